@@ -1,0 +1,1 @@
+"""Synthetic studies with a truth that no part of the judged code has touched."""

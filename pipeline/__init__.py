@@ -1,0 +1,1 @@
+"""Orchestration: load, segment, trace, simulate, compare, report."""

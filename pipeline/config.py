@@ -1,0 +1,86 @@
+"""Every setting of a run: one frozen dataclass per stage, one TOML table each, a docstring line per field.
+
+Performance settings live in their own table and never enter a cache key.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class LoadConfig:
+    """How scans are read."""
+
+    resample: bool = False
+    """Resample a tilted or irregularly spaced series onto a regular grid instead of refusing it."""
+
+
+@dataclass(frozen=True)
+class SegmentConfig:
+    """Fuzzy connectedness and the lumen surface."""
+
+    threshold: float = 0.6
+    """Strength of connectedness, 0 to 1, from which a voxel belongs to the lumen."""
+
+
+@dataclass(frozen=True)
+class TraceConfig:
+    """The wire's centreline."""
+
+    length_tolerance_mm: float = 2.0
+    """Largest accepted disagreement between the traced length and the manifest's insertion_mm."""
+
+
+@dataclass(frozen=True)
+class SolverConfig:
+    """The energy minimisation."""
+
+    method: str = "newton"
+    """newton or closed_form."""
+    segment_mm: float = 1.0
+    """Length of the wire's rigid segments."""
+    hull: str = "offset"
+    """offset (the smooth limit) or samples:N."""
+    tolerance: float = 1e-9
+    """Newton decrement, relative to the energy, at which a step counts as converged."""
+    max_iterations: int = 200
+    """Iterations allowed for one relaxation."""
+    step_mm: float = 1.0
+    """Longest insertion step; shortened where the scene asks for it."""
+    initial: str = "slide"
+    """slide or translate: how the wire is moved before it relaxes."""
+
+
+@dataclass(frozen=True)
+class SimulateConfig:
+    """What is simulated."""
+
+    depth: str = "traced"
+    """traced (the length found in each frame) or manifest (insertion_mm)."""
+    bending_scale: float = 1.0
+    """Factor on the wire's bending stiffness, for sensitivity runs."""
+    wall_scale: float = 1.0
+    """Factor on the wall stiffness, for sensitivity runs."""
+    roll_offset_deg: float = 0.0
+    """Added to the roll of every frame, for sensitivity runs."""
+
+
+@dataclass(frozen=True)
+class CompareConfig:
+    """How curves are compared."""
+
+    sample_mm: float = 0.5
+    """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
+
+
+@dataclass(frozen=True)
+class Config:
+    """All settings of a run."""
+
+    load: LoadConfig = field(default_factory=LoadConfig)
+    segment: SegmentConfig = field(default_factory=SegmentConfig)
+    trace: TraceConfig = field(default_factory=TraceConfig)
+    solver: SolverConfig = field(default_factory=SolverConfig)
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
+    compare: CompareConfig = field(default_factory=CompareConfig)

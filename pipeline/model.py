@@ -1,0 +1,107 @@
+"""The data that flows: load -> Volume, segment -> Lumen, trace -> Curve, simulate -> Simulated, compare -> Comparison.
+
+Frozen dataclasses of read-only arrays. Points are LPS mm, shape (n, 3), float64, ordered from entry to tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.status import FrameStatus
+from solver.grid import Grid, read_only
+
+Array = NDArray[np.float64]
+Counters = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Volume(Grid):
+    """Grey values of one scan (or of a crop of it), indexed x, y, z; ``assumed`` says what the file lacked."""
+
+    assumed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Lumen:
+    """The vessel: ``distance`` is the signed distance to its wall in mm on the vessel's own box, negative inside.
+
+    mask : uint8 on the same box, the voxels that are connected to the seeds.
+    wall_level : the grey value taken as the wall; NaN where the lumen did not come from grey values.
+    """
+
+    distance: Grid
+    mask: Grid
+    wall_level: float = float("nan")
+    warnings: tuple[str, ...] = ()
+    counters: Counters = field(default_factory=dict)
+
+
+def arc_length(points_mm: NDArray[Any]) -> Array:
+    """Arc length (n,) in mm from the first of (n, 3) points; empty for no points."""
+    if len(points_mm) == 0:
+        return np.zeros(0)
+    steps = np.linalg.norm(np.diff(points_mm, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A traced wire. points_mm (n, 3) from entry to tip; n = 0 when ``status`` says that there is none.
+
+    sigma_mm : (n,) standard deviation of each point across the wire, per axis, mm.
+    tip_sigma_mm : standard deviation of the tip along the wire, mm.
+    flagged : (n,) bool, points not to be trusted at that sigma (gap bridged, streak, strands in contact).
+    """
+
+    points_mm: Array
+    sigma_mm: Array
+    tip_sigma_mm: float = float("nan")
+    flagged: NDArray[np.bool_] | None = None
+    status: FrameStatus = FrameStatus.OK
+    note: str = ""
+    counters: Counters = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "points_mm", read_only(self.points_mm, np.float64))
+        object.__setattr__(self, "sigma_mm", read_only(self.sigma_mm, np.float64))
+        flagged = np.zeros(len(self.points_mm), bool) if self.flagged is None else self.flagged
+        object.__setattr__(self, "flagged", read_only(flagged, bool))
+
+    @property
+    def arc_mm(self) -> Array:
+        """Arc length (n,) from the entry, mm."""
+        return arc_length(self.points_mm)
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the curve, mm; 0 for an empty one."""
+        return float(self.arc_mm[-1]) if len(self.points_mm) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """The simulated wire of one frame, at the depth of that frame.
+
+    joints_mm : (k + 1, 3).     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
+    reaction_force_N : (3,), reaction_torque_N_mm : float or (3,), at the introducer.
+    """
+
+    joints_mm: Array
+    contact_force_N: Array
+    status: str
+    sentence: str
+    converged: bool
+    depth_mm: float
+    roll_deg: float
+    energy_N_mm: float
+    iterations: int
+    push_force_N: float
+    max_penetration_mm: float
+    seconds: float = float("nan")
+    work: Counters = field(default_factory=dict)

@@ -1,0 +1,38 @@
+"""What can happen to a frame: every member is the sentence that the user reads."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class FrameStatus(Enum):
+    """Outcome of one frame; ``identifier`` goes into errors.csv, the value is its sentence."""
+
+    OK = "traced, simulated to its depth, converged and compared"
+    SIMULATED = "simulated only: the case has no frames to compare with"
+    LOAD_FAILED = "the scan could not be read; see failures.csv for the file and the reason"
+    SEGMENT_FAILED = "no lumen could be segmented; see failures.csv for the reason"
+    NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
+    TRACE_FAILED = "the wire could not be followed as one curve from the entry; see failures.csv"
+    TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
+    TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
+    TRACE_LOW_CONTRAST = "the wire's contrast over noise is too low to be traced alone; give a previous curve"
+    LENGTH_MISMATCH = (
+        "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "
+        "correct the manifest or look for a gap in the trace"
+    )
+    SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
+    SCORE_MISSING = "no simulated curve was given for this frame"
+
+    @property
+    def identifier(self) -> str:
+        """The short name used in tables."""
+        return self.name.lower()
+
+
+class StageError(Exception):
+    """A stage cannot go on; the message has the five parts (what, where, got, allowed, do this)."""
+
+    def __init__(self, status: FrameStatus, message: str) -> None:
+        super().__init__(message)
+        self.status = status
