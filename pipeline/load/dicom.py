@@ -1,0 +1,205 @@
+"""DICOM series in a folder: sorted by position, refused by name where a stack is not a regular grid.
+
+ITK's reader sorts and spaces slices by itself, but shears a tilted stack and silently respaces one that lacks a
+slice (ITK issues 441 and 1607), so the positions are checked here, with tolerances relative to the spacing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import SimpleITK as sitk
+from numpy.typing import NDArray
+from scipy.ndimage import shift as shift_slice
+
+from pipeline.load.files import to_xyz
+from pipeline.load.geometry import Box, Header, LoadError, Source
+
+GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
+TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
+POSITION, ORIENTATION, PIXEL_SPACING = "0020|0032", "0020|0037", "0028|0030"
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Slices of one series in order: files, positions (n, 3) in mm, in-plane axes (3, 2), pixel (2,) mm, size (2,)."""
+
+    files: tuple[Path, ...]
+    positions: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    pixel_mm: NDArray[np.float64]
+    size: tuple[int, int]
+    pixel_type: str
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vector across the slices."""
+        return np.cross(self.axes[:, 0], self.axes[:, 1])
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """Position (n,) of every slice along the normal, mm."""
+        return np.asarray(self.positions @ self.normal)
+
+    @property
+    def drift_px(self) -> NDArray[np.float64]:
+        """In-plane displacement (n, 2) of every slice from the first, pixels."""
+        return np.asarray((self.positions - self.positions[0]) @ self.axes / self.pixel_mm)
+
+    @property
+    def spacing_mm(self) -> float:
+        """Usual distance between neighbours: the median gap."""
+        return float(np.median(np.diff(self.heights)))
+
+
+def _numbers(reader: sitk.ImageFileReader, key: str, count: int, path: Path) -> NDArray[np.float64]:
+    text = reader.GetMetaData(key) if reader.HasMetaDataKey(key) else ""
+    values = [float(v) for v in text.split("\\") if v.strip()]
+    if len(values) != count:
+        msg = f"{path}: DICOM tag ({key.replace('|', ',')}) holds {text!r}, expected {count} numbers; this slice has no position"
+        raise LoadError(msg)
+    return np.array(values)
+
+
+def _series_files(folder: Path, wanted: str) -> tuple[str, ...]:
+    sitk.ProcessObject.SetGlobalWarningDisplay(False)  # GDCM prints its own lines about folders without a series
+    ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
+    sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
+    images = {uid: files for uid, files in sizes.items() if files and _is_image(files[0])}
+    if wanted:
+        images = {uid: files for uid, files in images.items() if uid == wanted}
+    if len(images) != 1:
+        groups = "\n".join(f"    {uid}: {len(files)} files" for uid, files in images.items()) or "    none"
+        below = [d.name for d in sorted(folder.iterdir()) if d.is_dir()]
+        hint = f"  It has sub-folders: {', '.join(below[:5])}; name one of them.\n" if below else ""
+        msg = (
+            f"{folder}: found {len(images)} DICOM image series, expected one:\n{groups}\n{hint}"
+            "  Keep one series a folder, or name one as FOLDER#SERIES_UID."
+        )
+        raise LoadError(msg)
+    return next(iter(images.values()))
+
+
+def _is_image(path: str) -> bool:
+    reader = sitk.ImageFileReader()
+    reader.SetFileName(path)
+    try:
+        reader.ReadImageInformation()
+    except RuntimeError:
+        return False
+    return bool(reader.HasMetaDataKey(POSITION))
+
+
+def read_stack(source: Source) -> Stack:
+    """Headers of the one series in a folder, sorted along the slice normal."""
+    files, positions, orientations, pixels, sizes = [], [], [], [], []
+    pixel_type = ""
+    for name in _series_files(source.path, source.dataset):
+        reader = sitk.ImageFileReader()
+        reader.SetFileName(name)
+        reader.ReadImageInformation()
+        path = Path(name)
+        files.append(path)
+        positions.append(_numbers(reader, POSITION, 3, path))
+        orientations.append(_numbers(reader, ORIENTATION, 6, path))
+        pixels.append(_numbers(reader, PIXEL_SPACING, 2, path)[::-1])  # DICOM writes row spacing (y) first
+        sizes.append(tuple(reader.GetSize()[:2]))
+        pixel_type = sitk.GetPixelIDValueAsString(reader.GetPixelID())
+    _require_uniform(source, orientations, pixels, sizes)
+    axes = orientations[0].reshape(2, 3).T
+    order = np.argsort(np.array(positions) @ np.cross(axes[:, 0], axes[:, 1]), kind="stable")
+    return Stack(
+        tuple(files[i] for i in order), np.array(positions)[order], axes, pixels[0], sizes[0], pixel_type
+    )
+
+
+def _require_uniform(source: Source, orientations: list[Any], pixels: list[Any], sizes: list[Any]) -> None:
+    for name, values in (("orientation", orientations), ("pixel spacing", pixels), ("size", sizes)):
+        kinds = Counter(tuple(np.round(v, 5)) for v in values)
+        if len(kinds) > 1:
+            found = "; ".join(f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items())
+            msg = f"{source.path}: slices of different {name}: {found}. Mixed series: keep one stack a folder."
+            raise LoadError(msg)
+
+
+def irregularities(stack: Stack) -> list[str]:
+    """Why a stack is not a regular grid: repeated positions, missing slices, irregular gaps, tilt. Empty if it is."""
+    gaps = np.diff(stack.heights)
+    if len(gaps) == 0:
+        return ["single slice: one DICOM file is no volume"]
+    problems = []
+    if np.any(gaps < 1e-3):
+        problems.append(f"repeated position: {int(np.sum(gaps < 1e-3))} slice(s) lie where another one lies")
+    usual = stack.spacing_mm
+    odd = np.flatnonzero(np.abs(gaps - usual) > GAP_TOLERANCE * usual)
+    if len(odd) and usual > 1e-3:
+        where = ", ".join(f"{gaps[i]:.3f} mm after {stack.files[i].name}" for i in odd[:4])
+        whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(gaps[odd] > usual)
+        kind = "missing slices" if whole else "irregular slice gaps"
+        problems.append(f"{kind}: {len(odd)} of {len(gaps)} gaps differ from {usual:.3f} mm ({where})")
+    drift = np.abs(stack.drift_px[-1]).max() / len(gaps)
+    if drift > TILT_TOLERANCE:
+        angle = np.degrees(np.arctan2(np.linalg.norm(stack.drift_px[-1] * stack.pixel_mm), np.ptp(stack.heights)))
+        problems.append(f"gantry tilt: the stack leans {angle:.1f} degrees from the slice normal")
+    return problems
+
+
+def read_dicom_header(source: Source, resample: bool) -> tuple[Header, Stack]:
+    """Geometry of a series; tilt, gaps and repeats are refused, or resampled where ``resample`` asks for it."""
+    stack = read_stack(source)
+    problems = irregularities(stack)
+    fatal = [p for p in problems if p.startswith(("repeated", "single"))]
+    if fatal or (problems and not resample):
+        listing = "".join(f"\n    {p}" for p in problems)
+        msg = (
+            f"{source.path}: this series is not a regular grid:{listing}\n  A plain stack would shear or stretch the "
+            "anatomy. Export it again without tilt, or ask for resampling with --set load.resample=true."
+        )
+        raise LoadError(msg)
+    count = len(stack.files) if not problems else int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
+    header = Header(
+        source,
+        (stack.size[0], stack.size[1], count),
+        np.array([*stack.pixel_mm, stack.spacing_mm]),
+        stack.positions[0],
+        np.column_stack([stack.axes, stack.normal]),
+        stack.pixel_type,
+        stack.files,
+        assumed=tuple(f"resampled onto a regular grid: {p}" for p in problems),
+    )
+    return header, stack
+
+
+def read_dicom(header: Header, stack: Stack, box: Box) -> NDArray[Any]:
+    """Voxels of ``box``: of a regular stack the needed slices alone, of an irregular one the resampled grid."""
+    (x0, y0, z0), (x1, y1, z1) = box
+    if header.assumed:
+        return _resampled(header, stack)[x0:x1, y0:y1, z0:z1]
+    reader = sitk.ImageSeriesReader()
+    reader.SetFileNames([str(f) for f in stack.files[z0:z1]])
+    return to_xyz(reader.Execute())[x0:x1, y0:y1]
+
+
+def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
+    """Linear between the two nearest slices, each first shifted in plane by its drift (undoes the tilt)."""
+    heights = stack.heights - stack.heights[0]
+    slices: dict[int, NDArray[np.float32]] = {}
+
+    def straightened(i: int) -> NDArray[np.float32]:
+        if i not in slices:
+            plane = to_xyz(sitk.ReadImage(str(stack.files[i])))[:, :, 0].astype(np.float32)
+            slices[i] = shift_slice(plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min()))
+        return slices[i]
+
+    out = np.empty(header.shape, np.float32)
+    for k in range(header.shape[2]):
+        z = min(k * header.spacing_mm[2], heights[-1])
+        upper = int(np.clip(np.searchsorted(heights, z), 1, len(heights) - 1))
+        weight = (z - heights[upper - 1]) / (heights[upper] - heights[upper - 1])
+        out[:, :, k] = (1 - weight) * straightened(upper - 1) + weight * straightened(upper)
+        slices = {i: s for i, s in slices.items() if i >= upper - 1}
+    return out

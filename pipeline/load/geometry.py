@@ -1,0 +1,105 @@
+"""What a scan's header says, and whether two scans share one geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.status import FrameStatus, StageError
+from solver.grid import Grid
+
+Box = tuple[tuple[int, int, int], tuple[int, int, int]]
+"""First voxel (inclusive) and last voxel (exclusive) along x, y, z."""
+
+
+class LoadError(StageError):
+    """A scan that cannot be used as it is; the message says what, where, found, allowed and what to do."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(FrameStatus.LOAD_FAILED, message)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where one volume lives: a file, a DICOM folder, or one item of a sequence inside a file."""
+
+    path: Path
+    dataset: str = ""
+    item: int | None = None
+
+    def __str__(self) -> str:
+        """The way a manifest writes it."""
+        name = f"{self.path}#{self.dataset}" if self.dataset else str(self.path)
+        return name if self.item is None else f"{name}[{self.item}]"
+
+
+@dataclass(frozen=True, eq=False)
+class Header:
+    """Geometry and type of a scan, read without its voxels.
+
+    shape : voxels along x, y, z.     spacing_mm, origin_mm : (3,).     direction : (3, 3), columns are the axes.
+    files : what has to be read, in order.     item_count : volumes in the file (> 1 for a sequence).
+    """
+
+    source: Source
+    shape: tuple[int, int, int]
+    spacing_mm: NDArray[np.float64]
+    origin_mm: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    pixel_type: str
+    files: tuple[Path, ...]
+    item_count: int = 1
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def grid(self) -> Grid:
+        """The geometry as a grid without values."""
+        empty = np.broadcast_to(np.zeros((), np.uint8), self.shape)
+        return Grid(empty, self.spacing_mm, self.origin_mm, self.direction)
+
+    @property
+    def box(self) -> Box:
+        """All of the scan."""
+        return (0, 0, 0), self.shape
+
+
+def describe(header: Header) -> str:
+    """One line with the whole geometry, for messages."""
+    numbers = ", ".join(
+        f"{name} {np.array2string(np.asarray(value), precision=6, separator=', ').replace(chr(10), '')}"
+        for name, value in (
+            ("shape", header.shape),
+            ("spacing", header.spacing_mm),
+            ("origin", header.origin_mm),
+            ("direction", header.direction),
+        )
+    )
+    return f"{header.source}: {numbers}"
+
+
+def corner_shift_voxels(a: Header, b: Header) -> float:
+    """Largest distance between the two scans' corners, in voxels of ``a``; inf where the shapes differ."""
+    if a.shape != b.shape:
+        return float("inf")
+    corners = np.array(np.meshgrid(*[(0, n - 1) for n in a.shape])).reshape(3, -1).T
+    shift = np.linalg.norm(a.grid.to_mm(corners) - b.grid.to_mm(corners), axis=1)
+    return float(shift.max() / a.spacing_mm.min())
+
+
+def require_same_geometry(reference: Header, other: Header, tolerance_voxels: float = 0.5) -> None:
+    """Refuse a scan whose corners lie more than half a voxel from the reference's.
+
+    Anything less is rounding in a header (1e-8 in a direction is common) and is harmonised silently.
+    """
+    shift = corner_shift_voxels(reference, other)
+    if shift > tolerance_voxels:
+        found = "the shapes differ" if np.isinf(shift) else f"their corners lie {shift:.2f} voxels apart"
+        msg = (
+            f"geometry differs between scans of one case: {found}, allowed {tolerance_voxels} voxel.\n"
+            f"  {describe(reference)}\n  {describe(other)}\n"
+            "  Resample the scans onto one grid, or split them into two cases."
+        )
+        raise LoadError(msg)
