@@ -1,0 +1,1 @@
+"""Compiled kernels of segment and trace: arrays and scalars in, arrays out. Arrays are C-contiguous, whatever the axes mean."""

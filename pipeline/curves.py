@@ -1,0 +1,59 @@
+"""Polylines: resampling, truncation and extension by arc length, tangents."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_splprep
+
+from pipeline.model import arc_length
+
+Array = NDArray[np.float64]
+
+
+def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
+    """Points (n, 3) of a polyline (m, 3) at arc lengths (n,) in mm from its start; beyond its ends, straight on."""
+    curve = np.asarray(curve_mm, dtype=np.float64)
+    wanted = np.asarray(arc_mm, dtype=np.float64)
+    arc = arc_length(curve)
+    inside = np.stack([np.interp(wanted, arc, curve[:, a]) for a in range(3)], axis=-1)
+    beyond = np.maximum(wanted - arc[-1], 0.0)[..., None] * tip_tangent(curve)
+    return np.asarray(inside + beyond)
+
+
+def samples(length_mm: float, step_mm: float) -> Array:
+    """Arc lengths 0, step, 2 step, ... and the end itself, mm."""
+    count = max(int(np.floor(length_mm / step_mm + 1e-9)), 0)
+    arc = np.arange(count + 1) * step_mm
+    return arc if length_mm - arc[-1] < 1e-6 else np.append(arc, length_mm)
+
+
+def resample(curve_mm: ArrayLike, step_mm: float) -> Array:
+    """The polyline sampled every ``step_mm`` of arc length, both ends included."""
+    curve = np.asarray(curve_mm, dtype=np.float64)
+    return at_arc(curve, samples(float(arc_length(curve)[-1]), step_mm))
+
+
+def to_length(curve_mm: ArrayLike, length_mm: float, step_mm: float = 0.5) -> Array:
+    """The polyline cut at, or continued straight to, ``length_mm``."""
+    return at_arc(curve_mm, samples(length_mm, step_mm))
+
+
+def tip_tangent(curve_mm: ArrayLike, over_mm: float = 1.0) -> Array:
+    """Unit vector (3,) along which the curve ends, taken over its last ``over_mm``; zero for a single point."""
+    curve = np.asarray(curve_mm, dtype=np.float64)
+    arc = arc_length(curve)
+    start = int(np.searchsorted(arc, arc[-1] - over_mm, side="right")) - 1
+    chord = curve[-1] - curve[max(start, 0)]
+    norm = np.linalg.norm(chord)
+    return np.asarray(chord / norm) if norm > 0 else np.zeros(3)
+
+
+def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:
+    """Smoothing cubic spline through a voxel path whose points scatter by ``sigma_mm`` per axis, ends included."""
+    path = np.asarray(path_mm, dtype=np.float64)
+    if len(path) < 5:
+        return path
+    spline, _ = make_splprep(path.T, s=3.0 * len(path) * sigma_mm**2)
+    dense = spline(np.linspace(0.0, 1.0, 4 * len(path))).T
+    return resample(dense, step_mm)

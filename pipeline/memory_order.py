@@ -1,0 +1,51 @@
+"""Grids in the order of their memory, so that kernels walk files that are x-fastest without copying them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.grid import Array, Grid
+
+FORWARD = (0, 1, 2)
+REVERSED = (2, 1, 0)
+
+
+def memory_axes(grid: Grid) -> tuple[int, int, int]:
+    """The order of axes in which the grid's values are C-contiguous: as they are, or reversed (Fortran)."""
+    return REVERSED if grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous else FORWARD
+
+
+def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
+    """The same grid (same points in mm) with its index axes in another order; a view, never a copy."""
+    order = list(axes)
+    return Grid(grid.values.transpose(axes), grid.spacing_mm[order], grid.origin_mm, grid.direction[:, order])
+
+
+def contiguous(grid: Grid) -> Grid:
+    """The grid itself if its values are C-contiguous, otherwise with a copy (of a crop, say) that is."""
+    if grid.values.flags.c_contiguous:
+        return grid
+    return grid.with_values(np.ascontiguousarray(grid.values))
+
+
+def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
+    """The grid with C-contiguous values and the axes that undo it with :func:`reorder`.
+
+    Both orders in use are their own inverse, so ``reorder(result, axes)`` gives the first order back.
+    """
+    axes = memory_axes(grid)
+    return contiguous(reorder(grid, axes)), axes
+
+
+def integer_offset(grid: Grid, inner: Grid) -> Array | None:
+    """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
+
+    A lattice is the same when spacing and axes agree to a ten-thousandth and the shift is whole to 0.02 voxel.
+    """
+    same = np.allclose(grid.spacing_mm, inner.spacing_mm, rtol=1e-4) and np.allclose(
+        grid.direction, inner.direction, atol=1e-4
+    )
+    shift = grid.to_index(inner.origin_mm)
+    if not same or np.any(np.abs(shift - np.rint(shift)) > 0.02):
+        return None
+    return np.rint(shift)

@@ -1,0 +1,65 @@
+"""Where a result comes from: versions, command line, machine, code state."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("numpy", "scipy", "scikit-image", "SimpleITK", "pandas", "h5py", "matplotlib", "numba", "pydantic")
+
+
+def package_version() -> str:
+    """Version of wireval, or ``unknown`` where it runs from a plain checkout."""
+    try:
+        return version("wireval")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _git(*args: str) -> str:
+    try:
+        done = subprocess.run(
+            ["git", *args], cwd=Path(__file__).parent, capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.strip()
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def peak_memory_mib() -> float:
+    """Largest resident memory of this process so far, MiB (Linux counts in KiB)."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def collect() -> dict[str, Any]:
+    """Versions, code state, command line and machine of this run."""
+    commit = _git("rev-parse", "HEAD")
+    return {
+        "wireval": package_version(),
+        "git_commit": commit,
+        "git_dirty": bool(commit and _git("status", "--porcelain", "--untracked-files=no")),
+        "python": platform.python_version(),
+        "versions": {name: version(name) for name in PACKAGES},
+        "argv": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "host": platform.node(),
+        "system": platform.platform(),
+        "processor": _processor(),
+        "cpu_count": os.cpu_count(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
