@@ -1,0 +1,100 @@
+"""3D Slicer markups curves (.mrk.json), LPS mm."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from reports.atomic import write_text
+
+Array = NDArray[np.float64]
+_SCHEMA = (
+    "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/"
+    "markups-schema-v1.0.3.json#"
+)
+_POSITION_DIGITS = 6  # a nanometre: below any voxel, above float noise
+
+
+def write_markups_curve(
+    path: Path,
+    points_mm: ArrayLike,
+    name: str,
+    measurements: Mapping[str, ArrayLike] | None = None,
+    colour: tuple[float, float, float] = (0.0, 0.447, 0.698),
+) -> None:
+    """Write a curve through points (n, 3), LPS mm, in order.
+
+    measurements : name -> finite values (n,), shown by Slicer as control-point measurements; the ending
+    of the name (``_mm``, ``_N``, ``_deg``) gives the unit.     colour : red, green, blue from 0 to 1.
+    """
+    points = checked_points(points_mm, path)
+    markup = {
+        "type": "Curve",
+        "coordinateSystem": "LPS",
+        "coordinateUnits": "mm",
+        "locked": True,
+        "labelFormat": "%N-%d",
+        "controlPoints": [_control_point(name, i, p) for i, p in enumerate(points, start=1)],
+        "measurements": [_measurement(key, values, path) for key, values in (measurements or {}).items()],
+        "display": {
+            "visibility": True,
+            "color": list(colour),
+            "selectedColor": list(colour),
+        },
+    }
+    write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
+
+
+def read_markups_curve(path: Path) -> Array:
+    """Points (n, 3) in LPS mm of the first curve of a file; RAS is turned. ValueError for another markup."""
+    markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
+    units = markup.get("coordinateUnits", "mm")
+    if markup["type"] not in ("Curve", "ClosedCurve") or units not in ("mm", ["mm", "UCUM", "millimeter"]):
+        msg = f"{path}: got a {markup['type']!r} in {units!r}; only a curve in mm can be read"
+        raise ValueError(msg)
+    kept = [p["position"] for p in markup["controlPoints"] if p.get("positionStatus", "defined") == "defined"]
+    points = np.array(kept, dtype=np.float64).reshape(-1, 3)
+    # older writers say "0" for RAS, which is LPS with the first two axes reversed
+    reversed_axes = str(markup.get("coordinateSystem", "LPS")) in ("RAS", "0")
+    return np.asarray(points * (-1.0, -1.0, 1.0)) if reversed_axes else points
+
+
+def checked_points(points_mm: ArrayLike, path: Path) -> Array:
+    """Points as a float64 array (n, 3); raises ValueError for another shape or a value that is not finite."""
+    points = np.asarray(points_mm, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or not np.all(np.isfinite(points)):
+        msg = f"{path}: got points of shape {points.shape}; give finite LPS coordinates (n, 3) in mm"
+        raise ValueError(msg)
+    return points
+
+
+def _control_point(name: str, number: int, point: Array) -> dict[str, Any]:
+    return {
+        "id": str(number),
+        "label": f"{name}-{number}",
+        "position": [round(float(x), _POSITION_DIGITS) for x in point],
+        "orientation": [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0],
+        "selected": True,
+        "locked": True,
+        "visibility": False,  # a curve is read as a line; 400 glyphs would hide it
+        "positionStatus": "defined",  # without it some versions take the point as a preview
+    }
+
+
+def _measurement(name: str, values: ArrayLike, path: Path) -> dict[str, Any]:
+    numbers = np.asarray(values, dtype=np.float64)
+    if not np.all(np.isfinite(numbers)):
+        msg = f"{path}: measurement {name} has values that are not finite; leave it out"
+        raise ValueError(msg)
+    ending = name.rsplit("_", 1)[-1]
+    return {
+        "name": name,
+        "enabled": True,
+        "units": ending if ending in ("mm", "N", "deg") else "",
+        "controlPointValues": [float(f"{v:.6g}") for v in numbers],
+    }

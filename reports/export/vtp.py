@@ -1,0 +1,135 @@
+"""VTK poly data (.vtp): wires as polylines with point arrays, surfaces as triangles. LPS mm.
+
+Written by hand, because the vtk wheel would cost 592 MB: inline base64, little-endian, one 8-byte length
+before each block. ASCII would be smaller code, but VTK's text reader stops at the first NaN.
+"""
+
+from __future__ import annotations
+
+import base64
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from reports.atomic import write_bytes
+from reports.export.markups import checked_points
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Cells = Mapping[str, tuple[Index, Index]]
+_TYPES = {"Float64": "<f8", "Int64": "<i8"}
+_LENGTH_BYTES = 8  # header_type UInt64
+
+
+@dataclass(frozen=True, eq=False)
+class PolyData:
+    """What a .vtp holds.
+
+    points_mm : (n, 3) LPS mm.     lines : one index array each.     triangles : (t, 3) indices.
+    point_arrays : name -> (n,) or (n, 3).
+    """
+
+    points_mm: Array
+    lines: tuple[Index, ...] = ()
+    triangles: Index = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    point_arrays: Mapping[str, Array] = field(default_factory=dict)
+
+
+def write_polyline_vtp(
+    path: Path, points_mm: ArrayLike, point_arrays: Mapping[str, ArrayLike] | None = None
+) -> None:
+    """Write one polyline through points (n, 3), LPS mm, with arrays (n,) or (n, 3) such as ``error_mm``."""
+    points = checked_points(points_mm, path)
+    connectivity = np.arange(len(points))
+    offsets = np.array([len(points)] if len(points) else [], dtype=np.int64)
+    _write(path, points, {"Lines": (connectivity, offsets)}, point_arrays or {})
+
+
+def write_surface_vtp(
+    path: Path,
+    vertices_mm: ArrayLike,
+    triangles: ArrayLike,
+    point_arrays: Mapping[str, ArrayLike] | None = None,
+) -> None:
+    """Write a triangle surface: vertices (n, 3) in LPS mm, triangles (t, 3) of vertex indices."""
+    vertices = checked_points(vertices_mm, path)
+    faces = np.asarray(triangles, dtype=np.int64)
+    inside = bool(np.all((faces >= 0) & (faces < len(vertices))))
+    if faces.ndim != 2 or faces.shape[1] != 3 or not inside:
+        msg = f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices"
+        raise ValueError(msg)
+    offsets = 3 * np.arange(1, len(faces) + 1)
+    _write(path, vertices, {"Polys": (faces.ravel(), offsets)}, point_arrays or {})
+
+
+def read_vtp(path: Path) -> PolyData:
+    """Read back a .vtp as written here; raises ValueError for the ASCII, compressed and appended forms."""
+    root = ET.parse(path).getroot()
+    piece = root.find("./PolyData/Piece")
+    inline = all(a.get("format") == "binary" for a in root.iter("DataArray"))
+    if piece is None or not inline or root.get("header_type") != "UInt64" or root.get("compressor"):
+        msg = f"{path}: not an uncompressed inline .vtp; only the files that this package writes are read"
+        raise ValueError(msg)
+    points = _arrays(piece, "Points")["Points"]
+    lines = _cells(piece, "Lines")
+    triangles = np.array(_cells(piece, "Polys"), dtype=np.int64).reshape(-1, 3)
+    return PolyData(points, lines, triangles, _arrays(piece, "PointData"))
+
+
+def _write(path: Path, points: Array, cells: Cells, point_arrays: Mapping[str, ArrayLike]) -> None:
+    root = ET.Element(
+        "VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64"
+    )
+    root.append(ET.Comment(" SPACE=LPS; lengths in mm "))
+    counts = {f"NumberOf{kind}": str(len(offsets)) for kind, (_, offsets) in cells.items()}
+    piece = ET.SubElement(
+        ET.SubElement(root, "PolyData"), "Piece", {"NumberOfPoints": str(len(points)), **counts}
+    )
+    data = ET.SubElement(piece, "PointData")
+    for name, values in point_arrays.items():
+        _append(data, name, _checked_array(values, name, len(points), path), "Float64")
+    _append(ET.SubElement(piece, "Points"), "Points", points, "Float64")
+    for kind, (connectivity, offsets) in cells.items():
+        block = ET.SubElement(piece, kind)
+        _append(block, "connectivity", connectivity, "Int64")
+        _append(block, "offsets", offsets, "Int64")
+    write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+
+
+def _checked_array(values: ArrayLike, name: str, n_points: int, path: Path) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((n_points,), (n_points, 3)):
+        msg = f"{path}: point array {name} has shape {array.shape}; give ({n_points},) or ({n_points}, 3)"
+        raise ValueError(msg)
+    return array
+
+
+def _append(parent: ET.Element, name: str, values: NDArray[Any], kind: str) -> None:
+    content = np.ascontiguousarray(values, dtype=_TYPES[kind]).tobytes()
+    length = len(content).to_bytes(_LENGTH_BYTES, "little")
+    components = str(values.shape[1]) if values.ndim == 2 else "1"
+    attributes = {"type": kind, "Name": name, "NumberOfComponents": components, "format": "binary"}
+    ET.SubElement(parent, "DataArray", attributes).text = base64.b64encode(length + content).decode("ascii")
+
+
+def _arrays(piece: ET.Element, block: str) -> dict[str, NDArray[Any]]:
+    return {str(a.get("Name")): _parse(a) for a in piece.findall(f"./{block}/DataArray")}
+
+
+def _parse(element: ET.Element) -> NDArray[Any]:
+    content = base64.b64decode((element.text or "").strip())[_LENGTH_BYTES:]
+    values = np.frombuffer(content, dtype=_TYPES[str(element.get("type"))])
+    components = int(element.get("NumberOfComponents", "1"))
+    return values.reshape(-1, components) if components > 1 else values
+
+
+def _cells(piece: ET.Element, kind: str) -> tuple[Index, ...]:
+    arrays = _arrays(piece, kind)
+    if not arrays or not len(arrays["offsets"]):
+        return ()
+    return tuple(np.split(arrays["connectivity"], arrays["offsets"][:-1]))
