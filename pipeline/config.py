@@ -22,6 +22,16 @@ class SegmentConfig:
 
     threshold: float = 0.6
     """Strength of connectedness, 0 to 1, from which a voxel belongs to the lumen."""
+    homogeneity_sigma: float | None = None
+    """Spread of the homogeneity affinity, grey values; estimated at the seeds when not given."""
+    feature_sigma: float | None = None
+    """Spread of the object-feature affinity, grey values; estimated at the seeds when not given."""
+    margin_mm: float = 5.0
+    """Room around the vessel in the box that holds its signed distance."""
+    outer_mm: float = 3.0
+    """How far outside the wall the distance is exact."""
+    least_voxels: int = 200
+    """A smaller connected region is no lumen."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +82,8 @@ class CompareConfig:
 
     sample_mm: float = 0.5
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
+    bootstrap: int = 2000
+    """Resamples behind the 95 % intervals; 0 leaves them out."""
 
 
 @dataclass(frozen=True)
