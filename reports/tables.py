@@ -109,6 +109,11 @@ def read_table(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
         raise ValueError(msg) from error
 
 
+def empty_table(columns: Sequence[Column]) -> pd.DataFrame:
+    """No rows, every column of the schema in its kind."""
+    return _conform(pd.DataFrame(), columns)
+
+
 def _write_rows(path: Path, rows: Iterable[Row], columns: Sequence[Column]) -> None:
     kept = [dict(row) for row in rows]
     for row in kept:

@@ -1,0 +1,88 @@
+"""The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reports import frames_file, tables
+from reports.frames_file import Frame, Scan
+from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS
+
+GOOD = ("ok", "simulated")
+
+
+@dataclass(frozen=True, eq=False)
+class CaseFiles:
+    """What is on disk of one case; absent tables are empty, an absent result.json is an empty mapping."""
+
+    folder: Path
+    result: Mapping[str, Any]
+    errors: pd.DataFrame
+    points: pd.DataFrame
+    scan: Scan | None
+    frames: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Identifier of the case; the folder's name where result.json is missing."""
+        return str(self.result.get("case", self.folder.name))
+
+    @property
+    def good(self) -> pd.DataFrame:
+        """Rows of errors.csv whose frame is ok (or simulated, where there is nothing to compare with)."""
+        return self.errors[self.errors["status"].isin(GOOD)]
+
+    def read_frame(self, frame: int) -> Frame:
+        """Read the arrays of one frame from the disk; kept by nobody."""
+        return frames_file.read_frame(self.folder / "frames.h5", frame)
+
+
+def read_case(folder: Path) -> CaseFiles:
+    """Read a case's folder; raises ValueError, naming the file, where one is damaged."""
+    frames = folder / "frames.h5"
+    errors = _table(folder / "errors.csv", tables.read_errors, ERRORS_COLUMNS)
+    points = _table(folder / "points.csv.gz", tables.read_points, POINTS_COLUMNS)
+    scan, numbers = _frames(frames) if frames.exists() else (None, ())
+    return CaseFiles(folder, read_json(folder / "result.json"), errors, points, scan, numbers)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object; an absent file is an empty one. Raises ValueError where it is not an object."""
+    if not path.exists():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        msg = f"{path}: not JSON ({error}); remove the folder and run the case again"
+        raise ValueError(msg) from error
+    if not isinstance(content, dict):
+        msg = f"{path}: got a {type(content).__name__}, expected an object; run the case again"
+        raise ValueError(msg)
+    return content
+
+
+def find_cases(out_dir: Path) -> list[Path]:
+    """Folders of the cases of a run, by name."""
+    root = out_dir / "cases"
+    return sorted(p for p in root.iterdir() if p.is_dir()) if root.is_dir() else []
+
+
+def _table(path: Path, read: Any, columns: Any) -> pd.DataFrame:
+    if path.exists():
+        table: pd.DataFrame = read(path)
+        return table
+    return tables.empty_table(columns)
+
+
+def _frames(path: Path) -> tuple[Scan | None, tuple[int, ...]]:
+    try:
+        return frames_file.read_scan(path), frames_file.frame_numbers(path)
+    except OSError as error:
+        msg = f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"
+        raise ValueError(msg) from error

@@ -1,0 +1,63 @@
+"""Heat maps: a quantity along the wire (across) for every frame (up)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from reports.case_files import CaseFiles
+from reports.figures._style import SEQUENTIAL, Drawing, has, new_figure, plain, whole_numbers
+
+_CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
+
+
+def error_along_wire(case: CaseFiles) -> Drawing | None:
+    """Distance to the traced curve along the simulated wire."""
+    return _heat_map(case.points, "error_mm", "distance to the traced curve, mm")
+
+
+def contact_along_wire(case: CaseFiles) -> Drawing | None:
+    """Magnitude of the wall's force along the simulated wire."""
+    return _heat_map(case.points, "contact_force_N", "contact force, N")
+
+
+def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
+    kept = points[points[column].notna() & points["arc_mm"].notna()]
+    if not has(kept, column):
+        return None
+    frames = np.arange(int(kept["frame"].min()), int(kept["frame"].max()) + 1)
+    step = _step(kept)
+    columns = np.rint(kept["arc_mm"].to_numpy() / step).astype(int)
+    grid = np.full((len(frames), int(columns.max()) + 1), np.nan)
+    # two samples in one cell (the tip's short last step): the larger is shown
+    rows = kept["frame"].to_numpy(dtype=int) - frames[0]
+    np.fmax.at(grid, (rows, columns), kept[column].to_numpy())
+    figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
+    axes = figure.subplots()
+    edges = (np.arange(grid.shape[1] + 1) - 0.5) * step
+    top = max(float(np.nanpercentile(grid, _CLIP_PERCENTILE)), 1e-9)
+    rows_edges = np.append(frames, frames[-1] + 1) - 0.5
+    mesh = axes.pcolormesh(edges, rows_edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, rasterized=True)
+    clipped = bool(np.nanmax(grid) > top)
+    figure.colorbar(mesh, ax=axes, label=label, extend="max" if clipped else "neither", pad=0.01)
+    axes.set_facecolor("0.93")
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel("arc length from the entry along the simulated wire, mm")
+    axes.set_ylabel("frame")
+    whole_numbers(axes.yaxis)
+    plain(axes)
+    axes.grid(visible=False)
+    return Drawing(figure, _tidy(grid, frames, step, column))
+
+
+def _step(points: pd.DataFrame) -> float:
+    """Arc-length step between samples, mm."""
+    steps = points.groupby("frame")["arc_mm"].diff()
+    positive = steps[steps > 0]
+    return float(positive.median()) if len(positive) else 1.0
+
+
+def _tidy(grid: NDArray[np.float64], frames: NDArray[np.int_], step: float, column: str) -> pd.DataFrame:
+    row, place = np.nonzero(np.isfinite(grid))
+    return pd.DataFrame({"frame": frames[row], "arc_mm": place * step, column: grid[row, place]})

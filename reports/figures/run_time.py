@@ -1,0 +1,54 @@
+"""Seconds by stage, for every frame and in all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from reports.case_files import CaseFiles
+from reports.figures._style import STAGE_COLOURS, Drawing, has, new_figure, plain, whole_numbers
+
+
+def run_time(case: CaseFiles) -> Drawing | None:
+    """Stacked seconds per frame, and the totals of the case."""
+    stages = [s for s in STAGE_COLOURS if has(case.errors, f"{s}_s")]
+    totals = {s: case.result.get("seconds", {}).get(s) for s in STAGE_COLOURS}
+    known = {s: float(v) for s, v in totals.items() if v is not None and np.isfinite(v)}
+    if not stages and not known:
+        return None
+    figure = new_figure(3.6)
+    left, right = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
+    if stages:
+        _stacked(left, case.errors, stages)
+    else:
+        left.remove()
+    _totals(right, known)
+    per_frame = case.errors[["frame", *(f"{s}_s" for s in stages)]]
+    in_all = pd.DataFrame([{f"{s}_s": v for s, v in known.items()}], index=["case"])
+    return Drawing(figure, pd.concat([per_frame, in_all]))
+
+
+def _stacked(axes: Axes, errors: pd.DataFrame, stages: list[str]) -> None:
+    base = np.zeros(len(errors))
+    for stage in stages:
+        seconds = errors[f"{stage}_s"].fillna(0.0).to_numpy()
+        axes.bar(errors["frame"], seconds, bottom=base, color=STAGE_COLOURS[stage], label=stage, width=0.85)
+        base = base + seconds
+    axes.set_xlabel("frame")
+    axes.set_ylabel("seconds")
+    whole_numbers(axes.xaxis)
+    axes.legend(frameon=False, fontsize=8, ncols=3)
+    axes.set_ylim(top=1.25 * max(float(base.max()), 1e-9))
+    plain(axes)
+
+
+def _totals(axes: Axes, seconds: dict[str, float]) -> None:
+    names = list(seconds)
+    values = [seconds[name] for name in names]
+    bars = axes.barh(names, values, color=[STAGE_COLOURS[name] for name in names])
+    axes.bar_label(bars, labels=[f"{v:.3g} s" for v in values], padding=3, fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlim(right=1.3 * max([*values, 1e-9]))
+    axes.set_xlabel("seconds, whole case")
+    plain(axes)
