@@ -136,8 +136,12 @@ def _segment(run: CaseRun) -> None:
     header = run.headers.first
     assert header is not None, "the manifest guarantees frames, a reference or a lumen"
     if run.headers.reference is None:
-        run.assumptions.append("no reference scan: the lumen was segmented from frame 0, which has a wire in it")
-    key = key_of("segment", _header_hash(run, header), run.case.lumen_seed_mm, run.config.segment, run.config.load)
+        run.assumptions.append(
+            "no reference scan: the lumen was segmented from frame 0, which has a wire in it"
+        )
+    key = key_of(
+        "segment", _header_hash(run, header), run.case.lumen_seed_mm, run.config.segment, run.config.load
+    )
     stored = run.store.get("segment", key)
     if stored is not None:
         run.lumen = unpack_lumen(*stored)
@@ -178,7 +182,9 @@ def _trace_frames(run: CaseRun) -> None:
         with run.timed("trace", frame):
             frame.curve = given[frame.index] if given else _trace(run, frame, header, volume, reference)
         _judge_trace(run, frame)
-        run.progress("trace", frame.index + 1, len(run.frames), f"{frame.status} {frame.curve.length_mm:.1f} mm")
+        run.progress(
+            "trace", frame.index + 1, len(run.frames), f"{frame.status} {frame.curve.length_mm:.1f} mm"
+        )
 
 
 def _given_traces(run: CaseRun) -> list[Curve]:
@@ -232,15 +238,17 @@ def _judge_trace(run: CaseRun, frame: Frame) -> None:
         frame.fail(
             "trace",
             FrameStatus.LENGTH_MISMATCH,
-            f"trace: case {run.case.id!r} frame {frame.index}: traced {frame.curve.length_mm:.2f} mm, insertion_mm says "
-            f"{frame.expected_mm:.2f} mm, allowed {run.config.trace.length_tolerance_mm} mm apart; look at the picture, "
-            "then correct the manifest or trace.length_tolerance_mm",
+            f"trace: case {run.case.id!r} frame {frame.index}: traced {frame.curve.length_mm:.2f} mm, insertion_mm "
+            f"says {frame.expected_mm:.2f} mm, allowed {run.config.trace.length_tolerance_mm} mm apart; look at the "
+            "picture, then correct the manifest or trace.length_tolerance_mm",
         )
 
 
 def _depth(run: CaseRun, frame: Frame) -> float:
     """Depth to simulate a frame at: the traced length, else the manifest's; NaN where neither is known."""
-    traced = frame.curve.length_mm if frame.curve is not None and len(frame.curve.points_mm) > 1 else float("nan")
+    traced = (
+        frame.curve.length_mm if frame.curve is not None and len(frame.curve.points_mm) > 1 else float("nan")
+    )
     if run.config.simulate.depth == "manifest" or np.isnan(traced):
         return frame.expected_mm
     return traced
@@ -252,7 +260,9 @@ def _simulate_frames(run: CaseRun) -> None:
     for frame in run.frames:
         frame.depth_mm = _depth(run, frame)
         if np.isnan(frame.depth_mm):
-            frame.fail("simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given")
+            frame.fail(
+                "simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given"
+            )
     replay = [f for f in run.frames if not np.isnan(f.depth_mm)]
     if not replay:
         return
@@ -266,7 +276,9 @@ def _simulate_frames(run: CaseRun) -> None:
             run.count("simulate", result.work)
             if not result.converged:
                 frame.fail_with("simulate", result.status, result.sentence)
-            run.progress("simulate", frame.index + 1, len(run.frames), f"{result.status} {result.depth_mm:.1f} mm")
+            run.progress(
+                "simulate", frame.index + 1, len(run.frames), f"{result.status} {result.depth_mm:.1f} mm"
+            )
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {run.case.id!r}: {error}") from error
 
@@ -282,7 +294,10 @@ def _compare_frames(run: CaseRun) -> None:
         with run.timed("compare", frame):
             if run.headers is not None and not run.headers.frames:
                 if frame.ok:
-                    frame.status, frame.sentence = FrameStatus.SIMULATED.identifier, FrameStatus.SIMULATED.value
+                    frame.status, frame.sentence = (
+                        FrameStatus.SIMULATED.identifier,
+                        FrameStatus.SIMULATED.value,
+                    )
             elif frame in traced and frame.simulated is not None:
                 assert frame.curve is not None
                 frame.comparison = compare(frame.simulated, frame.curve, run.lumen, run.config.compare)
@@ -303,7 +318,9 @@ def _static_nulls(run: CaseRun, traced: list[Frame]) -> nulls.Nulls:
 
 def _score_nulls(run: CaseRun, frame: Frame, static: nulls.Nulls, previous: Any) -> None:
     assert frame.curve is not None
-    guesses = {name: static.at_depth(name, frame.depth_mm) for name in ("centreline", "shortest", "min_bending")}
+    guesses = {
+        name: static.at_depth(name, frame.depth_mm) for name in ("centreline", "shortest", "min_bending")
+    }
     guesses["previous"] = previous
     step = run.config.compare.sample_mm
     for name, guess in guesses.items():

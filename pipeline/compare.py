@@ -104,10 +104,13 @@ def same_branch(simulated_tip: Array, traced_tip: Array, lumen: Lumen, slack_mm:
     return bool(np.max(lumen.distance.values[tuple(index.T)]) <= slack_mm)
 
 
-def compare(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()) -> Comparison:
+def compare(
+    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()
+) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
     if len(traced.points_mm) < 2 or len(simulated.joints_mm) < 2:
-        msg = f"compare: got {len(simulated.joints_mm)} simulated joints and {len(traced.points_mm)} traced points, need 2"
+        counts = f"{len(simulated.joints_mm)} simulated joints and {len(traced.points_mm)} traced points"
+        msg = f"compare: got {counts}, need 2 of each"
         raise ValueError(msg)
     wire, curve = simulated.joints_mm, traced.points_mm
     arc = samples(float(arc_length(wire)[-1]), config.sample_mm)
@@ -154,13 +157,20 @@ def _against(curve: NDArray[np.float64], truth: Array, step_mm: float) -> tuple[
 
 
 def compare_truth(
-    truth_mm: Array, traced: Curve | None, simulated: Simulated | None, config: CompareConfig = CompareConfig()
+    truth_mm: Array,
+    traced: Curve | None,
+    simulated: Simulated | None,
+    config: CompareConfig = CompareConfig(),
 ) -> TruthErrors:
     """Errors of both curves against the known wire, one-sided from 0.5 mm samples of each curve to the truth."""
     values: dict[str, float] = {}
     if traced is not None and len(traced.points_mm) > 1:
         distance, tip = _against(traced.points_mm, truth_mm, config.sample_mm)
-        values |= {"trace_mean_mm": float(distance.mean()), "trace_max_mm": float(distance.max()), "trace_tip_mm": tip}
+        values |= {
+            "trace_mean_mm": float(distance.mean()),
+            "trace_max_mm": float(distance.max()),
+            "trace_tip_mm": tip,
+        }
     if simulated is not None and len(simulated.joints_mm) > 1:
         distance, tip = _against(simulated.joints_mm, truth_mm, config.sample_mm)
         values |= {"truth_rms_mm": rms(distance), "truth_tip_mm": tip}

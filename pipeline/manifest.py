@@ -122,7 +122,9 @@ def _siblings(location: tuple[int | str, ...]) -> set[str]:
 def _resolve(model: ManifestModel, path: Path) -> Manifest:
     problems: list[str] = []
     repeats = [name for name, count in Counter(c.id for c in model.case).items() if count > 1]
-    problems += [f"{path}: case {name!r}: this id is used more than once; ids name output folders" for name in repeats]
+    problems += [
+        f"{path}: case {name!r}: this id is used more than once; ids name output folders" for name in repeats
+    ]
     cases = []
     for case in model.case:
         try:

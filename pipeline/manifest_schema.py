@@ -30,7 +30,9 @@ def _check_profile(value: Profile, lowest: float, name: str) -> Profile:
         msg = f"{name}: distances from the tip {distances} must be >= 0 and must not decrease"
         raise ValueError(msg)
     if any(not math.isfinite(v) or v < lowest for _, v in pairs):
-        msg = f"{name}: values {[v for _, v in pairs]} must be finite" + ("" if lowest < 0 else " and above 0")
+        msg = f"{name}: values {[v for _, v in pairs]} must be finite" + (
+            "" if lowest < 0 else " and above 0"
+        )
         raise ValueError(msg)
     return value
 

@@ -39,7 +39,10 @@ def voxel_path(lumen: Lumen, cost: Array, entry_mm: Array, target_mm: Array) -> 
     walkable = np.argwhere(cost < np.inf)
     if len(walkable) == 0:
         return None
-    ends = [tuple(walkable[np.argmin(np.sum((walkable - grid.to_index(p)) ** 2, axis=1))]) for p in (entry_mm, target_mm)]
+    ends = [
+        tuple(walkable[np.argmin(np.sum((walkable - grid.to_index(p)) ** 2, axis=1))])
+        for p in (entry_mm, target_mm)
+    ]
     search = MCP_Geometric(cost, sampling=tuple(grid.spacing_mm))
     total, _ = search.find_costs([ends[0]], [ends[1]])
     if not np.isfinite(total[ends[1]]):

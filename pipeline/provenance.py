@@ -12,7 +12,17 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("numpy", "scipy", "scikit-image", "SimpleITK", "pandas", "h5py", "matplotlib", "numba", "pydantic")
+PACKAGES = (
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "SimpleITK",
+    "pandas",
+    "h5py",
+    "matplotlib",
+    "numba",
+    "pydantic",
+)
 
 
 def package_version() -> str:

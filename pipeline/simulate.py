@@ -49,7 +49,13 @@ def vessel_wall(case: Case, lumen: Lumen, config: SolverConfig, simulate: Simula
 def rolls(case: Case, count: int, simulate: SimulateConfig) -> list[float]:
     """Roll of every frame in degrees, the sensitivity offset added."""
     given = case.roll_deg
-    values = [0.0] * count if isinstance(given, str) else list(given) if isinstance(given, tuple) else [given] * count
+    values = (
+        [0.0] * count
+        if isinstance(given, str)
+        else list(given)
+        if isinstance(given, tuple)
+        else [given] * count
+    )
     return [value + simulate.roll_offset_deg for value in values]
 
 

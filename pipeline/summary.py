@@ -6,6 +6,7 @@ resamples blocks: cases (groups) where there are several, runs of consecutive fr
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -39,7 +40,7 @@ def blocks(count: int, length: int) -> list[NDArray[np.intp]]:
     """Indices 0..count-1 in runs of ``length``; a short rest joins the last run."""
     starts = range(0, max(count - length + 1, 1), length)
     cuts = [*starts, count]
-    return [np.arange(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+    return [np.arange(a, b) for a, b in itertools.pairwise(cuts)]
 
 
 def intervals(

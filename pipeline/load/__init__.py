@@ -43,7 +43,9 @@ def read_header(
         header = read_file_header(source)
     if spacing_mm is None:
         return header
-    note = f"{source.path.name}: spacing {list(map(float, np.asarray(spacing_mm)))} mm taken from the manifest"
+    note = (
+        f"{source.path.name}: spacing {list(map(float, np.asarray(spacing_mm)))} mm taken from the manifest"
+    )
     return replace(header, spacing_mm=np.asarray(spacing_mm, float), assumed=(*header.assumed, note))
 
 
@@ -59,6 +61,8 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
         values = read_file(header, (start, stop))
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
-        msg = f"{header.source}: {bad} voxels are NaN or infinite; allowed: finite grey values. Replace them before loading."
+        msg = f"{header.source}: {bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
         raise LoadError(msg)
-    return Volume(values, header.spacing_mm, header.grid.to_mm(start), header.direction, assumed=header.assumed)
+    return Volume(
+        values, header.spacing_mm, header.grid.to_mm(start), header.direction, assumed=header.assumed
+    )

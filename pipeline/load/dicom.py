@@ -60,13 +60,18 @@ def _numbers(reader: sitk.ImageFileReader, key: str, count: int, path: Path) -> 
     text = reader.GetMetaData(key) if reader.HasMetaDataKey(key) else ""
     values = [float(v) for v in text.split("\\") if v.strip()]
     if len(values) != count:
-        msg = f"{path}: DICOM tag ({key.replace('|', ',')}) holds {text!r}, expected {count} numbers; this slice has no position"
+        tag = key.replace("|", ",")
+        msg = (
+            f"{path}: DICOM tag ({tag}) holds {text!r}, expected {count} numbers; this slice has no position"
+        )
         raise LoadError(msg)
     return np.array(values)
 
 
 def _series_files(folder: Path, wanted: str) -> tuple[str, ...]:
-    sitk.ProcessObject.SetGlobalWarningDisplay(False)  # GDCM prints its own lines about folders without a series
+    sitk.ProcessObject.SetGlobalWarningDisplay(
+        False
+    )  # GDCM prints its own lines about folders without a series
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
     images = {uid: files for uid, files in sizes.items() if files and _is_image(files[0])}
@@ -121,8 +126,12 @@ def _require_uniform(source: Source, orientations: list[Any], pixels: list[Any],
     for name, values in (("orientation", orientations), ("pixel spacing", pixels), ("size", sizes)):
         kinds = Counter(tuple(np.round(v, 5)) for v in values)
         if len(kinds) > 1:
-            found = "; ".join(f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items())
-            msg = f"{source.path}: slices of different {name}: {found}. Mixed series: keep one stack a folder."
+            found = "; ".join(
+                f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items()
+            )
+            msg = (
+                f"{source.path}: slices of different {name}: {found}. Mixed series: keep one stack a folder."
+            )
             raise LoadError(msg)
 
 
@@ -138,12 +147,16 @@ def irregularities(stack: Stack) -> list[str]:
     odd = np.flatnonzero(np.abs(gaps - usual) > GAP_TOLERANCE * usual)
     if len(odd) and usual > 1e-3:
         where = ", ".join(f"{gaps[i]:.3f} mm after {stack.files[i].name}" for i in odd[:4])
-        whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(gaps[odd] > usual)
+        whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(
+            gaps[odd] > usual
+        )
         kind = "missing slices" if whole else "irregular slice gaps"
         problems.append(f"{kind}: {len(odd)} of {len(gaps)} gaps differ from {usual:.3f} mm ({where})")
     drift = np.abs(stack.drift_px[-1]).max() / len(gaps)
     if drift > TILT_TOLERANCE:
-        angle = np.degrees(np.arctan2(np.linalg.norm(stack.drift_px[-1] * stack.pixel_mm), np.ptp(stack.heights)))
+        angle = np.degrees(
+            np.arctan2(np.linalg.norm(stack.drift_px[-1] * stack.pixel_mm), np.ptp(stack.heights))
+        )
         problems.append(f"gantry tilt: the stack leans {angle:.1f} degrees from the slice normal")
     return problems
 
@@ -160,7 +173,11 @@ def read_dicom_header(source: Source, resample: bool) -> tuple[Header, Stack]:
             "anatomy. Export it again without tilt, or ask for resampling with --set load.resample=true."
         )
         raise LoadError(msg)
-    count = len(stack.files) if not problems else int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
+    count = (
+        len(stack.files)
+        if not problems
+        else int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
+    )
     header = Header(
         source,
         (stack.size[0], stack.size[1], count),
@@ -192,7 +209,9 @@ def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
     def straightened(i: int) -> NDArray[np.float32]:
         if i not in slices:
             plane = to_xyz(sitk.ReadImage(str(stack.files[i])))[:, :, 0].astype(np.float32)
-            slices[i] = shift_slice(plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min()))
+            slices[i] = shift_slice(
+                plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min())
+            )
         return slices[i]
 
     out = np.empty(header.shape, np.float32)

@@ -57,8 +57,8 @@ def read_file_header(source: Source) -> Header:
     size = reader.GetSize()
     if len(size) not in (3, 4) or reader.GetNumberOfComponents() != 1 or min(size) < 1:
         msg = (
-            f"{source.path}: got {len(size)} axes {tuple(size)} with {reader.GetNumberOfComponents()} component(s) per voxel; "
-            "allowed: a 3-D grey-value volume, or a 4-D file that is a sequence of them."
+            f"{source.path}: got {len(size)} axes {tuple(size)} with {reader.GetNumberOfComponents()} component(s) per "
+            "voxel; allowed: a 3-D grey-value volume, or a 4-D file that is a sequence of them."
         )
         raise LoadError(msg)
     spacing, origin, direction = _geometry(reader, source)

@@ -18,10 +18,14 @@ def _dataset(file: h5py.File, source: Source) -> h5py.Dataset:
     node = file.get(source.dataset or "/volume")
     if not isinstance(node, h5py.Dataset) or node.ndim not in (3, 4):
         found: list[str] = []
-        file.visititems(lambda name, item: found.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None)
+        file.visititems(
+            lambda name, item: (
+                found.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None
+            )
+        )
         msg = (
-            f"{source.path}: no 3-D or 4-D dataset {source.dataset or '/volume'!r}; the file holds {', '.join(found) or 'none'}. "
-            "Name one as FILE.h5#/dataset."
+            f"{source.path}: no 3-D or 4-D dataset {source.dataset or '/volume'!r}; the file holds "
+            f"{', '.join(found) or 'none'}. Name one as FILE.h5#/dataset."
         )
         raise LoadError(msg)
     return node

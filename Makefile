@@ -1,0 +1,38 @@
+# make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
+# make test       set up, then lint, types, import rules and tests
+.PHONY: setup validate test lint study bench aneurism clean
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT := reports/out
+SEED ?= 100
+export OMP_NUM_THREADS := 1
+
+validate: setup
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --frames 30 --size 256 --seed $(SEED)
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume \
+	  --sweep simulate.bending_scale=0.8,1.2 --sweep simulate.wall_scale=0.333,3 --sweep simulate.roll_offset_deg=-15,15
+
+test: setup lint
+	$(BIN)/python -m pytest -q
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+study: setup
+	$(BIN)/python -m pytest -q -m slow
+
+setup: $(VENV)/.ready
+
+$(VENV)/.ready: pyproject.toml requirements.lock
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "wireval needs Python 3.11 or newer")'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@
+
+clean:
+	rm -rf $(OUT) build dist *.egg-info
