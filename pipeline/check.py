@@ -50,7 +50,8 @@ def _entry_problems(case: Case, scans: Scans) -> list[str]:
                 corners = header.grid.to_mm([(0, 0, 0), np.array(header.shape) - 1]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
-                    f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; is the point in RAS, or in voxels?"
+                    f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "
+                    "is the point in RAS, or in voxels?"
                 )
     return list(dict.fromkeys(problems))
 

@@ -118,9 +118,16 @@ def to_toml(resolved: Resolved) -> str:
     lines: list[str] = []
     for table, items in resolved.as_dict().items():
         lines.append(f"[{table}]")
-        lines += [f"{key} = {_literal(item['value'])}  # {item['source']}" for key, item in items.items()]
+        lines += [_line(key, item) for key, item in items.items()]
         lines.append("")
     return "\n".join(lines)
+
+
+def _line(key: str, item: dict[str, Any]) -> str:
+    """One setting; TOML has no null, so one that is left to the data is a comment."""
+    if item["value"] is None:
+        return f"# {key}: estimated from the data"
+    return f"{key} = {_literal(item['value'])}  # {item['source']}"
 
 
 def _literal(value: Any) -> str:

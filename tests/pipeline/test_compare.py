@@ -1,0 +1,152 @@
+"""Curve errors against the slow oracle, by symmetry and in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from pipeline.compare import compare, compare_truth, point_to_curve, rms
+from pipeline.curves import at_arc, resample, samples, tip_tangent, to_length
+from pipeline.model import Curve, Lumen, Simulated, arc_length
+from solver.grid import Grid
+from tests.naive import curves as naive
+
+
+def random_curve(seed: int, count: int) -> np.ndarray:
+    return np.cumsum(np.random.default_rng(seed).normal(size=(count, 3)), axis=0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 12), m=st.integers(2, 15))
+def test_point_to_curve_equals_the_slow_oracle(seed: int, n: int, m: int) -> None:
+    points, curve = random_curve(seed, n) * 1.5, random_curve(seed + 1, m)
+    distance, foot = point_to_curve(points, curve)
+    expected, arc = naive.point_to_curve(points, curve)
+    np.testing.assert_allclose(distance, expected, atol=1e-12)
+    np.testing.assert_allclose(at_arc(curve, foot), at_arc(curve, arc), atol=1e-9)
+
+
+def test_vertices_alone_would_overestimate() -> None:
+    distance, foot = point_to_curve([[5.0, 1.0, 0.0]], [[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]])
+    assert (distance[0], foot[0]) == (1.0, 5.0)
+
+
+def test_repeated_points_and_single_points_are_no_trouble() -> None:
+    assert point_to_curve([[1.0, 0, 0]], [[0.0, 0, 0], [0.0, 0, 0]])[0][0] == 1.0
+    assert point_to_curve([[1.0, 0, 0]], [[0.0, 0, 0]])[0][0] == 1.0
+
+
+def test_blocks_of_points_give_the_same_as_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, curve = random_curve(3, 50), random_curve(4, 40)
+    whole = point_to_curve(points, curve)
+    monkeypatch.setattr("pipeline.compare.PAIRS_AT_ONCE", 100)
+    np.testing.assert_array_equal(whole, point_to_curve(points, curve))
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 1000))
+def test_errors_do_not_change_under_rigid_motion(seed: int) -> None:
+    turn, shift = Rotation.random(random_state=seed), np.array([3.0, -2.0, 7.0])
+    points, curve = random_curve(seed, 8), random_curve(seed + 1, 9)
+    before, _ = point_to_curve(points, curve)
+    after, _ = point_to_curve(turn.apply(points) + shift, turn.apply(curve) + shift)
+    np.testing.assert_allclose(before, after, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("length", "step", "count"), [(10.0, 0.5, 21), (10.2, 0.5, 22), (0.3, 0.5, 2), (0.0, 0.5, 1)]
+)
+def test_samples_hold_both_ends(length: float, step: float, count: int) -> None:
+    arc = samples(length, step)
+    assert len(arc) == count
+    assert arc[0] == 0.0
+    assert arc[-1] == pytest.approx(length)
+
+
+def test_a_curve_is_cut_or_continued_straight() -> None:
+    curve = np.array([[0.0, 0, 0], [4.0, 0, 0], [4.0, 3.0, 0]])
+    np.testing.assert_allclose(to_length(curve, 5.0)[-1], [4.0, 1.0, 0.0])
+    np.testing.assert_allclose(to_length(curve, 9.0)[-1], [4.0, 5.0, 0.0])
+    np.testing.assert_allclose(tip_tangent(curve), [0, 1, 0])
+    assert arc_length(resample(curve, 0.1))[-1] == pytest.approx(7.0)
+
+
+def open_space() -> Lumen:
+    grid = Grid(np.full((40, 40, 40), -5.0, np.float32), np.ones(3), np.full(3, -10.0))
+    return Lumen(grid, grid.with_values(np.ones((40, 40, 40), np.uint8)))
+
+
+def simulated(joints: np.ndarray) -> Simulated:
+    return Simulated(joints, np.zeros_like(joints), "converged", "", True, 0.0, 0.0, 0.0, 1, 0.0, 0.0)
+
+
+def traced(points: np.ndarray) -> Curve:
+    return Curve(points, np.full(len(points), 0.01))
+
+
+def line(length: float, offset: float = 0.0, step: float = 1.0) -> np.ndarray:
+    arc = samples(length, step)
+    return np.column_stack([arc, np.full_like(arc, offset), np.zeros_like(arc)])
+
+
+def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
+    result = compare(simulated(line(20.0)), traced(line(20.0, 0.3)), open_space())
+    for name in (
+        "rms_mm",
+        "mean_mm",
+        "p95_mm",
+        "max_mm",
+        "back_rms_mm",
+        "hausdorff_mm",
+        "arc_rms_mm",
+        "tip_mm",
+    ):
+        assert getattr(result, name) == pytest.approx(0.3, abs=1e-12), name
+    assert result.tip_angle_deg == 0.0
+    assert result.branch_ok
+    assert result.coverage == 1.0
+
+
+def test_the_segment_length_cannot_flatter() -> None:
+    """A coarse chain whose joints lie on the curve is still off between the joints."""
+    angle = np.linspace(0, np.pi / 2, 200)
+    curve = 10 * np.column_stack([np.sin(angle), 1 - np.cos(angle), 0 * angle])
+    coarse = curve[[0, 99, 199]]
+    result = compare(simulated(coarse), traced(curve), open_space())
+    assert point_to_curve(coarse, curve)[0].max() < 1e-12
+    assert result.max_mm == pytest.approx(10 * (1 - np.cos(np.pi / 8)), rel=0.02)
+
+
+def test_a_wire_too_short_is_seen_by_coverage_tip_and_the_way_back() -> None:
+    result = compare(simulated(line(10.0)), traced(line(20.0)), open_space())
+    assert result.rms_mm == pytest.approx(0.0, abs=1e-12)
+    assert result.coverage == pytest.approx(0.5)
+    assert result.tip_mm == pytest.approx(10.0)
+    assert result.hausdorff_mm == pytest.approx(10.0)
+
+
+def test_tips_with_a_wall_between_them_are_in_different_branches() -> None:
+    values = np.full((40, 40, 40), -3.0, np.float32)
+    values[:, 18:22, :] = 2.0
+    grid = Grid(values, np.ones(3), np.array([0.0, -20.0, -20.0]))
+    lumen = Lumen(grid, grid.with_values((values < 0).astype(np.uint8)))
+    assert not compare(simulated(line(20.0, 4.0)), traced(line(20.0, -4.0)), lumen).branch_ok
+    assert compare(simulated(line(20.0, 4.0)), traced(line(20.0, 5.0)), lumen).branch_ok
+
+
+def test_truth_errors_are_nan_where_there_is_no_curve() -> None:
+    errors = compare_truth(line(5.0), None, simulated(line(5.0, 0.2)))
+    assert np.isnan(errors.trace_mean_mm)
+    assert errors.truth_rms_mm == pytest.approx(0.2)
+
+
+def test_rms_of_nothing_is_not_zero() -> None:
+    assert np.isnan(rms([]))
+
+
+def test_an_empty_curve_is_refused() -> None:
+    with pytest.raises(ValueError, match="need 2 of each"):
+        compare(simulated(line(5.0)), Curve(np.zeros((0, 3)), np.zeros(0)), open_space())

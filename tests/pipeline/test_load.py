@@ -1,0 +1,238 @@
+"""Scans in: geometry kept in every format, one place where x, y, z meets z, y, x, bad stacks refused by name."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import SimpleITK as sitk
+
+from pipeline.config import LoadConfig
+from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
+from pipeline.scans import _expanded
+
+SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def numbered() -> np.ndarray:
+    """values[x, y, z] = x + 10 y + 100 z on an asymmetric grid: any swap of axes shows."""
+    x, y, z = np.meshgrid(np.arange(5), np.arange(7), np.arange(9), indexing="ij")
+    return (x + 10 * y + 100 * z).astype(np.int16)
+
+
+def image_of(values: np.ndarray, direction: np.ndarray = TURN) -> sitk.Image:
+    image = sitk.GetImageFromArray(np.ascontiguousarray(values.T))
+    image.SetSpacing(SPACING)
+    image.SetOrigin(ORIGIN)
+    image.SetDirection(direction.ravel().tolist())
+    return image
+
+
+@pytest.mark.parametrize("suffix", [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz"])
+def test_every_format_keeps_values_axes_and_geometry(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    sitk.WriteImage(image_of(numbered()), str(path))
+    volume = load(read_header(path))
+    np.testing.assert_array_equal(volume.values, numbered())
+    np.testing.assert_allclose(volume.spacing_mm, SPACING, rtol=1e-6)
+    np.testing.assert_allclose(volume.direction, TURN, atol=1e-6)
+    np.testing.assert_allclose(
+        volume.to_mm([2, 3, 4]), np.array(ORIGIN) + TURN @ (np.array(SPACING) * (2, 3, 4)), rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("suffix", [".mha", ".nrrd", ".nii.gz"])
+def test_a_crop_is_the_same_voxels_at_the_same_place(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+    sitk.WriteImage(image_of(numbered()), str(path))
+    header = read_header(path)
+    crop = load(header, ((1, 2, 3), (4, 6, 8)))
+    np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
+    np.testing.assert_allclose(crop.to_mm([0, 0, 0]), header.grid.to_mm([1, 2, 3]), atol=1e-6)
+
+
+def test_an_hdf5_sequence_is_one_header_a_volume(tmp_path: Path) -> None:
+    path = tmp_path / "study.h5"
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("frames", data=np.stack([numbered().T, numbered().T + 1]))
+        data.attrs["spacing_mm"] = SPACING
+    header = read_header(Source(path, "/frames"))
+    assert header.item_count == 2
+    second = load(_expanded(header)[1], ((0, 1, 2), (5, 3, 4)))
+    np.testing.assert_array_equal(second.values, (numbered() + 1)[:, 1:3, 2:4])
+
+
+def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "study.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("frames", data=numbered().T)
+    with pytest.raises(LoadError, match=r"lacks the attribute spacing_mm"):
+        read_header(Source(path, "/frames"))
+    with pytest.raises(LoadError, match=r"holds /frames \(9, 7, 5\)"):
+        read_header(Source(path, "/wrong"))
+
+
+def test_a_four_dimensional_file_is_a_sequence(tmp_path: Path) -> None:
+    both = sitk.JoinSeries([image_of(numbered(), np.eye(3)), image_of(numbered() + 1, np.eye(3))])
+    sitk.WriteImage(both, str(tmp_path / "both.nrrd"))
+    header = read_header(tmp_path / "both.nrrd")
+    assert header.item_count == 2
+    np.testing.assert_array_equal(load(_expanded(header)[1]).values, numbered() + 1)
+
+
+def write_series(folder: Path, values: np.ndarray, positions: list[tuple[float, float, float]]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    writer = sitk.ImageFileWriter()
+    writer.KeepOriginalImageUIDOn()
+    for k, position in enumerate(positions):
+        plane = sitk.GetImageFromArray(np.ascontiguousarray(values[:, :, k].T))
+        plane.SetSpacing(SPACING[:2])
+        tags = {
+            "0008|0060": "CT", "0020|000e": "1.2.3.4", "0020|000d": "1.2.3", "0008|0018": f"1.2.3.4.{k + 1}",
+            "0008|0016": "1.2.840.10008.5.1.4.1.1.2", "0020|0013": str(k + 1),
+            "0020|0032": "\\".join(map(str, position)), "0020|0037": "1\\0\\0\\0\\1\\0",
+        }  # fmt: skip
+        for key, value in tags.items():
+            plane.SetMetaData(key, value)
+        writer.SetFileName(str(folder / f"slice{(k * 7) % 11:02d}.dcm"))  # file names out of order on purpose
+        writer.Execute(plane)
+
+
+def straight_stack(count: int = 9, gap: float = 0.7) -> list[tuple[float, float, float]]:
+    return [(12.0, -30.0, 5.0 + gap * k) for k in range(count)]
+
+
+def test_a_dicom_series_is_sorted_by_position(tmp_path: Path) -> None:
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    header = read_header(tmp_path / "series")
+    np.testing.assert_allclose(header.spacing_mm, SPACING, rtol=1e-6)
+    np.testing.assert_allclose(header.origin_mm, ORIGIN)
+    np.testing.assert_array_equal(load(header).values, numbered())
+    np.testing.assert_array_equal(load(header, ((1, 2, 3), (4, 6, 8))).values, numbered()[1:4, 2:6, 3:8])
+
+
+def test_a_missing_slice_is_named(tmp_path: Path) -> None:
+    positions = straight_stack()
+    write_series(tmp_path / "series", numbered()[:, :, :8], [*positions[:4], *positions[5:]])
+    with pytest.raises(LoadError, match=r"missing slices: 1 of 7 gaps differ from 0\.700 mm"):
+        read_header(tmp_path / "series")
+
+
+def test_a_repeated_slice_is_named(tmp_path: Path) -> None:
+    positions = straight_stack()
+    positions[5] = positions[4]
+    write_series(tmp_path / "series", numbered(), positions)
+    with pytest.raises(LoadError, match="repeated position"):
+        read_header(tmp_path / "series", LoadConfig(resample=True))
+
+
+def test_a_tilted_stack_is_refused_or_straightened_never_sheared(tmp_path: Path) -> None:
+    """A plane of constant height + y in space must stay one after resampling."""
+    lean = 0.5  # pixels of 0.5 mm a slice
+    positions = [(12.0, -30.0 + lean * k, 5.0 + 0.7 * k) for k in range(9)]
+    index = np.indices((5, 20, 9))
+    true_y = -30.0 + 0.5 * index[1] + lean * index[2]
+    write_series(tmp_path / "series", np.round(10 * (true_y + 40)).astype(np.int16), positions)
+    with pytest.raises(LoadError, match="gantry tilt"):
+        read_header(tmp_path / "series")
+    asked = LoadConfig(resample=True)
+    header = read_header(tmp_path / "series", asked)
+    assert any("tilt" in text for text in header.assumed)
+    volume = load(header, None, asked)
+    inner = np.argwhere(np.ones(volume.shape, bool))
+    inner = inner[(inner[:, 1] > 9) & (inner[:, 1] < 19)]
+    expected = 10 * (volume.to_mm(inner)[:, 1] + 40)
+    np.testing.assert_allclose(volume.values[tuple(inner.T)], expected, atol=1.0)
+
+
+def test_two_series_in_a_folder_are_listed(tmp_path: Path) -> None:
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    image = sitk.ReadImage(str(next((tmp_path / "series").iterdir())))
+    image.SetMetaData("0020|000e", "9.9.9")
+    writer = sitk.ImageFileWriter()
+    writer.KeepOriginalImageUIDOn()
+    writer.SetFileName(str(tmp_path / "series" / "other.dcm"))
+    writer.Execute(image)
+    with pytest.raises(LoadError, match="found 2 DICOM image series"):
+        read_header(tmp_path / "series")
+
+
+def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:
+    with pytest.raises(LoadError, match="no such file"):
+        read_header(tmp_path / "nothing.mha")
+    (tmp_path / "text.mha").write_text("hello")
+    with pytest.raises(LoadError, match="cannot read"):
+        read_header(tmp_path / "text.mha")
+    (tmp_path / "below" / "series").mkdir(parents=True)
+    with pytest.raises(LoadError, match=r"sub-folders: series"):
+        read_header(tmp_path / "below")
+
+
+def test_a_file_cut_short_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "scan.mha"
+    sitk.WriteImage(image_of(numbered()), str(path))
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(LoadError, match=r"cannot be read|cut short"):
+        load(read_header(path))
+
+
+def test_nan_voxels_are_refused(tmp_path: Path) -> None:
+    values = numbered().astype(np.float32)
+    values[1, 2, 3] = np.nan
+    sitk.WriteImage(image_of(values), str(tmp_path / "scan.mha"))
+    with pytest.raises(LoadError, match="1 voxels are NaN"):
+        load(read_header(tmp_path / "scan.mha"))
+
+
+@pytest.mark.parametrize(("change", "accepted"), [(1e-8, True), (0.05, True), (0.3, False)])
+def test_geometry_is_compared_in_voxels_at_the_far_corner(
+    tmp_path: Path, change: float, accepted: bool
+) -> None:
+    first, second = image_of(numbered()), image_of(numbered())
+    second.SetOrigin((ORIGIN[0] + change, *ORIGIN[1:]))
+    for name, image in (("a", first), ("b", second)):
+        sitk.WriteImage(image, str(tmp_path / f"{name}.mha"))
+    headers = [read_header(tmp_path / f"{name}.mha") for name in "ab"]
+    if accepted:
+        require_same_geometry(*headers)
+    else:
+        with pytest.raises(LoadError, match=r"corners lie 0\.75 voxels apart, allowed 0\.5"):
+            require_same_geometry(*headers)
+
+
+def test_a_spacing_from_the_manifest_is_reported_as_assumed(tmp_path: Path) -> None:
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
+    header = read_header(tmp_path / "scan.mha", spacing_mm=(0.5, 0.5, 0.5))
+    np.testing.assert_array_equal(header.spacing_mm, 0.5)
+    assert "taken from the manifest" in header.assumed[0]
+
+
+def unpacked(archive: Path, folder: Path) -> Path:
+    zipfile.ZipFile(archive).extractall(folder)
+    return next(p for p in folder.rglob("*") if p.is_dir() and any(p.glob("*.dcm")))
+
+
+def test_the_real_catphan_series_has_its_geometry(real_data: Path, tmp_path: Path) -> None:
+    series = unpacked(real_data / "catphan504_cbct" / "High_quality_head.zip", tmp_path)
+    header = read_header(series)
+    assert header.shape == (512, 512, 64)
+    np.testing.assert_allclose(header.spacing_mm, (0.48828125, 0.48828125, 2.5))
+    np.testing.assert_allclose(header.direction[:, 0], (0.9999863, 0.0, 0.005236), atol=1e-6)
+    volume = load(header, ((200, 200, 28), (300, 300, 30)))
+    assert volume.shape == (100, 100, 2)
+    assert -1000 <= volume.values.min() < volume.values.max() <= 1810
+
+
+def test_the_real_tilted_head_is_refused_or_resampled(real_data: Path, tmp_path: Path) -> None:
+    series = unpacked(real_data / "head_ct_tilted_dicom" / "GE_head_28slices.zip", tmp_path)
+    with pytest.raises(LoadError, match=r"(?s)irregular slice gaps.*leans 18\.5 degrees"):
+        read_header(series)
+    asked = LoadConfig(resample=True)
+    volume = load(read_header(series, asked), None, asked)
+    assert len(volume.assumed) == 2
+    assert volume.values.min() >= -1500.0
+    assert volume.values.max() <= 2121.0

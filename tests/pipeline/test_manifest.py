@@ -1,0 +1,90 @@
+"""The manifest: everything wrong with it at once, each with its place, what was found and what is allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.manifest import ManifestError, natural_key, read_manifest
+
+GOOD = """
+schema = 1
+[wires.soft]
+radius_mm = 0.18
+bending_stiffness_N_mm2 = [[0.0, 0.5], [30.0, 5.0]]
+[[case]]
+id = "run1"
+frames = "frames/*.mha"
+entry_mm = [1.0, 2.0, 3.0]
+entry_direction = [0.0, 0.0, 2.0]
+wire = "soft"
+"""
+
+
+def written(folder: Path, text: str, frames: int = 3) -> Path:
+    (folder / "frames").mkdir(exist_ok=True)
+    for i in (10, 2, 1)[:frames]:
+        (folder / "frames" / f"f_{i}.mha").touch()
+    path = folder / "manifest.toml"
+    path.write_text(text)
+    return path
+
+
+def problems(folder: Path, text: str) -> str:
+    with pytest.raises(ManifestError) as caught:
+        read_manifest(written(folder, text))
+    return "\n".join(caught.value.problems)
+
+
+def test_defaults_paths_and_order(tmp_path: Path) -> None:
+    case = read_manifest(written(tmp_path, GOOD)).cases[0]
+    assert [s.path.name for s in case.frames] == ["f_1.mha", "f_2.mha", "f_10.mha"]
+    assert case.entry_direction == (0.0, 0.0, 1.0)
+    assert case.role == "validation"
+    assert case.group == "run1"
+    assert case.lumen_seed_mm == (case.entry_mm,)
+    assert case.wall.stiffness_N_mm2 == 2.0
+    assert case.wire.rest_curvature_per_mm == 0.0
+
+
+def test_natural_order() -> None:
+    assert sorted(["a10", "a9", "b1", "a1"], key=natural_key) == ["a1", "a9", "a10", "b1"]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (("radius_mm", "radus_mm"), "unknown key; did you mean 'radius_mm'?"),
+        (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
+        (("radius_mm = 0.18", "radius_mm = -1"), "greater than 0; found -1"),
+        (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
+        (('frames = "frames/*.mha"', 'frames = "nothing/*.mha"'), "matches no file"),
+        (('frames = "frames/*.mha"', ""), "neither frames nor insertion_mm"),
+        (("entry_mm = [1.0, 2.0, 3.0]", ""), "case 'run1' entry_mm: missing"),
+        (('id = "run1"', 'id = "a/b"'), "id"),
+        (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
+        (("schema = 1", "schema = 2"), "schema"),
+        (('wire = "soft"', 'wire = "soft"\ninsertion_mm = [1.0]'), "insertion_mm has 1 entries for 3 frames"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, change: tuple[str, str], expected: str) -> None:
+    assert expected in problems(tmp_path, GOOD.replace(*change))
+
+
+def test_all_problems_come_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("radius_mm = 0.18", 'radius_mm = "thin"').replace('id = "run1"', 'idd = "run1"')
+    found = problems(tmp_path, text)
+    assert "radius_mm" in found
+    assert "did you mean 'id'?" in found
+
+
+def test_ids_are_unique(tmp_path: Path) -> None:
+    twice = GOOD + GOOD[GOOD.index("[[case]]") :]
+    assert "used more than once" in problems(tmp_path, twice)
+
+
+def test_broken_toml_and_no_file(tmp_path: Path) -> None:
+    assert "not valid TOML" in problems(tmp_path, "schema = = 1")
+    with pytest.raises(ManifestError, match="no such manifest"):
+        read_manifest(tmp_path / "nothing.toml")

@@ -1,0 +1,105 @@
+"""Settings: precedence, origin, messages; and the stage store that they key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.cache import Store, file_hash, key_of
+from pipeline.commands.common import complain
+from pipeline.config import Config, SegmentConfig
+from pipeline.model import Curve, Lumen
+from pipeline.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
+from pipeline.status import FrameStatus
+from pipeline.stored import pack_curve, pack_lumen, unpack_curve, unpack_lumen
+from solver.grid import Grid
+
+
+def test_the_command_line_wins_over_a_file_and_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "cfg.toml"
+    path.write_text("[solver]\nsegment_mm = 0.5\nmax_iterations = 50\n")
+    resolved = resolve([*read_settings(path), parse_assignment("solver.segment_mm=0.25")])
+    assert resolved.config.solver.segment_mm == 0.25
+    assert resolved.config.solver.max_iterations == 50
+    entries = resolved.as_dict()["solver"]
+    assert entries["segment_mm"]["source"] == "command line"
+    assert entries["max_iterations"]["source"] == "cfg.toml"
+    assert entries["method"]["source"] == "default"
+
+
+def test_resolved_settings_read_back(tmp_path: Path) -> None:
+    resolved = resolve(
+        [parse_assignment("solver.segment_mm=0.25"), parse_assignment("solver.hull=samples:8")]
+    )
+    path = tmp_path / "config.resolved.toml"
+    path.write_text(to_toml(resolved))
+    assert resolve(read_settings(path)).config == resolved.config
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("solver.segmnt_mm=1", "did you mean 'segment_mm'"),
+        ("sovler.segment_mm=1", "did you mean 'solver'"),
+        ("solver.segment_mm=wide", "valid number"),
+        ("segment_mm=1", "no setting; write table.key=value"),
+    ],
+)
+def test_a_wrong_setting_is_explained(text: str, expected: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        resolve([parse_assignment(text)])
+    assert expected in str(caught.value) or expected.replace("no setting", "is no setting") in str(
+        caught.value
+    )
+
+
+def test_all_wrong_settings_come_at_once() -> None:
+    with pytest.raises(SettingsError) as caught:
+        resolve([parse_assignment("solver.a=1"), parse_assignment("trace.b=2")])
+    assert len(caught.value.problems) == 2
+    assert complain(caught.value.problems, "x") == 2
+
+
+def test_keys_follow_contents_and_settings_not_paths(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).write_bytes(b"same")
+    assert file_hash(tmp_path / "a") == file_hash(tmp_path / "b")
+    first = key_of("segment", file_hash(tmp_path / "a"), SegmentConfig())
+    assert first == key_of("segment", file_hash(tmp_path / "b"), SegmentConfig())
+    assert first != key_of("segment", file_hash(tmp_path / "a"), SegmentConfig(threshold=0.123))
+    assert first != key_of("trace", file_hash(tmp_path / "a"), SegmentConfig())
+    assert key_of("segment", np.array([1.0])) != key_of("segment", np.array([1.0 + 1e-15 * 4]))
+    assert Config() == Config()
+
+
+def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    grid = Grid(np.linspace(-1, 1, 60).reshape(3, 4, 5).astype(np.float32), np.full(3, 0.3), np.ones(3))
+    lumen = Lumen(
+        grid, grid.with_values((grid.values < 0).astype(np.uint8)), 550.0, ("thin",), {"visited": 7}
+    )
+    store.put("segment", "ab" * 32, *pack_lumen(lumen))
+    back = unpack_lumen(*(store.get("segment", "ab" * 32) or pytest.fail("not stored")))
+    np.testing.assert_array_equal(back.distance.values, grid.values)
+    np.testing.assert_array_equal(back.mask.values, lumen.mask.values)
+    assert (back.wall_level, back.warnings, dict(back.counters)) == (550.0, ("thin",), {"visited": 7})
+    curve = Curve(
+        np.eye(3), np.ones(3), 0.1, np.array([True, False, True]), FrameStatus.LENGTH_MISMATCH, "why"
+    )
+    store.put("trace", "cd" * 32, *pack_curve(curve))
+    again = unpack_curve(*(store.get("trace", "cd" * 32) or pytest.fail("not stored")))
+    np.testing.assert_array_equal(again.points_mm, curve.points_mm)
+    np.testing.assert_array_equal(again.flagged, curve.flagged)
+    assert (again.status, again.note) == (FrameStatus.LENGTH_MISMATCH, "why")
+
+
+def test_a_damaged_entry_counts_as_absent(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.put("trace", "ab" * 32, {"x": np.ones(3)}, {})
+    entry = store.entries()[0]
+    entry.write_bytes(b"PK not a zip")
+    assert store.get("trace", "ab" * 32) is None
+    assert store.entries() == []
+    assert Store(None).get("trace", "ab" * 32) is None
