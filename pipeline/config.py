@@ -40,6 +40,10 @@ class TraceConfig:
 
     length_tolerance_mm: float = 2.0
     """Largest accepted disagreement between the traced length and the manifest's insertion_mm."""
+    ridge_voxels: float = 0.7
+    """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
+    longest_gap_mm: float = 5.0
+    """Longest gap between two pieces of wire that is bridged."""
 
 
 @dataclass(frozen=True)

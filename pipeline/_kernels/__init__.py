@@ -1,1 +1,4 @@
-"""Compiled kernels of segment and trace: arrays and scalars in, arrays out. Arrays are C-contiguous, whatever the axes mean."""
+"""Compiled kernels of segment and trace: arrays and scalars in, arrays out.
+
+Arrays are C-contiguous, whatever their axes mean.
+"""

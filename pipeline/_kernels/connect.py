@@ -45,7 +45,14 @@ def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -
 
 @njit(cache=True)
 def _level(
-    volume: NDArray[Any], levels: NDArray[Any], taps: NDArray[Any], low: float, scale: float, i: int, j: int, k: int
+    volume: NDArray[Any],
+    levels: NDArray[Any],
+    taps: NDArray[Any],
+    low: float,
+    scale: float,
+    i: int,
+    j: int,
+    k: int,
 ) -> int:
     """Quantised grey 0..LEVELS-1 of one voxel, read from the volume the first time only."""
     known = levels[i, j, k]

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 def basis(t: float) -> tuple[float, float, float, float]:
     """The four cubic B-spline weights at offset ``t`` in [0, 1) from the second node."""
     u = 1.0 - t
-    return u * u * u / 6.0, (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0, (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0, t * t * t / 6.0
+    return (
+        u * u * u / 6.0,
+        (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
+        t * t * t / 6.0,
+    )
 
 
 @njit(cache=True, inline="always")
@@ -34,7 +39,7 @@ def bend(t: float) -> tuple[float, float, float, float]:
 
 @njit(cache=True, inline="always")
 def _row(c: NDArray[Any], i: int, j: int, k: int, w: tuple[float, float, float, float]) -> float:
-    return w[0] * c[i, j, k] + w[1] * c[i, j, k + 1] + w[2] * c[i, j, k + 2] + w[3] * c[i, j, k + 3]
+    return float(w[0] * c[i, j, k] + w[1] * c[i, j, k + 1] + w[2] * c[i, j, k + 2] + w[3] * c[i, j, k + 3])
 
 
 @njit(cache=True)

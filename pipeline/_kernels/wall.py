@@ -22,9 +22,7 @@ FOOT_STEPS = 4
 
 
 @njit(cache=True)
-def dilate(
-    mask: NDArray[Any], order: NDArray[Any], layers: int, first: int
-) -> NDArray[Any]:
+def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> NDArray[Any]:
     """Mark ``layers`` 26-neighbour layers around the voxels ``order`` with ``first``, ``first + 1`` ... in ``mask``."""
     ni, nj, nk = mask.shape
     found = np.empty(max(4096, order.shape[0]), np.int64)
@@ -55,9 +53,16 @@ def dilate(
 
 @njit(cache=True)
 def smooth_lattice(
-    volume: NDArray[Any], corner: NDArray[Any], taps: NDArray[Any], voxels: NDArray[Any], lattice: NDArray[Any]
+    volume: NDArray[Any],
+    corner: NDArray[Any],
+    taps: NDArray[Any],
+    voxels: NDArray[Any],
+    lattice: NDArray[Any],
 ) -> None:
-    """Fill ``lattice`` (a padded box, voxel (PAD, PAD, PAD) at ``corner`` of the volume) at the flat box indices ``voxels``."""
+    """Fill ``lattice`` at the flat box indices ``voxels``.
+
+    Its box is padded: voxel (PAD, PAD, PAD) is ``corner`` of the volume.
+    """
     _, mj, mk = lattice.shape
     ni, nj, nk = volume.shape
     for n in range(voxels.shape[0]):
@@ -73,15 +78,22 @@ def smooth_lattice(
 
 
 @njit(cache=True)
-def _is_side(state: NDArray[Any], lattice: NDArray[Any], level: float, i: int, j: int, k: int, deep: int) -> bool:
+def _is_side(
+    state: NDArray[Any], lattice: NDArray[Any], level: float, i: int, j: int, k: int, deep: int
+) -> bool:
     """Inside: of the dilated mask and above the level (or deep in the mask, where noise or metal may dip)."""
     mark = state[i, j, k]
-    return mark != 0 and mark <= deep and lattice[i, j, k] > level
+    return bool(mark != 0 and mark <= deep and lattice[i, j, k] > level)
 
 
 @njit(cache=True)
 def surface_voxels(
-    state: NDArray[Any], lattice: NDArray[Any], level: float, deep: int, voxels: NDArray[Any], inside: NDArray[Any]
+    state: NDArray[Any],
+    lattice: NDArray[Any],
+    level: float,
+    deep: int,
+    voxels: NDArray[Any],
+    inside: NDArray[Any],
 ) -> NDArray[Any]:
     """Voxels (flat) with a 6-neighbour on the other side, and beside those; ``inside`` gets 1 where it holds.
 
@@ -170,7 +182,9 @@ def feet(
         xy, xz, yz = xy / (hx * hy), xz / (hx * hz), yz / (hy * hz)
         gg = gx * gx + gy * gy + gz * gz
         g = np.sqrt(gg) + 1e-30
-        bend = (gx * gx * xx + gy * gy * yy + gz * gz * zz + 2 * (gx * gy * xy + gx * gz * xz + gy * gz * yz)) / gg
+        bend = (
+            gx * gx * xx + gy * gy * yy + gz * gz * zz + 2 * (gx * gy * xy + gx * gz * xz + gy * gz * yz)
+        ) / gg
         foot[n, 0], foot[n, 1], foot[n, 2] = px, py, pz
         normal[n, 0], normal[n, 1], normal[n, 2] = -gx / g, -gy / g, -gz / g
         curvature[n] = -(xx + yy + zz - bend) / g
@@ -207,9 +221,7 @@ def mean_around(
 
 
 @njit(cache=True, inline="always")
-def _from_foot(
-    x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float
-) -> float:
+def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float) -> float:
     """Signed distance of a point to the sphere of curvature ``bend`` that osculates the surface at its foot p."""
     ax, ay, az = x - p[0], y - p[1], z - p[2]
     along = ax * n[0] + ay * n[1] + az * n[2]
@@ -217,13 +229,13 @@ def _from_foot(
     across = max(0.0, square - along * along)
     lift = 1.0 + bend * along
     if lift <= 0.2:
-        return np.sqrt(square) if along > 0 else -np.sqrt(square)
-    return along + 0.5 * bend * across / lift
+        return float(np.sqrt(square) if along > 0 else -np.sqrt(square))
+    return float(along + 0.5 * bend * across / lift)
 
 
 @njit(cache=True, inline="always")
 def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
-    return (x - p[0]) * (x - p[0]) + (y - p[1]) * (y - p[1]) + (z - p[2]) * (z - p[2])
+    return float((x - p[0]) * (x - p[0]) + (y - p[1]) * (y - p[1]) + (z - p[2]) * (z - p[2]))
 
 
 @njit(cache=True)

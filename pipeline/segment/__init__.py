@@ -10,7 +10,7 @@ from pipeline.config import SegmentConfig
 from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
-from pipeline.segment.levels import core_levels, levels_at
+from pipeline.segment.levels import deepest, levels_at
 from pipeline.segment.surface import signed_distance
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
@@ -19,11 +19,13 @@ __all__ = ["segment"]
 
 LEAST_CONTRAST = 2.0
 """Contrast over the noise of one voxel below which no vessel is looked for (Dice falls below 0.97 at 2.2)."""
+LEVEL_TOLERANCE = 0.015
+"""Change of the wall's level, in contrasts, that is worth a second surface: it moves the wall by 0.03 voxel."""
 FACES = np.array([(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1)], np.int64)
 
 
-def _fail(what: str, got: str, allowed: str, do: str) -> StageError:
-    return StageError(FrameStatus.SEGMENT_FAILED, f"segment: {what}: got {got}; expected {allowed}; {do}")
+def _failed(got: str, allowed: str, do: str) -> StageError:
+    return StageError(FrameStatus.SEGMENT_FAILED, f"segment: {got}; expected {allowed}; {do}")
 
 
 def _seed_voxels(grid: Grid, seeds_mm: ArrayLike) -> NDArray[np.int64]:
@@ -32,8 +34,10 @@ def _seed_voxels(grid: Grid, seeds_mm: ArrayLike) -> NDArray[np.int64]:
     index = np.rint(grid.to_index(points)).astype(np.int64)
     outside = np.any((index < -1) | (index > np.array(grid.shape)), axis=1)
     if outside.all():
-        got = np.round(points, 1).tolist()
-        raise _fail("seeds", f"{got} mm", "a point inside the scan", "check entry_mm or lumen_seed_mm (LPS mm)")
+        got = f"seeds: got {np.round(points, 1).tolist()} mm"
+        low, high = grid.to_mm([0, 0, 0]), grid.to_mm(np.array(grid.shape) - 1)
+        allowed = f"a point inside the scan, {np.round(low, 1).tolist()} to {np.round(high, 1).tolist()} mm"
+        raise _failed(got, allowed, "check entry_mm or lumen_seed_mm (LPS mm)")
     return np.asarray(np.clip(index[~outside], 0, np.array(grid.shape) - 1))
 
 
@@ -42,8 +46,9 @@ def _start(grid: Grid, seeds: NDArray[np.int64]) -> tuple[Levels, NDArray[np.int
     found = [levels_at(grid, seed) for seed in seeds]
     levels = max((f[0] for f in found), key=lambda a: a.contrast / max(a.noise, 1e-9))
     if not levels.contrast > LEAST_CONTRAST * levels.noise:
-        got = f"{levels.inside:.0f} at the seed, {levels.outside:.0f} around it, noise {levels.noise:.0f}"
-        raise _fail("grey values", got, "a lumen brighter than its surroundings by twice the noise", "move the seed")
+        got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
+        allowed = "a lumen brighter than its surroundings by twice the noise"
+        raise _failed(got, allowed, "move the seed (lumen_seed_mm) well into the vessel")
     return levels, np.array([f[1] for f in found], np.int64)
 
 
@@ -55,7 +60,9 @@ def connect(
     reached = np.zeros(grid.shape, np.uint8)
     cut = round(threshold * FULL)
     a = affinity
-    order = flood(grid.values, levels, reached, seeds, FACES, a.taps, a.low, a.scale, a.homogeneity, a.feature, cut)
+    order = flood(
+        grid.values, levels, reached, seeds, FACES, a.taps, a.low, a.scale, a.homogeneity, a.feature, cut
+    )
     return order, float(len(order))
 
 
@@ -74,9 +81,16 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     order, read = connect(grid, seeds, affinity, config.threshold)
     if len(order) < config.least_voxels:
         allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
-        raise _fail("connected voxels", str(len(order)), allowed, "move the seed or lower segment.threshold")
+        got = f"connected voxels: got {len(order)}"
+        raise _failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
     distance, mask, counters = signed_distance(
         grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
     )
+    again = deepest(grid, distance, levels, affinity.taps, counters["blur_mm"])
+    if abs(again.half - levels.half) > LEVEL_TOLERANCE * levels.contrast:
+        levels = again
+        distance, mask, counters = signed_distance(
+            grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
+        )
     counters |= {"voxels_read": read, "voxels_total": float(np.prod(grid.shape)), "noise": levels.noise}
     return Lumen(reorder(distance, axes), reorder(mask, axes), levels.half, (), counters)

@@ -66,7 +66,9 @@ def noise_after(taps: NDArray[Any]) -> float:
     return float(np.sqrt(np.sum(np.asarray(taps, float) ** 2)) ** 3)
 
 
-def estimate_affinity(levels: Levels, homogeneity_sigma: float | None, feature_sigma: float | None) -> Affinity:
+def estimate_affinity(
+    levels: Levels, homogeneity_sigma: float | None, feature_sigma: float | None
+) -> Affinity:
     """The tables for an object with these levels; a sigma that is given (grey values) replaces the estimate."""
     taps = smoothing_taps(levels)
     spread = NOISE_SPREAD * levels.noise * noise_after(taps)

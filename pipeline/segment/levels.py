@@ -24,28 +24,36 @@ def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> t
     """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
     half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
     a, b, c = (
-        slice(max(0, int(i - h)), min(n, int(i + h) + 1)) for i, h, n in zip(index, half, grid.shape, strict=True)
+        slice(max(0, int(i - h)), min(n, int(i + h) + 1))
+        for i, h, n in zip(index, half, grid.shape, strict=True)
     )
     return a, b, c
 
 
-def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[float, float, NDArray[np.bool_]]:
-    """Median grey of the bright region that holds the seed and of what is darker, by fixed-point iteration."""
+def _median(values: NDArray[Any], otherwise: float) -> float:
+    return float(np.median(values)) if values.size >= 8 else otherwise
+
+
+def _two_levels(
+    grey: NDArray[Any], seed: float, at: tuple[int, ...]
+) -> tuple[float, float, NDArray[np.bool_]]:
+    """Median grey of the bright region that holds the seed and of what is darker, by fixed-point iteration.
+
+    The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
+    """
     outside = float(np.percentile(grey, 10))
     inside = seed
     region = np.zeros(grey.shape, bool)
-    for _ in range(8):
+    for _ in range(6):
         bright = grey > 0.5 * (inside + outside)
-        if not bright[at] or bright.all():
+        if not bright[at]:
             break
         labels, _ = ndimage.label(bright)
         region = labels == labels[at]
-        core = ndimage.binary_erosion(region)
-        inside = float(np.median(grey[core if core.sum() >= 8 else region]))
+        whole = _median(grey[region], inside)
+        inside = _median(grey[ndimage.binary_erosion(region)], whole)
         inside = min(inside, seed + 0.5 * (seed - outside))
-        outside = float(np.median(grey[~ndimage.binary_dilation(bright, iterations=2)])) if not bright.all() else outside
-        if not np.isfinite(outside):
-            outside = float(np.percentile(grey, 10))
+        outside = _median(grey[~ndimage.binary_dilation(bright, iterations=2)], outside)
     return inside, outside, region
 
 
@@ -72,10 +80,29 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[Levels, NDArray[np.int64
     return Levels(inside, outside, noise), start + np.array(at)
 
 
-def core_levels(raw: Grid, distance_mm: NDArray[Any], first: Levels) -> Levels:
-    """Levels again from the whole vessel: grey well inside it, and 1 to 2 mm outside it."""
-    inner = distance_mm < -1.5 * float(raw.spacing_mm.max())
-    outer = (distance_mm > 1.0) & (distance_mm < 2.0)
-    inside = float(np.median(raw.values[inner])) if inner.sum() > 50 else first.inside
-    outside = float(np.median(raw.values[outer])) if outer.sum() > 50 else first.outside
-    return Levels(inside, outside, first.noise)
+def plateau(distance_mm: NDArray[Any], grey: NDArray[Any], levels: Levels, blur_mm: float) -> Levels:
+    """The levels again, from the deepest part of the whole vessel.
+
+    distance_mm, grey : (n,) of the voxels inside.  blur_mm : the scanner's.  A tube no thicker than its blur never
+    reaches its plateau: the axis of a blurred cylinder of radius R has 1 - exp(-R^2 / 2 blur^2) of its contrast.
+    """
+    depth = float(np.percentile(-distance_mm, 98))
+    core = -distance_mm > 0.7 * depth
+    peak = _median(grey[core], levels.inside)
+    share = 1.0 - float(np.exp(-0.5 * (depth / blur_mm) ** 2))
+    inside = levels.outside + (peak - levels.outside) / max(share, 0.5)
+    return Levels(inside, levels.outside, levels.noise)
+
+
+def deepest(grid: Grid, distance: Grid, levels: Levels, taps: NDArray[Any], blur_mm: float) -> Levels:
+    """:func:`plateau` of a segmented vessel; ``blur_mm`` is the whole blur, of which smoothing is taken off."""
+    h = float(np.min(grid.spacing_mm))
+    reach = np.arange(len(taps)) - len(taps) // 2
+    smoothing = float(np.sum(reach**2 * taps)) + 1.0 / 3.0
+    own = np.sqrt(max(blur_mm**2 - smoothing * h**2, (0.3 * h) ** 2))
+    corner = np.rint(grid.to_index(distance.origin_mm)).astype(int)
+    window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    inside = distance.values < 0
+    if not np.isfinite(own) or not inside.any():
+        return levels
+    return plateau(distance.values[inside], grid.values[window][inside], levels, float(own))

@@ -56,7 +56,9 @@ class Wall:
     steepness: Array
 
 
-def find_wall(lattice: NDArray[Any], level: float, spacing: Array, voxels: NDArray[Any], inside: NDArray[Any]) -> Wall:
+def find_wall(
+    lattice: NDArray[Any], level: float, spacing: Array, voxels: NDArray[Any], inside: NDArray[Any]
+) -> Wall:
     """Closest points of the voxels next to the half-level surface."""
     n = len(voxels)
     foot, normal = np.zeros((n, 3)), np.zeros((n, 3))
@@ -68,12 +70,13 @@ def find_wall(lattice: NDArray[Any], level: float, spacing: Array, voxels: NDArr
 def blur_mm(wall: Wall, levels: Levels) -> float:
     """Blur of the wall (standard deviation, mm): an edge of that contrast falls by contrast / (sigma sqrt(2 pi)).
 
-    The upper quartile of steepness stands for a wall that nothing else touches.
+    The 60th percentile of steepness stands for a wall that nothing else touches.
     """
     good = np.isfinite(wall.distance)
     if not good.any():
         return float("nan")
-    return levels.contrast / (np.sqrt(2 * np.pi) * float(np.percentile(wall.steepness[good], 60)))
+    steep = float(np.percentile(wall.steepness[good], 60))
+    return float(levels.contrast / (np.sqrt(2 * np.pi) * steep))
 
 
 def corrected(wall: Wall, owner: NDArray[np.int32], sigma_mm: float, spacing: Array) -> tuple[Wall, Array]:
@@ -90,7 +93,12 @@ def corrected(wall: Wall, owner: NDArray[np.int32], sigma_mm: float, spacing: Ar
 
 
 def signed_distance(
-    volume: Grid, order: NDArray[np.int64], levels: Levels, taps: NDArray[np.float32], margin_mm: float, outer_mm: float
+    volume: Grid,
+    order: NDArray[np.int64],
+    levels: Levels,
+    taps: NDArray[np.float32],
+    margin_mm: float,
+    outer_mm: float,
 ) -> tuple[Grid, Grid, dict[str, float]]:
     """Signed distance (float32, mm, negative inside) and mask (uint8) on the vessel's box.
 

@@ -1,0 +1,260 @@
+"""Bright ridges as ordered sub-voxel points: a predictor-corrector walk from every strong voxel that is left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline._kernels.connect import _grown, smoothed
+from pipeline._kernels.jets import jet, ridge_frame, ridge_step
+
+
+@njit(cache=True)
+def subtract(
+    frame: NDArray[Any],
+    background: NDArray[Any],
+    corner: NDArray[Any],
+    voxels: NDArray[Any],
+    out: NDArray[Any],
+) -> None:
+    """frame - background at flat indices of the box ``out``, whose voxel (0, 0, 0) is ``corner`` of the frame.
+
+    ``background`` is on the box. Voxels of the box outside the frame keep their value.
+    """
+    _, nj, nk = out.shape
+    fi, fj, fk = frame.shape
+    for n in range(voxels.shape[0]):
+        flat = voxels[n]
+        k = flat % nk
+        rest = flat // nk
+        j = rest % nj
+        i = rest // nj
+        a, b, c = i + corner[0], j + corner[1], k + corner[2]
+        if a >= 0 and b >= 0 and c >= 0 and a < fi and b < fj and c < fk:
+            out[i, j, k] = float(frame[a, b, c]) - background[i, j, k]
+
+
+@njit(cache=True)
+def smooth_voxels(grey: NDArray[Any], taps: NDArray[Any], voxels: NDArray[Any]) -> NDArray[Any]:
+    """The separable kernel ``taps`` at flat indices of a box."""
+    _, nj, nk = grey.shape
+    out = np.empty(voxels.shape[0], np.float32)
+    for n in range(voxels.shape[0]):
+        flat = voxels[n]
+        rest = flat // nk
+        out[n] = smoothed(grey, taps, rest // nj, rest % nj, flat % nk)
+    return out
+
+
+@njit(cache=True)
+def to_ridge(
+    grey: NDArray[Any],
+    spacing: NDArray[Any],
+    sigma: float,
+    p: NDArray[Any],
+    t: NDArray[Any],
+    rounds: int,
+    w: NDArray[Any],
+    out: NDArray[Any],
+    step: NDArray[Any],
+) -> float:
+    """Move ``p`` onto the crest (in place), set its tangent ``t``; returns the weaker curvature across (negative)."""
+    limit = 0.7 * min(spacing[0], spacing[1], spacing[2])
+    middle = 0.0
+    for m in range(rounds + 1):
+        jet(grey, spacing, sigma, p, w, out)
+        _, middle = ridge_frame(out, t)
+        if m < rounds:
+            ridge_step(out, t, limit, step)
+            p[0] += step[0]
+            p[1] += step[1]
+            p[2] += step[2]
+    return middle
+
+
+@njit(cache=True)
+def _walk(
+    grey: NDArray[Any],
+    allowed: NDArray[Any],
+    stamp: NDArray[Any],
+    spacing: NDArray[Any],
+    sigma: float,
+    start: NDArray[Any],
+    heading: NDArray[Any],
+    length: float,
+    low: float,
+    sharp: float,
+    turn: float,
+    points: NDArray[Any],
+    tangents: NDArray[Any],
+    values: NDArray[Any],
+    earlier: NDArray[Any],
+    earlier_tangents: NDArray[Any],
+) -> int:
+    """Follow the crest from ``start``; fills the arrays (m, 3), (m, 3), (m,) and returns how many points were set.
+
+    Stops where the crest is weaker than ``low``, blunter than ``sharp``, turns by more than ``turn`` (cosine) in a
+    step, leaves ``allowed``, or runs along a crest that was walked before (``stamp`` = its point + 1).
+    """
+    w = np.empty((3, 3, 64))
+    out = np.empty(10)
+    step = np.empty(3)
+    p = start.copy()
+    t = heading.copy()
+    count = 0
+    size = min(spacing[0], spacing[1], spacing[2])
+    while count < points.shape[0]:
+        qx, qy, qz = p[0] + length * t[0], p[1] + length * t[1], p[2] + length * t[2]
+        ox, oy, oz = t[0], t[1], t[2]
+        p[0], p[1], p[2] = qx, qy, qz
+        middle = to_ridge(grey, spacing, sigma, p, t, 2, w, out, step)
+        if out[0] < low or middle > -sharp or t[0] * ox + t[1] * oy + t[2] * oz < turn:
+            break
+        moved = (p[0] - qx) ** 2 + (p[1] - qy) ** 2 + (p[2] - qz) ** 2
+        if moved > (0.8 * size) ** 2:
+            break
+        i, j, k = round(p[0] / spacing[0]), round(p[1] / spacing[1]), round(p[2] / spacing[2])
+        if i < 0 or j < 0 or k < 0 or i >= grey.shape[0] or j >= grey.shape[1] or k >= grey.shape[2]:
+            break
+        if not allowed[i, j, k]:
+            break
+        known = stamp[i, j, k] - 1
+        if known >= 0:
+            e, f = earlier[known], earlier_tangents[known]
+            gap = (p[0] - e[0]) ** 2 + (p[1] - e[1]) ** 2 + (p[2] - e[2]) ** 2
+            if gap < (0.8 * size) ** 2 and abs(t[0] * f[0] + t[1] * f[1] + t[2] * f[2]) > 0.7:
+                break
+        points[count, 0], points[count, 1], points[count, 2] = p[0], p[1], p[2]
+        tangents[count, 0], tangents[count, 1], tangents[count, 2] = t[0], t[1], t[2]
+        values[count] = out[0]
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def tracklets(
+    grey: NDArray[Any],
+    allowed: NDArray[Any],
+    spacing: NDArray[Any],
+    sigma: float,
+    seeds: NDArray[Any],
+    high: float,
+    low: float,
+    sharp: float,
+    turn: float,
+    length: float,
+    longest: int,
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Crests through the seeds (flat box indices, strongest first), each walked both ways with step ``length`` mm.
+
+    Returns points (n, 3), tangents (n, 3), crest values (n,), and the first point of every tracklet (m + 1,).
+    """
+    _, nj, nk = grey.shape
+    size = min(spacing[0], spacing[1], spacing[2])
+    stamp = np.zeros(grey.shape, np.int32)
+    w = np.empty((3, 3, 64))
+    out = np.empty(10)
+    step = np.empty(3)
+    points = np.empty((1024, 3))
+    tangents = np.empty((1024, 3))
+    values = np.empty(1024)
+    first = np.zeros(64, np.int64)
+    count = 0
+    tracks = 0
+    ahead, ahead_t, ahead_v = np.empty((longest, 3)), np.empty((longest, 3)), np.empty(longest)
+    back, back_t, back_v = np.empty((longest, 3)), np.empty((longest, 3)), np.empty(longest)
+    p = np.empty(3)
+    t = np.empty(3)
+    for n in range(seeds.shape[0]):
+        flat = seeds[n]
+        k = flat % nk
+        rest = flat // nk
+        j = rest % nj
+        i = rest // nj
+        taken = False
+        for a in range(max(0, i - 1), min(grey.shape[0], i + 2)):
+            for b in range(max(0, j - 1), min(nj, j + 2)):
+                for c in range(max(0, k - 1), min(nk, k + 2)):
+                    taken = taken or stamp[a, b, c] != 0
+        if taken:
+            continue
+        p[0], p[1], p[2] = i * spacing[0], j * spacing[1], k * spacing[2]
+        t[:] = 0.0
+        middle = to_ridge(grey, spacing, sigma, p, t, 3, w, out, step)
+        moved = (p[0] - i * spacing[0]) ** 2 + (p[1] - j * spacing[1]) ** 2 + (p[2] - k * spacing[2]) ** 2
+        if out[0] < high or middle > -sharp or moved > (1.8 * size) ** 2:
+            continue
+        value = out[0]
+        na = _walk(
+            grey,
+            allowed,
+            stamp,
+            spacing,
+            sigma,
+            p,
+            t,
+            length,
+            low,
+            sharp,
+            turn,
+            ahead,
+            ahead_t,
+            ahead_v,
+            points,
+            tangents,
+        )
+        nb = _walk(
+            grey,
+            allowed,
+            stamp,
+            spacing,
+            sigma,
+            p,
+            -t,
+            length,
+            low,
+            sharp,
+            turn,
+            back,
+            back_t,
+            back_v,
+            points,
+            tangents,
+        )
+        total = na + nb + 1
+        while count + total >= points.shape[0]:
+            values = _grown(values)
+            larger = np.empty((2 * points.shape[0], 3))
+            larger[:count] = points[:count]
+            points = larger
+            larger = np.empty((2 * tangents.shape[0], 3))
+            larger[:count] = tangents[:count]
+            tangents = larger
+        for m in range(nb):
+            points[count + m] = back[nb - 1 - m]
+            tangents[count + m] = -back_t[nb - 1 - m]
+            values[count + m] = back_v[nb - 1 - m]
+        points[count + nb] = p
+        tangents[count + nb] = t
+        values[count + nb] = value
+        for m in range(na):
+            points[count + nb + 1 + m] = ahead[m]
+            tangents[count + nb + 1 + m] = ahead_t[m]
+            values[count + nb + 1 + m] = ahead_v[m]
+        for m in range(count, count + total):
+            a, b, c = (
+                round(points[m, 0] / spacing[0]),
+                round(points[m, 1] / spacing[1]),
+                round(points[m, 2] / spacing[2]),
+            )
+            if 0 <= a < grey.shape[0] and 0 <= b < nj and 0 <= c < nk:
+                stamp[a, b, c] = m + 1
+        count += total
+        tracks += 1
+        if tracks >= first.shape[0]:
+            first = _grown(first)
+        first[tracks] = count
+    return points[:count], tangents[:count], values[:count], first[: tracks + 1]
