@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reports.case_files import CaseFiles
 from reports.figures._style import SEQUENTIAL, Drawing, has, new_figure, plain, whole_numbers
 
+Array = NDArray[np.float64]
 _CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
 
 
@@ -28,11 +29,10 @@ def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
         return None
     frames = np.arange(int(kept["frame"].min()), int(kept["frame"].max()) + 1)
     step = _step(kept)
-    columns = np.rint(kept["arc_mm"].to_numpy() / step).astype(int)
-    grid = np.full((len(frames), int(columns.max()) + 1), np.nan)
-    # two samples in one cell (the tip's short last step): the larger is shown
-    rows = kept["frame"].to_numpy(dtype=int) - frames[0]
-    np.fmax.at(grid, (rows, columns), kept[column].to_numpy())
+    grid = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan)
+    for frame, samples in kept.groupby("frame"):
+        row = _nearest(samples["arc_mm"].to_numpy(), samples[column].to_numpy(), step)
+        grid[int(str(frame)) - frames[0], : len(row)] = row
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step
@@ -51,6 +51,14 @@ def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
     return Drawing(figure, _tidy(grid, frames, step, column))
 
 
+def _nearest(arc_mm: Array, values: Array, step: float) -> Array:
+    """Values of the nearest samples at arc lengths 0, step, 2 step, ... up to the last sample."""
+    order = np.argsort(arc_mm, kind="stable")
+    at = np.arange(int(arc_mm.max() / step + 0.5) + 1) * step
+    middles = 0.5 * (arc_mm[order][1:] + arc_mm[order][:-1])
+    return np.asarray(values[order][np.searchsorted(middles, at)])
+
+
 def _step(points: pd.DataFrame) -> float:
     """Arc-length step between samples, mm."""
     steps = points.groupby("frame")["arc_mm"].diff()
@@ -58,6 +66,6 @@ def _step(points: pd.DataFrame) -> float:
     return float(positive.median()) if len(positive) else 1.0
 
 
-def _tidy(grid: NDArray[np.float64], frames: NDArray[np.int_], step: float, column: str) -> pd.DataFrame:
+def _tidy(grid: Array, frames: NDArray[np.int_], step: float, column: str) -> pd.DataFrame:
     row, place = np.nonzero(np.isfinite(grid))
     return pd.DataFrame({"frame": frames[row], "arc_mm": place * step, column: grid[row, place]})

@@ -84,7 +84,7 @@ def truth_by_depth(case: CaseFiles) -> Drawing | None:
     _line(top, good, "trace_tip_mm", "tip", color=VERMILION, linestyle="--", marker="s", markersize=4)
     positive_axis(top, [good[c] for c in columns[:3]])
     _finish(top, "traced to true wire, mm", depth=False)
-    _line(bottom, good, "truth_rms_mm", "to the true wire, rms", color=TRUTH, marker="D", markersize=4)
+    _line(bottom, good, "truth_rms_mm", "to the true wire, rms", color=TRUTH, linewidth=3.5, alpha=0.6)
     _line(bottom, good, "rms_mm", "to the traced wire, rms", color=SIMULATED, marker="o", markersize=4)
     _line(bottom, good, "truth_tip_mm", "to the true tip", color=TRUTH, linestyle="--", linewidth=1.0)
     positive_axis(bottom, [good[c] for c in ("truth_rms_mm", "rms_mm", "truth_tip_mm")])
@@ -164,7 +164,10 @@ def _finish(axes: Axes, ylabel: str, depth: bool = True) -> None:
     if depth:
         axes.set_xlabel(_DEPTH)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(frameon=False, fontsize=8, ncols=2)
+        # above the panel: inside, some case always has its curve behind the legend
+        axes.legend(
+            frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1
+        )
 
 
 def _predictors(statistics: Any) -> pd.DataFrame:

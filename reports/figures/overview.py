@@ -23,6 +23,7 @@ from reports.figures._style import (
     whole_numbers,
 )
 
+_CLIP_PERCENTILE = 98.0  # one lost frame must not turn the others dark
 _MAX_INCH = 24.0
 _MAX_NAMES = 90  # more labels than that overlap at the largest height
 
@@ -49,12 +50,15 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
     figure, axes = _tall(len(cases))
     axes.set_facecolor("0.93")
     edges = np.arange(grid.shape[1] + 1) - 0.5, np.arange(len(cases) + 1) - 0.5
-    top = max(float(np.nanmax(grid)), 1e-9) if np.isfinite(grid).any() else 1.0
+    top = max(float(np.nanpercentile(grid, _CLIP_PERCENTILE)), 1e-9) if np.isfinite(grid).any() else 1.0
+    clipped = bool((grid > top).any())
     mesh = axes.pcolormesh(
         *edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, edgecolors="white", linewidth=0.4
     )
     axes.plot(table["frame"].to_numpy(dtype=int)[failed], rows[failed], "x", color=VERMILION, markersize=5)
-    figure.colorbar(mesh, ax=axes, label="95th percentile, mm", pad=0.01)
+    figure.colorbar(
+        mesh, ax=axes, label="95th percentile, mm", extend="max" if clipped else "neither", pad=0.01
+    )
     _name_rows(axes, cases)
     axes.set_xlabel("frame")
     whole_numbers(axes.xaxis)
@@ -93,7 +97,9 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
 
 
 def _long(run: RunFiles) -> pd.DataFrame:
-    parts = [t[["frame", "status", "p95_mm"]].assign(case=name) for name, t in run.errors.items() if len(t)]
+    # a case without scans has nothing to show here, unless it failed
+    known = {name: t for name, t in run.errors.items() if (t["status"] != "simulated").any()}
+    parts = [t[["frame", "status", "p95_mm"]].assign(case=name) for name, t in known.items()]
     columns = ["case", "frame", "status", "p95_mm"]
     return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
 

@@ -12,9 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from reports.case_files import CaseFiles
-from reports.figures._planes import PLANES, Frame2D, dress, sheet
+from reports.figures._planes import PLANES, Plane, View, dress, sheet, whole
 from reports.figures._style import Drawing
-from reports.frames_file import Scan
 
 _MAX_WIRES = 12
 _COLOURS = "viridis"
@@ -28,12 +27,13 @@ def simulated_wires(case: CaseFiles) -> Drawing | None:
     wires = _wires(case)
     if not wires:
         return None
-    figure, rows = sheet(case.scan, 1)
+    view = whole(case.scan)
+    figure, rows = sheet(view, 1)
     depths = [depth for _, depth, _ in wires]
     scale = ScalarMappable(Normalize(min(depths), max(max(depths), min(depths) + 1e-9)), colormaps[_COLOURS])
     for axes, (axis, plane) in zip(rows[0], PLANES, strict=True):
-        _panel(axes, case.scan, axis, plane, wires, scale)
-    figure.colorbar(scale, ax=rows[0], label="insertion depth, mm", pad=0.01)
+        _panel(axes, view, axis, plane, wires, scale)
+    figure.colorbar(scale, ax=rows[0], label="insertion depth, mm", pad=0.01, aspect=30, shrink=0.8)
     return Drawing(figure, _tidy(wires))
 
 
@@ -49,24 +49,24 @@ def _wires(case: CaseFiles) -> list[tuple[int, float, Any]]:
     return wires
 
 
-def _panel(
-    axes: Axes, scan: Scan, axis: int, plane: tuple[int, int], wires: Any, scale: ScalarMappable
-) -> None:
-    frame = Frame2D(scan)
-    if axis in scan.lumen_mips:
-        _outline(axes, scan, frame, axis, plane)
-    for _, depth, points in wires:
-        across, up = frame.coordinates(points)[:, plane].T
-        axes.plot(across, up, color=scale.to_rgba(depth), linewidth=1.3)
-        axes.plot(across[-1:], up[-1:], "o", color=scale.to_rgba(depth), markersize=3)
-    dress(axes, frame, plane)
+def _panel(axes: Axes, view: View, axis: int, plane: Plane, wires: Any, scale: ScalarMappable) -> None:
+    if axis in view.scan.lumen_mips:
+        _outline(axes, view, axis, plane)
+    # deep wires first and wide, shallow ones over them and thin: each is seen where it differs
+    widths = np.linspace(3.2, 1.0, len(wires))
+    for (_, depth, points), width in zip(reversed(wires), widths, strict=True):
+        across, up = view.coordinates(points)[:, plane].T
+        axes.plot(across, up, color=scale.to_rgba(depth), linewidth=width)
+        axes.plot(across[-1:], up[-1:], "o", color=scale.to_rgba(depth), markersize=4)
+    dress(axes, view, plane)
 
 
-def _outline(axes: Axes, scan: Scan, frame: Frame2D, axis: int, plane: tuple[int, int]) -> None:
-    mask = (scan.lumen_mips[axis] > 0).astype(float)
-    left, right, bottom, top = frame.extent(*plane)
-    across = np.linspace(left, right, mask.shape[0], endpoint=False) + 0.5 * (right - left) / mask.shape[0]
-    up = np.linspace(bottom, top, mask.shape[1], endpoint=False) + 0.5 * (top - bottom) / mask.shape[1]
+def _outline(axes: Axes, view: View, axis: int, plane: Plane) -> None:
+    mask = (view.scan.lumen_mips[axis] > 0).astype(float)
+    left, right, bottom, top = view.extent(*plane)
+    half = 0.5 * view.scan.spacing_mm
+    across = np.linspace(left + half[plane[0]], right - half[plane[0]], mask.shape[0])
+    up = np.linspace(bottom + half[plane[1]], top - half[plane[1]], mask.shape[1])
     if min(mask.shape) >= 2 and mask.min() < mask.max():
         axes.contourf(across, up, mask.T, levels=[0.5, 1.5], colors=["0.90"])
         axes.contour(across, up, mask.T, levels=[0.5], colors=["0.45"], linewidths=0.7)

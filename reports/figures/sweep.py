@@ -38,6 +38,9 @@ def sensitivity(run: RunFiles) -> Drawing | None:
     for axes, parameter in zip(panels, parameters, strict=False):
         _panel(axes, run.sweep[run.sweep["parameter"] == parameter], columns)
         axes.set_xlabel(parameter)
+    handles, labels = panels[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)
     for axes in panels[len(parameters) :]:
         axes.remove()
     return Drawing(figure, run.sweep)
@@ -60,8 +63,6 @@ def _panel(axes: Axes, rows: pd.DataFrame, columns: list[str]) -> None:
         places = np.unique(values.to_numpy())
         axes.set_xticks(places, [f"{v:g}" for v in places], minor=False)
         axes.minorticks_off()
-    axes.set_ylim(bottom=0.0, top=1.25 * float(rows[columns].max().max()))
+    axes.set_ylim(bottom=0.0, top=1.1 * float(rows[columns].max().max()))
     axes.set_ylabel("pooled rms distance, mm")
-    if len(cases) <= _MAX_LINES:
-        axes.legend(frameon=False, fontsize=8)
     plain(axes)
