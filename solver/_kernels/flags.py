@@ -1,0 +1,9 @@
+"""The one place that says how kernels are compiled."""
+
+from __future__ import annotations
+
+import numba
+
+# Only fused multiply-add is allowed to reorder arithmetic: NaN and inf must keep their meaning, because
+# the minimiser detects a broken state by them.
+kernel = numba.njit(cache=True, fastmath={"contract"}, error_model="numpy")

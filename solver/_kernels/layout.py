@@ -1,0 +1,183 @@
+"""A wire at one depth, cut into segments: stiffness and rest bend per joint, look-up points per node.
+
+Everything but the first segment is fixed to the wire; the first takes up the remainder of the depth.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver._kernels.flags import kernel
+
+
+class Profile(NamedTuple):
+    """Piecewise linear functions of the distance from the tip; two equal abscissae make a jump."""
+
+    stiffness_at: Any
+    stiffness: Any
+    rest_at: Any
+    rest: Any
+    twist: float
+
+
+class Rule(NamedTuple):
+    """Where a segment's wall energy is looked up.
+
+    hull : (h, 2), offsets across the wire in the material frame, mm; one zero row is the smooth limit, no row no wall.
+    reach : added to the distance at each look-up, mm (the wire's radius in the smooth limit, else 0).
+    tip_at, tip_weight : (q,), places along the last segment as a fraction from its tip, and weights (sum 1).
+    """
+
+    hull: Any
+    reach: float
+    tip_at: Any
+    tip_weight: Any
+
+
+class Chain(NamedTuple):
+    """A wire of k segments; arrays may be longer than k.
+
+    length, bend, twist, rest : (k,) segment mm, joint stiffness N mm/rad, rest bend rad.
+    load : (k + 1, 3) dead force on each node, N.     first : (k + 2,) first look-up point of each node.
+    offset : (p, 3) mm in the frame of the segment that ends at the node; weight : (p,) mm of wire.
+    """
+
+    length: Any
+    bend: Any
+    twist: Any
+    rest: Any
+    load: Any
+    first: Any
+    offset: Any
+    weight: Any
+    reach: float
+
+
+@kernel
+def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
+    """Integral from 0 to s of a piecewise linear function, or of one over it (exact on every piece)."""
+    total = 0.0
+    start = 0.0
+    n = at.size
+    for i in range(n + 1):
+        stop = s if i == n else min(max(at[i], 0.0), s)
+        if stop <= start:
+            continue
+        left = value[0] if i == 0 else value[min(i, n) - 1]
+        right = value[n - 1] if i == n else value[i]
+        if 0 < i < n:
+            span = at[i] - at[i - 1]
+            rise = (right - left) / span
+            right = left + rise * (stop - at[i - 1])
+            left = left + rise * (start - at[i - 1])
+        else:
+            left = right = value[0] if i == 0 else value[n - 1]
+        width = stop - start
+        if not reciprocal:
+            total += 0.5 * width * (left + right)
+        else:
+            ratio = (right - left) / left
+            # log(1 + r)/r: the series keeps 1e-16 where the logarithm would cancel
+            mean = math.log1p(ratio) / ratio if abs(ratio) > 1e-4 else 1 - ratio / 2 + ratio * ratio / 3
+            total += width * mean / left
+        start = stop
+    return total
+
+
+@kernel
+def tabulate(profile: Profile, segment_mm: float, table: Any) -> None:
+    """Fill table (m, 2): compliance and rest bend of the whole cell around distance m * segment from the tip."""
+    for m in range(table.shape[0]):
+        outer, inner = (m + 0.5) * segment_mm, max(m - 0.5, 0.0) * segment_mm
+        cell(profile, inner, outer, table[m])
+
+
+@kernel
+def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
+    """Compliance 1/c and rest bend of a joint whose cell reaches from ``inner`` to ``outer`` mm from the tip."""
+    result[0] = integral(profile.stiffness_at, profile.stiffness, outer, True)
+    result[0] -= integral(profile.stiffness_at, profile.stiffness, inner, True)
+    result[1] = integral(profile.rest_at, profile.rest, outer, False)
+    result[1] -= integral(profile.rest_at, profile.rest, inner, False)
+
+
+@kernel
+def lay_out(
+    chain: Chain, profile: Profile, rule: Rule, table: Any, k: int, first_mm: float, segment_mm: float
+) -> int:
+    """Fill a chain of k segments whose first one is ``first_mm`` long; return the number of look-up points."""
+    depth = first_mm + (k - 1) * segment_mm
+    own = np.empty(2)
+    for j in range(k):
+        chain.length[j] = first_mm if j == 0 else segment_mm
+        outer = depth if j == 0 else (k - j + 0.5) * segment_mm
+        inner = (k - j - 0.5) * segment_mm
+        if j == 0:
+            inner = depth - 0.5 * first_mm
+        elif j == 1:
+            outer = depth - 0.5 * first_mm
+        if j < 2:
+            cell(profile, inner, outer, own)
+        else:
+            own[0], own[1] = table[k - j, 0], table[k - j, 1]
+        chain.bend[j] = 1.0 / own[0]
+        chain.rest[j] = own[1]
+        chain.twist[j] = profile.twist / (outer - inner)
+    return place_points(chain, rule, k)
+
+
+@kernel
+def place_points(chain: Chain, rule: Rule, k: int) -> int:
+    """Fill the look-up points: nodes weigh half of each neighbour, the last segment has its own rule."""
+    hulls = rule.hull.shape[0]
+    p = 0
+    chain.first[0] = chain.first[1] = 0
+    for n in range(1, k + 1):
+        if n < k:
+            weight = 0.5 * chain.length[n - 1]
+            if n < k - 1 or rule.tip_at.size == 1:
+                weight += 0.5 * chain.length[n]
+            for h in range(hulls):
+                chain.offset[p, 0] = rule.hull[h, 0]
+                chain.offset[p, 1] = rule.hull[h, 1]
+                chain.offset[p, 2] = 0.0
+                chain.weight[p] = weight / hulls
+                p += 1
+        else:
+            p = place_tip(chain, rule, k, p)
+        chain.first[n + 1] = p
+    return p
+
+
+@kernel
+def place_tip(chain: Chain, rule: Rule, k: int, p: int) -> int:
+    """Fill the look-up points of the last segment; one point means the tip joint with half a weight."""
+    hulls = rule.hull.shape[0]
+    length = chain.length[k - 1]
+    for t in range(rule.tip_at.size):
+        share = 0.5 if rule.tip_at.size == 1 else rule.tip_weight[t]
+        for h in range(hulls):
+            chain.offset[p, 0] = rule.hull[h, 0]
+            chain.offset[p, 1] = rule.hull[h, 1]
+            chain.offset[p, 2] = -length * rule.tip_at[t]
+            chain.weight[p] = share * length / hulls
+            p += 1
+    return p
+
+
+def empty_chain(k: int, points: int, reach: float) -> Chain:
+    """A chain with room for k segments and some look-up points."""
+    return Chain(
+        length=np.zeros(k),
+        bend=np.zeros(k),
+        twist=np.zeros(k),
+        rest=np.zeros(k),
+        load=np.zeros((k + 1, 3)),
+        first=np.zeros(k + 2, dtype=np.int64),
+        offset=np.zeros((points, 3)),
+        weight=np.zeros(points),
+        reach=reach,
+    )

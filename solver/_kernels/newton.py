@@ -1,0 +1,447 @@
+"""Newton's step for the whole chain in O(k): a backward Riccati recursion and a forward rollout.
+
+The chain is a discrete optimal-control problem: state (x_j, R_j), control u_j, dynamics
+    R_{j+1} = R_j B_j exp(û_j),    x_{j+1} = x_j + l_j R_{j+1} e3.
+The value function is expanded to second order in (δp, δr), both in the frame of the node, R -> R exp(δr̂).
+Crossing a segment in its own frame, δp' = δp + A δr with A = l [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], so that
+    g = v_r + Aᵀ f,   C = V_pr + V_pp A,   H = V_rr + Aᵀ V_pr + (Aᵀ C)ᵀ + l [½ (f e3ᵀ + e3 fᵀ) - f_3 I]
+with f = v_p; the last term is tension and compression: buckling lives there. Crossing a joint,
+    Q_u = Jᵀ g + c u,   Q_uu = Jᵀ H J + c I + g·∂J/∂u,   Q_ur = Jᵀ (H + ½ [g]x),   Q_up = Jᵀ Cᵀ.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels.energy import Scratch, State
+from solver._kernels.flags import kernel
+from solver._kernels.layout import Chain
+from solver._kernels.rotation import jacobian_terms, sine_terms, turn
+from solver._kernels.small import (
+    Nine,
+    Six,
+    Three,
+    add3,
+    add6,
+    add9,
+    apply,
+    apply_transposed,
+    conjugate,
+    cross,
+    cross_matrix,
+    full,
+    gram,
+    load3,
+    load9,
+    store9,
+    times,
+    times_transposed,
+    transpose,
+)
+
+CURVATURE_FLOOR = tol.CURVATURE_FLOOR
+STEP_ANGLE = tol.STEP_ANGLE
+CONTROL_ANGLE = tol.CONTROL_ANGLE
+
+ZERO3 = (0.0, 0.0, 0.0)
+ZERO6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ZERO9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def point_force(frame: Nine, jet: Any, force: float) -> Three:
+    """The wall's energy gradient at a point in contact, in the frame of its node; force = k w d."""
+    n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
+    return force * n[0], force * n[1], force * n[2]
+
+
+@kernel
+def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, project: bool) -> Six:
+    """The wall's energy Hessian at a point in contact, k w (∇φ ∇φᵀ + d ∇²φ), in the frame of its node.
+
+    ``project`` leaves out ∇²φ, the part that can be negative.
+    """
+    n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
+    own = (
+        curvature * n[0] * n[0],
+        curvature * n[1] * n[1],
+        curvature * n[2] * n[2],
+        curvature * n[0] * n[1],
+        curvature * n[0] * n[2],
+        curvature * n[1] * n[2],
+    )
+    if project:
+        return own
+    bend = conjugate(
+        transpose(frame),
+        (force * jet[4], force * jet[5], force * jet[6], force * jet[7], force * jet[8], force * jet[9]),
+    )
+    return add6(own, bend)
+
+
+@kernel
+def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six, Three]:
+    """What a point off its node adds to V_pr, V_rr and v_r: its place moves by δr x offset, and curves."""
+    d = cross_matrix((-offset[0], -offset[1], -offset[2]))
+    c = times(full(stiffness), d)
+    h = times(transpose(d), c)
+    f, o = force, offset
+    dot = f[0] * o[0] + f[1] * o[1] + f[2] * o[2]
+    rr = (
+        h[0] + f[0] * o[0] - dot,
+        h[4] + f[1] * o[1] - dot,
+        h[8] + f[2] * o[2] - dot,
+        h[1] + 0.5 * (f[0] * o[1] + f[1] * o[0]),
+        h[2] + 0.5 * (f[0] * o[2] + f[2] * o[0]),
+        h[5] + 0.5 * (f[1] * o[2] + f[2] * o[1]),
+    )
+    return c, rr, cross(o, f)
+
+
+@kernel
+def jacobian(u0: float, u1: float, u2: float) -> Nine:
+    """Right Jacobian of exp at u."""
+    q = u0 * u0 + u1 * u1 + u2 * u2
+    s, a = sine_terms(q)
+    b, _, _ = jacobian_terms(q, s, a)
+    return (
+        1 - b * (u1 * u1 + u2 * u2),
+        a * u2 + b * u0 * u1,
+        -a * u1 + b * u0 * u2,
+        -a * u2 + b * u0 * u1,
+        1 - b * (u0 * u0 + u2 * u2),
+        a * u0 + b * u1 * u2,
+        a * u1 + b * u0 * u2,
+        -a * u0 + b * u1 * u2,
+        1 - b * (u0 * u0 + u1 * u1),
+    )
+
+
+@kernel
+def jacobian_curvature(g: Three, u: Three) -> Six:
+    """The symmetric S with g·(∂_v J) v = vᵀ S v: the part of a joint's Hessian that its own bend makes."""
+    q = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    s, a = sine_terms(q)
+    b, da, db = jacobian_terms(q, s, a)
+    w = cross(g, u)
+    gu = g[0] * u[0] + g[1] * u[1] + g[2] * u[2]
+    # y collects everything that is multiplied with u from the left and symmetrised
+    y0 = -da * w[0] - db * q * g[0] - b * g[0] + db * gu * u[0]
+    y1 = -da * w[1] - db * q * g[1] - b * g[1] + db * gu * u[1]
+    y2 = -da * w[2] - db * q * g[2] - b * g[2] + db * gu * u[2]
+    return (
+        u[0] * y0 + b * gu,
+        u[1] * y1 + b * gu,
+        u[2] * y2 + b * gu,
+        0.5 * (u[0] * y1 + u[1] * y0),
+        0.5 * (u[0] * y2 + u[2] * y0),
+        0.5 * (u[1] * y2 + u[2] * y1),
+    )
+
+
+@kernel
+def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) -> tuple[Nine, Six, Three]:
+    """Carry V from the far end of a segment to its near end, at the same frame."""
+    # C = V_pr + V_pp A: A moves columns, (M A)[:, 0] = -l M[:, 1], (M A)[:, 1] = l M[:, 0]
+    n = (
+        c[0] - length * p[3],
+        c[1] + length * p[0],
+        c[2],
+        c[3] - length * p[1],
+        c[4] + length * p[3],
+        c[5],
+        c[6] - length * p[5],
+        c[7] + length * p[4],
+        c[8],
+    )
+    # Aᵀ M moves rows: row 0 = -l M[1, :], row 1 = l M[0, :], row 2 = 0
+    rr = (
+        h[0] - length * (c[3] + n[3]) - length * f[2],
+        h[1] + length * (c[1] + n[1]) - length * f[2],
+        h[2],
+        h[3] - length * n[4] + length * c[0],
+        h[4] - length * c[5] + 0.5 * length * f[0],
+        h[5] + length * c[2] + 0.5 * length * f[1],
+    )
+    return n, rr, (g[0] - length * f[1], g[1] + length * f[0], g[2])
+
+
+@kernel
+def smallest_shift(a: float, b: float, d: float, floor: float) -> float:
+    """What to add to the diagonal of [[a, b], [b, d]] so that it is safely positive; 0 where it is already."""
+    mean = 0.5 * (a + d)
+    least = mean - math.sqrt(0.25 * (a - d) * (a - d) + b * b)
+    if least > floor:
+        return 0.0
+    return max(-least, floor) - least
+
+
+@kernel
+def solve_block(q: Six, twisting: bool) -> Nine:
+    """Minus the inverse of Q_uu; without a twist variable its last row and column are zero."""
+    if not twisting:
+        det = q[0] * q[1] - q[3] * q[3]
+        return -q[1] / det, q[3] / det, 0.0, q[3] / det, -q[0] / det, 0.0, 0.0, 0.0, 0.0
+    c00 = q[1] * q[2] - q[5] * q[5]
+    c01 = q[4] * q[5] - q[3] * q[2]
+    c02 = q[3] * q[5] - q[4] * q[1]
+    c11 = q[0] * q[2] - q[4] * q[4]
+    c12 = q[3] * q[4] - q[0] * q[5]
+    c22 = q[0] * q[1] - q[3] * q[3]
+    det = -(q[0] * c00 + q[3] * c01 + q[4] * c02)
+    return (
+        c00 / det,
+        c01 / det,
+        c02 / det,
+        c01 / det,
+        c11 / det,
+        c12 / det,
+        c02 / det,
+        c12 / det,
+        c22 / det,
+    )
+
+
+@kernel
+def sweep(
+    chain: Chain,
+    stiffness: float,
+    state: State,
+    which: int,
+    k: int,
+    scratch: Scratch,
+    twisting: bool,
+    project: bool,
+    levenberg: float,
+    report: Any,
+) -> None:
+    """One backward Riccati recursion; gains go to scratch.gain (k, 3, 7), see ``rollout``.
+
+    report (12,): [0] Newton decrement (predicted fall of the energy), [1] largest gradient, N mm, [2] joint of
+    the first indefinite block from the tip or -1, [3:5] its direction of negative curvature, [5] that curvature,
+    [6:9] gradient with respect to the entry point, N, [9:12] with respect to turning the base frame, N mm.
+    """
+    x_u, x_r = state.u[which], state.r[which]
+    p, c, h, f, g = ZERO6, ZERO9, ZERO6, ZERO3, ZERO3
+    exact_f, exact_g = ZERO3, ZERO3
+    decrement = 0.0
+    largest = 0.0
+    report[2] = -1.0
+    for n in range(k, 0, -1):
+        j = n - 1
+        frame = load9(x_r[n])
+        load = apply_transposed(frame, load3(chain.load[n]))
+        f = (f[0] - load[0], f[1] - load[1], f[2] - load[2])
+        exact_f = (exact_f[0] - load[0], exact_f[1] - load[1], exact_f[2] - load[2])
+        for i in range(chain.first[n], chain.first[n + 1]):
+            d = state.depth[which, i]
+            if d != 0.0:
+                curvature = stiffness * chain.weight[i]
+                jet = state.jet[which, i]
+                force = point_force(frame, jet, curvature * d)
+                hessian = point_stiffness(frame, jet, curvature * d, curvature, project)
+                p, f, exact_f = add6(p, hessian), add3(f, force), add3(exact_f, force)
+                offset = load3(chain.offset[i])
+                if offset != ZERO3:
+                    dc, dh, dg = lever(offset, force, hessian)
+                    c, h, g, exact_g = add9(c, dc), add6(h, dh), add3(g, dg), add3(exact_g, dg)
+        length = chain.length[j]
+        c, h, g = cross_segment(length, p, c, h, f, g)
+        exact_g = (exact_g[0] - length * exact_f[1], exact_g[1] + length * exact_f[0], exact_g[2])
+        bend, twist = chain.bend[j], chain.twist[j]
+        u = load3(x_u[j])
+        jac = jacobian(u[0], u[1], u[2])
+        if not twisting:
+            jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
+            twist = 0.0
+        moment = (bend * u[0], bend * u[1], twist * u[2])
+        q_u = add3(apply_transposed(jac, g), moment)
+        exact = add3(apply_transposed(jac, exact_g), moment)
+        largest = max(largest, abs(exact[0]), abs(exact[1]), abs(exact[2]))
+        jac_t = transpose(jac)
+        curved = jacobian_curvature(g, u)
+        q_uu = add6(conjugate(jac_t, h), curved)
+        extra = bend * (1.0 + levenberg)
+        q_uu = (
+            q_uu[0] + extra,
+            q_uu[1] + extra,
+            q_uu[2] + twist * (1.0 + levenberg),
+            q_uu[3],
+            q_uu[4],
+            q_uu[5],
+        )
+        shift = smallest_shift(q_uu[0], q_uu[3], q_uu[1], CURVATURE_FLOOR * bend)
+        if shift > 0.0:
+            if report[2] < 0.0:
+                note_direction(q_uu, j, report)
+            q_uu = (q_uu[0] + shift, q_uu[1] + shift, q_uu[2] + shift, q_uu[3], q_uu[4], q_uu[5])
+        if twisting:
+            q_uu = lift_twist(q_uu, twist)
+        inverse = solve_block(q_uu, twisting)
+        q_up = times_transposed(jac_t, c)
+        q_ur = times(jac_t, add9(full(h), cross_matrix((0.5 * g[0], 0.5 * g[1], 0.5 * g[2]))))
+        feed = apply(inverse, q_u)
+        gain_p = times(inverse, q_up)
+        gain_r = times(inverse, q_ur)
+        store_gain(scratch.gain[j], feed, gain_p, gain_r)
+        decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
+        p = add6(p, gram(q_up, gain_p))
+        c = add9(c, times(transpose(q_up), gain_r))
+        h = add6(h, gram(q_ur, gain_r))
+        f = add3(f, apply_transposed(q_up, feed))
+        g = add3(g, apply_transposed(q_ur, feed))
+        e = turn(chain.rest[j], u[0], u[1], u[2])
+        p, h = conjugate(e, p), conjugate(e, h)
+        c = times_transposed(times(e, c), e)
+        f, g = apply(e, f), apply(e, g)
+        exact_f, exact_g = apply(e, exact_f), apply(e, exact_g)
+    base = load9(x_r[0])
+    report[0], report[1] = decrement, largest
+    world = apply(base, exact_f)
+    report[6], report[7], report[8] = world[0], world[1], world[2]
+    report[9], report[10], report[11] = exact_g[0], exact_g[1], exact_g[2]
+
+
+@kernel
+def note_direction(q: Six, j: int, report: Any) -> None:
+    """Keep the direction of negative curvature of an indefinite block: the way off a saddle."""
+    half = 0.5 * (q[0] - q[1])
+    radius = math.sqrt(half * half + q[3] * q[3])
+    angle = 0.5 * math.atan2(q[3], half) + 0.5 * math.pi
+    report[2] = j
+    report[3], report[4] = math.cos(angle), math.sin(angle)
+    report[5] = 0.5 * (q[0] + q[1]) - radius
+
+
+@kernel
+def lift_twist(q: Six, twist: float) -> Six:
+    """Raise the twist entry of Q_uu until the 3x3 block is positive (its bending block already is)."""
+    det = q[0] * q[1] - q[3] * q[3]
+    least = (q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]) / det
+    return q[0], q[1], max(q[2], least + CURVATURE_FLOOR * twist), q[3], q[4], q[5]
+
+
+@kernel
+def store_gain(gain: Any, feed: Three, gain_p: Nine, gain_r: Nine) -> None:
+    """Write one joint's gains: column 0 the step, 1-3 the answer to δp, 4-6 to δr."""
+    for a in range(3):
+        gain[a, 0] = feed[a]
+        for b in range(3):
+            gain[a, 1 + b] = gain_p[3 * a + b]
+            gain[a, 4 + b] = gain_r[3 * a + b]
+
+
+@kernel
+def place(chain: Chain, state: State, which: int, k: int) -> None:
+    """Joints and frames of the controls u, from the base frame and entry point of the same state."""
+    u, x, r = state.u[which], state.x[which], state.r[which]
+    frame = load9(r[0])
+    for j in range(k):
+        frame = times(frame, turn(chain.rest[j], u[j, 0], u[j, 1], u[j, 2]))
+        store9(r[j + 1], frame)
+        length = chain.length[j]
+        for a in range(3):
+            x[j + 1, a] = x[j, a] + length * r[j + 1, a, 2]
+
+
+@kernel
+def rollout(
+    chain: Chain, state: State, which: int, k: int, gain: Any, fraction: float, twisting: bool
+) -> None:
+    """Take a fraction of Newton's step forward with feedback: the other state becomes the trial.
+
+    Feedback answers the true displacement of each node, so the trial stays close to the plan even where the
+    second-order model of a thousand rotations would not.
+    """
+    old_u, old_x, old_r = state.u[which], state.x[which], state.r[which]
+    u, x, r = state.u[1 - which], state.x[1 - which], state.r[1 - which]
+    x[0, :] = old_x[0]
+    frame = load9(old_r[0])
+    store9(r[0], frame)
+    place3 = load3(x[0])
+    for j in range(k):
+        old = load9(old_r[j])
+        moved = (place3[0] - old_x[j, 0], place3[1] - old_x[j, 1], place3[2] - old_x[j, 2])
+        turned = relative(old, frame)
+        ahead = load9(old_r[j + 1])
+        dp = apply_transposed(ahead, moved)
+        dr = apply_transposed(ahead, turned)
+        m = gain[j]
+        s0 = fraction * m[0, 0] + m[0, 1] * dp[0] + m[0, 2] * dp[1] + m[0, 3] * dp[2]
+        s1 = fraction * m[1, 0] + m[1, 1] * dp[0] + m[1, 2] * dp[1] + m[1, 3] * dp[2]
+        s2 = 0.0
+        s0 += m[0, 4] * dr[0] + m[0, 5] * dr[1] + m[0, 6] * dr[2]
+        s1 += m[1, 4] * dr[0] + m[1, 5] * dr[1] + m[1, 6] * dr[2]
+        if twisting:
+            s2 = fraction * m[2, 0] + m[2, 1] * dp[0] + m[2, 2] * dp[1] + m[2, 3] * dp[2]
+            s2 += m[2, 4] * dr[0] + m[2, 5] * dr[1] + m[2, 6] * dr[2]
+        v0, v1, v2 = limited(old_u[j, 0], old_u[j, 1], old_u[j, 2], s0, s1, s2)
+        u[j, 0], u[j, 1], u[j, 2] = v0, v1, v2
+        frame = times(frame, turn(chain.rest[j], v0, v1, v2))
+        store9(r[j + 1], frame)
+        length = chain.length[j]
+        place3 = (
+            place3[0] + length * frame[2],
+            place3[1] + length * frame[5],
+            place3[2] + length * frame[8],
+        )
+        x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = place3
+
+
+@kernel
+def relative(old: Nine, new: Nine) -> Three:
+    """Rotation vector (world) from an old frame to a new one, to first order: sin of the angle times the axis."""
+    a = cross((old[0], old[3], old[6]), (new[0], new[3], new[6]))
+    b = cross((old[1], old[4], old[7]), (new[1], new[4], new[7]))
+    c = cross((old[2], old[5], old[8]), (new[2], new[5], new[8]))
+    return 0.5 * (a[0] + b[0] + c[0]), 0.5 * (a[1] + b[1] + c[1]), 0.5 * (a[2] + b[2] + c[2])
+
+
+@kernel
+def limited(u0: float, u1: float, u2: float, s0: float, s1: float, s2: float) -> Three:
+    """u + s with the step kept below STEP_ANGLE and the result below CONTROL_ANGLE."""
+    size = s0 * s0 + s1 * s1 + s2 * s2
+    if size > STEP_ANGLE * STEP_ANGLE:
+        scale = STEP_ANGLE / math.sqrt(size)
+        s0, s1, s2 = s0 * scale, s1 * scale, s2 * scale
+    v0, v1, v2 = u0 + s0, u1 + s1, u2 + s2
+    size = v0 * v0 + v1 * v1 + v2 * v2
+    if size > CONTROL_ANGLE * CONTROL_ANGLE:
+        scale = CONTROL_ANGLE / math.sqrt(size)
+        v0, v1, v2 = v0 * scale, v1 * scale, v2 * scale
+    return v0, v1, v2
+
+
+@kernel
+def costate(
+    chain: Chain, stiffness: float, state: State, which: int, k: int, twisting: bool, report: Any
+) -> None:
+    """Exact gradient of the total energy: the first-order part of ``sweep``, into report[1] and report[6:12]."""
+    f, g = ZERO3, ZERO3
+    largest = 0.0
+    for n in range(k, 0, -1):
+        frame = load9(state.r[which, n])
+        load = apply_transposed(frame, load3(chain.load[n]))
+        f = (f[0] - load[0], f[1] - load[1], f[2] - load[2])
+        for i in range(chain.first[n], chain.first[n + 1]):
+            d = state.depth[which, i]
+            if d != 0.0:
+                force = point_force(frame, state.jet[which, i], stiffness * chain.weight[i] * d)
+                f = add3(f, force)
+                g = add3(g, cross(load3(chain.offset[i]), force))
+        length = chain.length[n - 1]
+        g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
+        u = load3(state.u[which, n - 1])
+        bend = chain.bend[n - 1]
+        moment = apply_transposed(jacobian(u[0], u[1], u[2]), g)
+        largest = max(largest, abs(moment[0] + bend * u[0]), abs(moment[1] + bend * u[1]))
+        if twisting:
+            largest = max(largest, abs(moment[2] + chain.twist[n - 1] * u[2]))
+        e = turn(chain.rest[n - 1], u[0], u[1], u[2])
+        f, g = apply(e, f), apply(e, g)
+    world = apply(load9(state.r[which, 0]), f)
+    report[1] = largest
+    report[6], report[7], report[8] = world[0], world[1], world[2]
+    report[9], report[10], report[11] = g[0], g[1], g[2]

@@ -1,0 +1,32 @@
+"""Named numbers of the solver, each with its reason."""
+
+from __future__ import annotations
+
+DECREMENT = 1e-9
+"""Newton decrement relative to the energy at which a step counts as converged: the step that follows squares it."""
+ROUND_OFF = 1e-13
+"""Energy differences below this fraction of the energy are rounding (1e-16 times a few hundred joints)."""
+ENERGY_FLOOR_ANGLE = 1e-7
+"""Joint angle in rad whose bending energy is called nothing: the scale where the energy itself is zero."""
+MOMENT = 1e-5
+"""Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
+CURVATURE_FLOOR = 1e-6
+"""A 2x2 block of the Hessian below this fraction of its joint's stiffness counts as indefinite."""
+SUFFICIENT = 1e-4
+"""Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
+STEP_ANGLE = 0.7
+"""Largest change of a joint in one step, rad: the second-order model of a rotation is good to 10 % there."""
+CONTROL_ANGLE = 2.8
+"""Largest joint angle kept, rad: the rotation vector is singular at 2 pi and a reversal at pi is a fold."""
+FOLD_COSINE = 0.0
+"""Two consecutive segments that turn by more than 90 degrees are a fold, not a bend."""
+FOLLOW = 1e-12
+"""Relative round-off when a wire is moved along its own curve."""
+ENTRY_MARGIN_VOXELS = 1.0
+"""How far outside the lumen, in voxel diagonals, an entry point may lie before it is called outside."""
+SMALLEST_STEP = 2.0**-10
+"""Smallest fraction of step_mm that a failing step is halved down to."""
+HOP_VOXELS = 0.02
+"""Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
+MATCH_DEPTH_MM = 1e-9
+"""Depths closer than this are the same depth."""

@@ -1,0 +1,53 @@
+"""What a relaxation returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.status import Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A wire at one depth, at rest if ``converged``; otherwise the last good state, and ``sentence`` says why.
+
+    joints_mm : (k + 1, 3) from the entry to the tip, read-only.
+    frames : (k + 1, 3, 3), columns are material axes 1, 2 and the direction of the segment before the joint.
+    energy_N_mm : total; bending_energy_N_mm, wall_energy_N_mm : its parts.
+    contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
+    reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
+    push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
+    work : counters of what was computed and what was proven unnecessary.
+    """
+
+    joints_mm: Array
+    frames: Array
+    energy_N_mm: float
+    bending_energy_N_mm: float
+    wall_energy_N_mm: float
+    status: Status
+    iterations: int
+    contact_force_N: Array
+    reaction_force_N: Array
+    reaction_torque_N_mm: float
+    push_force_N: float
+    max_penetration_mm: float
+    depth_mm: float
+    roll_deg: float
+    work: Mapping[str, float]
+
+    @property
+    def converged(self) -> bool:
+        """The wire is at rest."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def sentence(self) -> str:
+        """The status in words."""
+        return self.status.value

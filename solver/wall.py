@@ -1,0 +1,104 @@
+"""The vessel wall: Hooke's law on the signed distance to the lumen, interpolated so that energies can be checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solver._kernels.layout import Rule
+from solver._kernels.spline import Field, bounds, look_up, prefilter
+from solver.errors import refuse
+from solver.grid import Grid
+
+Array = NDArray[np.float64]
+
+
+def _checked(grid: Grid) -> Array:
+    """The distances as float64, or a refusal of what no distance can be."""
+    values = np.array(grid.values, dtype=np.float64, order="C")
+    if min(values.shape) < 2:
+        refuse(
+            "wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map"
+        )
+    bad = ~np.isfinite(values)
+    if bad.any():
+        where = [int(i) for i in np.argwhere(bad)[0]]
+        got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
+        refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class VesselWall:
+    """The lumen's wall as a signed distance in mm, negative inside; costs ½ k d² per mm of wire.
+
+    stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient, 0 costs nothing.
+    hull : "offset" (the smooth limit d = max(0, φ + radius)) or "samples:N" (N points around each joint).
+    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid.
+    """
+
+    distance: Grid
+    stiffness_N_mm2: float
+    friction: float = 0.0
+    hull: str = "offset"
+    field: Field = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
+        if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
+            refuse(
+                "wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual"
+            )
+        if not (math.isfinite(self.friction) and self.friction >= 0):
+            refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
+        _ = self.samples
+        values = _checked(self.distance)
+        prefilter(values)
+        padded = np.pad(values, 1)
+        for axis in range(3):
+            line = np.moveaxis(padded, axis, 0)
+            line[0] = 2 * line[1] - line[2]
+            line[-1] = 2 * line[-2] - line[-3]
+        to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
+        coefficients = padded.astype(np.float32)
+        gap, slope = bounds(coefficients, to_index)
+        origin = np.array(self.distance.origin_mm)
+        object.__setattr__(self, "field", Field(coefficients, to_index, origin, float(gap), float(slope)))
+
+    @cached_property
+    def samples(self) -> int:
+        """Number of hull points around a joint; 0 is the smooth limit."""
+        if self.hull == "offset":
+            return 0
+        name, _, count = self.hull.partition(":")
+        if name != "samples" or not count.isdigit() or not 1 <= int(count) <= 256:
+            refuse(
+                "wall", "hull", self.hull, '"offset" or "samples:N", N from 1 to 256', "samples:16 is usual"
+            )
+        return int(count)
+
+    def rule(self, radius_mm: float, tip_at: Array, tip_weight: Array) -> Rule:
+        """Where a wire of this radius looks the distance up."""
+        if self.samples == 0:
+            return Rule(np.zeros((1, 2)), float(radius_mm), tip_at, tip_weight)
+        angle = 2 * np.pi * np.arange(self.samples) / self.samples
+        return Rule(radius_mm * np.column_stack([np.cos(angle), np.sin(angle)]), 0.0, tip_at, tip_weight)
+
+    def look_up(self, points_mm: ArrayLike) -> tuple[Array, Array, Array]:
+        """Distance (n,) mm, gradient (n, 3) and Hessian (n, 3, 3) per mm of the interpolant at points (n, 3)."""
+        points = np.atleast_2d(np.asarray(points_mm, dtype=np.float64))
+        jets = np.zeros((len(points), 10))
+        look_up(self.field, points, jets)
+        order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]
+        return jets[:, 0], jets[:, 1:4], jets[:, order]
+
+    def beyond_grid(self, points_mm: ArrayLike) -> Array:
+        """How far each point (n, 3) lies outside the grid's voxels (half a voxel beyond their centres), mm."""
+        index = self.distance.to_index(points_mm)
+        last = np.array(self.distance.shape) - 0.5
+        outside = np.maximum(np.maximum(-0.5 - index, index - last), 0.0)
+        return np.asarray(np.linalg.norm(outside * self.distance.spacing_mm, axis=-1))
