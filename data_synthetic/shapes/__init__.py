@@ -1,0 +1,8 @@
+"""Analytic anatomies: simple shapes for small tests, the circle of Willis, and trees read from files."""
+
+from __future__ import annotations
+
+from data_synthetic.shapes.simple import bend, bifurcation, helix, s_curve, straight
+from data_synthetic.shapes.willis import WillisPlan, circle_of_willis
+
+__all__ = ["WillisPlan", "bend", "bifurcation", "circle_of_willis", "helix", "s_curve", "straight"]

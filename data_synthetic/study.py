@@ -1,0 +1,148 @@
+"""From a scene to a study: truth computed, phantom voxelised, manifest made as inexact as a real one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from data_synthetic.scan_grid import ScanGrid, centred_grid
+from data_synthetic.scanner import PsfScanner
+from data_synthetic.scene import Scanner, Scene, Setup, Study, Wires
+from data_synthetic.truth_cache import cached_replay
+from data_synthetic.wire_truth import Insertion, TrueFrame, normal_to, rotate
+
+Array = NDArray[np.float64]
+ScannerFactory = Callable[[Setup, ScanGrid], Scanner]
+
+ENTRY_ERROR_VOXELS = 0.5
+"""How far the manifest's entry is from the true one: what pointing at a scan achieves."""
+
+DIRECTION_ERROR_DEG = 2.0
+"""How far the manifest's entry direction is from the true one."""
+
+DEPTH_NOISE_MM = 0.2
+"""sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
+
+
+def psf_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
+    """The default scanner."""
+    return PsfScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, setup.greys)
+
+
+def make_study(
+    scene: Scene,
+    *,
+    frames: int | None = None,
+    size: int | None = None,
+    voxel_mm: float | None = None,
+    seed: int = 0,
+    truth_step_mm: float = 0.2,
+    scanner: ScannerFactory = psf_scanner,
+) -> Study:
+    """Build a scene: sizes default to the scene's own; voxel_mm to its field of view over ``size``."""
+    frames, size = frames or scene.frames, size or scene.size
+    voxel = voxel_mm or scene.fov_mm / size
+    setup = scene.setup(np.random.default_rng([seed, 1]), frames)
+    ratio = np.array(setup.spacing_ratio)
+    nx, ny, nz = (max(2, round(size / r)) for r in ratio)
+    grid = centred_grid(setup.centre_mm, (nx, ny, nz), voxel * ratio, setup.axes)
+    truth = true_wire(setup, truth_step_mm)
+    machine = _Machine(setup, grid, scanner, seed)
+    return Study(
+        name=scene.name,
+        why=scene.why,
+        grid=grid,
+        reference=machine.at(np.zeros(3)).scan((), (seed, 2)),
+        truth=tuple(_shifted(f, setup.motion_mm, i) for i, f in enumerate(truth)),
+        expected=scene.expected_statuses(frames),
+        manifest=_manifest(scene.name, setup, grid, np.random.default_rng([seed, 4])),
+        quality=truth_quality(truth),
+        setup=setup,
+        make_frame=lambda i: machine.frame(i, truth[i]),
+    )
+
+
+def true_wire(setup: Setup, step_mm: float) -> tuple[TrueFrame, ...]:
+    """The replayed insertion of a set-up."""
+    insertion = Insertion(
+        setup.wire,
+        setup.anatomy,
+        setup.stiffness_N_mm2,
+        setup.entry_mm,
+        setup.direction,
+        setup.material_axis,
+        step_mm,
+        max(step_mm, 0.4),
+    )
+    return cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
+
+
+def truth_quality(truth: tuple[TrueFrame, ...]) -> dict[str, float]:
+    """Figures that tell how far the truth can be trusted."""
+    return {
+        "largest_residual_N": max(f.residual_N for f in truth),
+        "largest_tip_jump_mm": max(f.jump_mm for f in truth),
+        "largest_contact_N": max(float(np.linalg.norm(f.contact_N, axis=1).max()) for f in truth),
+        "newton_iterations": float(sum(f.iterations for f in truth)),
+    }
+
+
+class _Machine:
+    """The scanner at each place of the phantom; voxelising is done once per place, the last one kept."""
+
+    def __init__(self, setup: Setup, grid: ScanGrid, factory: ScannerFactory, seed: int) -> None:
+        self.setup, self.seed = setup, seed
+        moved = lru_cache(maxsize=1)(
+            lambda shift: factory(setup, replace(grid, origin_mm=grid.origin_mm - np.array(shift)))
+        )
+        self.at: Callable[[Array], Scanner] = lambda shift: moved(tuple(float(s) for s in shift))
+
+    def frame(self, number: int, truth: TrueFrame) -> NDArray[np.int16]:
+        """Moving the phantom by +shift is moving the grid by -shift."""
+        setup = self.setup
+        shift = np.zeros(3) if setup.motion_mm is None else setup.motion_mm[number]
+        shown = setup.visible is None or setup.visible[number]
+        wires: Wires = [(truth.points_mm, setup.wire.radius_mm)] if shown else []
+        return self.at(shift).scan([*wires, *setup.others], (self.seed, 3, number))
+
+
+def _shifted(frame: TrueFrame, motion_mm: Array | None, number: int) -> TrueFrame:
+    return frame if motion_mm is None else replace(frame, points_mm=frame.points_mm + motion_mm[number])
+
+
+def _manifest(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:
+    """The case as its user would write it down: entry, direction and depths not quite right."""
+    offset = rng.normal(size=3)
+    offset *= ENTRY_ERROR_VOXELS * grid.voxel_mm / np.linalg.norm(offset)
+    axis = normal_to(rng.normal(size=3), setup.direction)
+    direction = rotate(
+        setup.direction / np.linalg.norm(setup.direction), axis, np.radians(DIRECTION_ERROR_DEG)
+    )
+    depths = np.array(setup.depths_mm) + rng.normal(0.0, DEPTH_NOISE_MM, len(setup.depths_mm))
+    wire = setup.wire
+    return {
+        "wires": {
+            "wire": {
+                "radius_mm": wire.radius_mm,
+                "bending_stiffness_N_mm2": [list(k) for k in wire.bending_N_mm2],
+                "rest_curvature_per_mm": [list(k) for k in wire.rest_curvature_per_mm],
+                "torsional_stiffness_N_mm2": wire.torsional_N_mm2,
+            }
+        },
+        "case": {
+            "id": name,
+            "role": "validation",
+            "entry_mm": (setup.entry_mm + offset).round(4).tolist(),
+            "entry_direction": direction.round(6).tolist(),
+            "material_axis": normal_to(setup.material_axis, direction).round(6).tolist(),
+            "wire": "wire",
+            "insertion_mm": depths.round(3).tolist(),
+            "roll_deg": list(setup.rolls_deg) if len(set(setup.rolls_deg)) > 1 else setup.rolls_deg[0],
+            "wall": {"stiffness_N_mm2": setup.stiffness_N_mm2, "friction": 0.0},
+        },
+    }
