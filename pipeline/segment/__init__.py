@@ -19,8 +19,12 @@ __all__ = ["segment"]
 
 LEAST_CONTRAST = 2.0
 """Contrast over the noise of one voxel below which no vessel is looked for (Dice falls below 0.97 at 2.2)."""
-LEVEL_TOLERANCE = 0.015
-"""Change of the wall's level, in contrasts, that is worth a second surface: it moves the wall by 0.03 voxel."""
+LEVEL_TOLERANCE = 0.03
+"""Change of the wall's level, in contrasts, that is worth a second surface; a smaller one just shifts the wall."""
+THIN_TOLERANCE = 0.004
+"""The same where no vessel is thick: there level, curvature and blur hang together."""
+SURFACE_ROUNDS = 3
+"""Surfaces at most beyond the first: only a vessel as thin as its blur, whose plateau is not seen, needs them."""
 FACES = np.array([(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1)], np.int64)
 
 
@@ -66,6 +70,12 @@ def connect(
     return order, float(len(order))
 
 
+def at_level(distance: Grid, change: float, contrast: float, blur_mm: float) -> tuple[Grid, Grid]:
+    """The distance and its mask for a wall's level changed by a little: the wall moves by change over steepness."""
+    moved = distance.values + np.float32(change * np.sqrt(2 * np.pi) * blur_mm / contrast)
+    return distance.with_values(moved), distance.with_values((moved < 0).astype(np.uint8))
+
+
 def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None) -> Lumen:
     """The vessel that holds the seeds.
 
@@ -83,14 +93,18 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
         got = f"connected voxels: got {len(order)}"
         raise _failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
-    distance, mask, counters = signed_distance(
+    distance, counters = signed_distance(
         grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
     )
-    again = deepest(grid, distance, levels, affinity.taps, counters["blur_mm"])
-    if abs(again.half - levels.half) > LEVEL_TOLERANCE * levels.contrast:
+    for _ in range(SURFACE_ROUNDS):
+        again = deepest(grid, distance, levels, affinity.taps, counters["blur_mm"])
+        thin = -float(distance.values.min()) < 4 * counters["blur_mm"]
+        if abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast:
+            break
         levels = again
-        distance, mask, counters = signed_distance(
+        distance, counters = signed_distance(
             grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
         )
+    distance, mask = at_level(distance, again.half - levels.half, levels.contrast, counters["blur_mm"])
     counters |= {"voxels_read": read, "voxels_total": float(np.prod(grid.shape)), "noise": levels.noise}
-    return Lumen(reorder(distance, axes), reorder(mask, axes), levels.half, (), counters)
+    return Lumen(reorder(distance, axes), reorder(mask, axes), again.half, (), counters)

@@ -53,10 +53,8 @@ class Affinity:
 
 
 def smoothing_taps(levels: Levels) -> NDArray[np.float32]:
-    """A binomial kernel: sigma 0.7 voxel where contrast is above 5 noises, 1.0 below; none without noise."""
+    """A binomial kernel: sigma 0.7 voxel where contrast is above 5 noises, 1.0 below."""
     ratio = levels.noise / levels.contrast
-    if ratio < 0.01:
-        return np.ones(1, np.float32)
     taps = [1.0, 2.0, 1.0] if ratio < 0.2 else [1.0, 4.0, 6.0, 4.0, 1.0]
     return np.asarray(np.array(taps) / sum(taps), np.float32)
 

@@ -23,11 +23,35 @@ def _half_radius(radius: float) -> float:
 
 
 @lru_cache(maxsize=1)
-def _table() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Curvature 1/r of the half-level surface and its offset R - r, both in units of the blur, ascending."""
+def _table() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of blurred cylinders of radius R in units of the blur: curvature 1/r of the half-level surface (ascending), its
+    offset R - r, and the slope there over that of a flat wall, 1 / sqrt(2 pi).
+    """
     radii = np.concatenate([np.geomspace(60.0, 2.0, 30), np.linspace(1.95, THINNEST, 30)])
     half = np.array([_half_radius(float(r)) for r in radii])
-    return np.concatenate([[0.0], 1.0 / half]), np.concatenate([[0.0], radii - half])
+    d = 1e-4
+    fall = ncx2.cdf(radii**2, 2, (half - d) ** 2) - ncx2.cdf(radii**2, 2, (half + d) ** 2)
+    slope = np.sqrt(2 * np.pi) * fall / (2 * d)
+    bulge, offset, slope = (
+        np.concatenate([[a], b]) for a, b in ((0.0, 1.0 / half), (0.0, radii - half), (1.0, slope))
+    )
+    return bulge, offset, slope
+
+
+def blur_of_wall(steepness: NDArray[np.float64], curvature: NDArray[np.float64], contrast: float) -> float:
+    """The blur (mm) that makes a wall of this curvature (n,), 1/mm, as steep as measured (n,), grey per mm.
+
+    A flat wall falls by contrast / (sigma sqrt(2 pi)) per mm, a thin vessel's by less: a fixed point in sigma. The
+    60th percentile of steepness stands for a wall that nothing else touches.
+    """
+    bulge, _, slope = _table()
+    typical = float(np.percentile(steepness, 60))
+    bend = max(0.0, float(np.median(curvature)))
+    flat = contrast / (np.sqrt(2 * np.pi) * typical)
+    sigma = flat
+    for _ in range(20):
+        sigma = 0.5 * (sigma + flat * float(np.interp(sigma * bend, bulge, slope)))
+    return float(sigma)
 
 
 def half_level_offset(curvature: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
@@ -37,6 +61,6 @@ def half_level_offset(curvature: NDArray[np.float64], sigma: float) -> NDArray[n
     sigma : the whole blur (scanner and smoothing), mm. Returns mm; negative where the surface is hollow.
     """
     scaled = sigma * np.asarray(curvature, float)
-    bulge, offset = _table()
+    bulge, offset, _ = _table()
     thin = np.interp(np.maximum(scaled, 0.0), bulge, offset)
     return np.asarray(sigma * np.where(scaled > 0, thin, 0.5 * scaled))

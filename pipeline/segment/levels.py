@@ -15,8 +15,6 @@ BOX_MM = 6.0
 """Half width of the box around a seed in which the levels are estimated: a carotid artery and what is around it."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
-SNAP_MM = 0.75
-"""Seeds come from a manifest that may be half a voxel off; the seed's grey is the median this far around."""
 MAD = 1.4826
 
 
@@ -57,6 +55,15 @@ def _two_levels(
     return inside, outside, region
 
 
+def _noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
+    """Spread of grey minus smoothed grey well inside the region, or well outside if that is too thin."""
+    core = ndimage.binary_erosion(region, iterations=2)
+    if core.sum() < 100:
+        core = ~ndimage.binary_dilation(region, iterations=4)
+    values = rough[core] if core.any() else rough.ravel()
+    return MAD * float(np.median(np.abs(values - np.median(values)))) / 0.935
+
+
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[Levels, NDArray[np.int64]]:
     """Levels around one seed voxel, and the brightest smoothed voxel beside it, where to start.
 
@@ -68,15 +75,15 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[Levels, NDArray[np.int64
     for axis in range(3):
         grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
     start = np.array([s.start for s in box])
-    near = box_around(grid, index, SNAP_MM, 1)
+    # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
+    near = box_around(grid, index, 0.0, 1)
     inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
     around = grey[inner]
     seed = float(np.median(around))
     best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
     inside, outside, region = _two_levels(grey, seed, at)
-    rough = (raw - grey)[region] if region.any() else (raw - grey).ravel()
-    noise = MAD * float(np.median(np.abs(rough - np.median(rough)))) / 0.935
+    noise = _noise(raw - grey, region)
     return Levels(inside, outside, noise), start + np.array(at)
 
 

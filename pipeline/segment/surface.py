@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline._kernels.wall import PAD, dilate, feet, mean_around, propagate, smooth_lattice, surface_voxels
 from pipeline.segment.affinity import Levels
-from pipeline.segment.blur import half_level_offset
+from pipeline.segment.blur import blur_of_wall, half_level_offset
 from solver.grid import Array, Grid
 
 LAYERS = 5
@@ -19,7 +19,6 @@ DEEP = 3
 """Mark of the last layer (mask = 1) that may be inside: connectedness is off by up to half a voxel, noise by one."""
 SPLINE_VARIANCE = 1.0 / 3.0
 """Variance in voxel^2 that reading a lattice as B-spline coefficients adds."""
-MAD = 1.4826
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +66,6 @@ def find_wall(
     return Wall(voxels, distance, foot, normal, curvature, steepness)
 
 
-def blur_mm(wall: Wall, levels: Levels) -> float:
-    """Blur of the wall (standard deviation, mm): an edge of that contrast falls by contrast / (sigma sqrt(2 pi)).
-
-    The 60th percentile of steepness stands for a wall that nothing else touches.
-    """
-    good = np.isfinite(wall.distance)
-    if not good.any():
-        return float("nan")
-    steep = float(np.percentile(wall.steepness[good], 60))
-    return float(levels.contrast / (np.sqrt(2 * np.pi) * steep))
-
-
 def corrected(wall: Wall, owner: NDArray[np.int32], sigma_mm: float, spacing: Array) -> tuple[Wall, Array]:
     """The wall moved out by the blur's offset, and the curvature averaged over the neighbourhood, 1/mm.
 
@@ -99,8 +86,8 @@ def signed_distance(
     taps: NDArray[np.float32],
     margin_mm: float,
     outer_mm: float,
-) -> tuple[Grid, Grid, dict[str, float]]:
-    """Signed distance (float32, mm, negative inside) and mask (uint8) on the vessel's box.
+) -> tuple[Grid, dict[str, float]]:
+    """Signed distance (float32, mm, negative inside) on the vessel's box.
 
     volume : C-contiguous.  order : flat indices of the connected voxels.  Outside, beyond ``outer_mm``, the distance
     stays at ``outer_mm``. Returns also counters: visits, surface voxels, blur_mm.
@@ -118,10 +105,10 @@ def signed_distance(
     spacing = np.asarray(volume.spacing_mm)
     wall = find_wall(lattice, levels.half, spacing, voxels, inside)
     del lattice
-    blur = blur_mm(wall, levels)
     owner = np.zeros(box.shape, np.int32)
     good = np.isfinite(wall.distance)
     owner.reshape(-1)[voxels[good]] = np.flatnonzero(good) + 1
+    blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
     wall, bend = corrected(wall, owner, blur, spacing)
     distance = np.full(box.shape, outer_mm, np.float32)
     distance.reshape(-1)[voxels[good]] = wall.distance[good]
@@ -131,7 +118,5 @@ def signed_distance(
     keep = tuple(slice(PAD, n - PAD) for n in box.shape)
     origin = volume.to_mm(box.corner)
     values = np.ascontiguousarray(distance[keep])
-    mask = (values < 0).astype(np.uint8)
     counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits), "blur_mm": blur}
-    grid = Grid(values, volume.spacing_mm, origin, volume.direction)
-    return grid, grid.with_values(mask), counters
+    return Grid(values, volume.spacing_mm, origin, volume.direction), counters

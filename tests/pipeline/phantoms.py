@@ -1,4 +1,4 @@
-"""Small analytic phantoms for segment and trace: tubes along curves, wires in them, blur and noise. numpy and scipy only."""
+"""Small analytic phantoms for segment and trace: tubes along curves, wires in them, blur and noise."""
 
 from __future__ import annotations
 

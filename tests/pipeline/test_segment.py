@@ -1,0 +1,76 @@
+"""segment: the wall of analytic tubes, what is not visited, and what is refused."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from pipeline.model import Volume
+from pipeline.segment import segment
+from pipeline.status import FrameStatus, StageError
+from tests.pipeline import phantoms
+
+VOXEL = 0.3
+
+
+@lru_cache(maxsize=4)
+def tube(radius: float):
+    """A curved tube: curve, grid origin, distance to the axis, and grey values before blur."""
+    curve = phantoms.helix(8.0, 14.0, 0.7)
+    origin = curve.min(axis=0) - radius - 3.0
+    shape = tuple(np.ceil((curve.max(axis=0) + radius + 3.0 - origin) / VOXEL).astype(int))
+    distance = phantoms.distance_to(curve, shape, VOXEL, origin, radius + 3.0)
+    clean = phantoms.BACKGROUND + 900.0 * phantoms.partial_volume(distance - radius, VOXEL)
+    return curve, origin, clean
+
+
+def wall_error(lumen, curve, radius, within=0.45):
+    """Error (voxels) of the signed distance at nodes near the wall, away from the tube's ends."""
+    index = np.argwhere(np.abs(lumen.distance.values) < within)
+    distance, foot = cKDTree(phantoms.resample(curve, 0.01)).query(lumen.distance.to_mm(index))
+    middle = (foot > 300) & (foot < foot.max() - 300)
+    return (lumen.distance.values[tuple(index.T)] - (distance - radius))[middle] / VOXEL
+
+
+@pytest.mark.parametrize("radius", [0.6, 2.0])
+@pytest.mark.parametrize(("noise", "bar"), [(0.0, 0.05), (90.0, 0.1)])
+def test_wall_of_a_blurred_tube_is_where_it_was_drawn(radius, noise, bar):
+    curve, origin, clean = tube(radius)
+    grey = phantoms.scan(clean, 0.8, noise, seed=1)
+    lumen = segment(Volume(np.asfortranarray(grey), [VOXEL] * 3, origin), curve[[200]])
+    error = wall_error(lumen, curve, radius)
+    assert len(error) > 3000
+    assert np.sqrt(np.mean(error**2)) < bar
+
+
+def test_memory_order_and_pose_do_not_change_the_lumen():
+    curve, origin, clean = tube(2.0)
+    grey = phantoms.scan(clean, 0.8, 50.0, seed=2)
+    turn = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+    plain = segment(Volume(np.ascontiguousarray(grey), [VOXEL] * 3, origin), curve[[200]])
+    fortran = segment(Volume(np.asfortranarray(grey), [VOXEL] * 3, origin), curve[[200]])
+    turned = segment(Volume(grey, [VOXEL] * 3, turn @ origin, turn), curve[[200]] @ turn.T)
+    assert plain.distance.shape == fortran.distance.shape
+    near = np.abs(plain.distance.values) < 0.6
+    np.testing.assert_allclose(plain.distance.values[near], fortran.distance.values[near], atol=2e-3)
+    np.testing.assert_allclose(plain.distance.values, turned.distance.values, atol=1e-6)
+    np.testing.assert_allclose(turned.distance.origin_mm, turn @ plain.distance.origin_mm, atol=1e-9)
+
+
+def test_background_is_not_visited():
+    curve, origin, clean = tube(0.75)
+    grey = phantoms.scan(clean, 0.8, 50.0, seed=3)
+    lumen = segment(Volume(grey, [VOXEL] * 3, origin), curve[[200]])
+    assert lumen.counters["voxels_read"] < 0.1 * lumen.counters["voxels_total"]
+
+
+def test_a_seed_in_the_background_or_outside_is_refused_by_name():
+    curve, origin, clean = tube(0.75)
+    volume = Volume(phantoms.scan(clean, 0.8, 90.0, seed=4), [VOXEL] * 3, origin)
+    for seed in (origin + 1.0, origin - 50.0):
+        with pytest.raises(StageError, match="expected") as error:
+            segment(volume, seed[None])
+        assert error.value.status is FrameStatus.SEGMENT_FAILED
