@@ -143,7 +143,7 @@ def feet(
 
     foot, normal : (n, 3), mm and outward unit.  curvature : (n,) sum of principal curvatures, 1/mm, positive for
     a vessel.  steepness : (n,) fall of grey per mm along the normal. Returns distances (n,), mm, negative inside;
-    NaN where no closest point was found within two voxels.
+    NaN where no closest point was found within two voxels (0.1 voxel off after the last step, say).
     """
     _, nj, nk = lattice.shape
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
@@ -176,6 +176,9 @@ def feet(
             distance[n] = np.nan
             continue
         f, gx, gy, gz = value_gradient(lattice, px / hx, py / hy, pz / hz)
+        if abs(f - level) > 0.1 * (abs(gx) + abs(gy) + abs(gz)):
+            distance[n] = np.nan
+            continue
         xx, yy, zz, xy, xz, yz = hessian(lattice, px / hx, py / hy, pz / hz)
         gx, gy, gz = gx / hx, gy / hy, gz / hz
         xx, yy, zz = xx / (hx * hx), yy / (hy * hy), zz / (hz * hz)

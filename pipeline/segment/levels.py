@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.stats import ncx2
 
 from pipeline.segment.affinity import Levels
 from solver.grid import Grid
@@ -16,6 +17,8 @@ BOX_MM = 6.0
 LEAST_BOX = 8
 """Its least half width in voxels."""
 MAD = 1.4826
+THICK = 5.0
+"""Depth over blur from which grey in the middle is the plateau."""
 
 
 def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
@@ -91,14 +94,18 @@ def plateau(distance_mm: NDArray[Any], grey: NDArray[Any], levels: Levels, blur_
     """The levels again, from the deepest part of the whole vessel.
 
     distance_mm, grey : (n,) of the voxels inside.  blur_mm : the scanner's.  A tube no thicker than its blur never
-    reaches its plateau: the axis of a blurred cylinder of radius R has 1 - exp(-R^2 / 2 blur^2) of its contrast.
+    reaches its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2).
     """
-    depth = float(np.percentile(-distance_mm, 98))
-    core = -distance_mm > 0.7 * depth
-    peak = _median(grey[core], levels.inside)
-    share = 1.0 - float(np.exp(-0.5 * (depth / blur_mm) ** 2))
-    inside = levels.outside + (peak - levels.outside) / max(share, 0.5)
-    return Levels(inside, levels.outside, levels.noise)
+    depth = float(np.percentile(-distance_mm, 99))
+    core = np.flatnonzero(-distance_mm > 0.7 * depth)
+    if depth > THICK * blur_mm:
+        return Levels(_median(grey[core], levels.inside), levels.outside, levels.noise)
+    core = core[:: max(1, len(core) // 500)]
+    radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
+    off_axis = np.maximum(radius + distance_mm[core], 0.0)
+    share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
+    peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
+    return Levels(levels.outside + peak, levels.outside, levels.noise)
 
 
 def deepest(grid: Grid, distance: Grid, levels: Levels, taps: NDArray[Any], blur_mm: float) -> Levels:

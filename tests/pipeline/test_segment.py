@@ -68,7 +68,7 @@ def test_background_is_not_visited():
 
 
 def test_a_seed_in_the_background_or_outside_is_refused_by_name():
-    curve, origin, clean = tube(0.75)
+    _, origin, clean = tube(0.75)
     volume = Volume(phantoms.scan(clean, 0.8, 90.0, seed=4), [VOXEL] * 3, origin)
     for seed in (origin + 1.0, origin - 50.0):
         with pytest.raises(StageError, match="expected") as error:
