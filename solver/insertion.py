@@ -201,7 +201,7 @@ class Insertion:
     def _curve(self, ahead: float) -> Array:
         """The polyline that the wire is laid along before it relaxes."""
         b = self.buffers
-        joints = b.state.x[0, : b.k + 1].copy()
+        joints: Array = b.state.x[0, : b.k + 1].copy()
         if b.k == 0:
             return np.array([self.entry, self.entry + self.direction])
         if self.initial == "translate":

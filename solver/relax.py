@@ -145,7 +145,7 @@ def push_force(b: Buffers) -> float:
     force -= 0.5 * c.bend[0] * float(u[0, :2] @ u[0, :2]) / b.first_mm
     if b.k > 1:
         force -= 0.5 * c.bend[1] * float(u[1, :2] @ u[1, :2]) / (b.first_mm + c.length[1])
-    return force
+    return float(force)
 
 
 def work_of(counter: NDArray[np.int64]) -> Mapping[str, float]:

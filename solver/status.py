@@ -14,7 +14,9 @@ class Status(Enum):
         "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
     )
-    CROSSED_WALL = "the wire would have to pass through the wall; look for a lumen that is closed or narrower than the wire"
+    CROSSED_WALL = (
+        "the way on leads through the wall; look for a lumen that is closed or narrower than the wire"
+    )
     FOLDED = (
         "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     )

@@ -80,10 +80,8 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
     d0, d1, d2 = x[j + 1, 0] - x[j, 0], x[j + 1, 1] - x[j, 1], x[j + 1, 2] - x[j, 2]
     size = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     frame = load9(r[j])
-    if size > 0.0:
-        t = apply_transposed(frame, (d0 / size, d1 / size, d2 / size))
-    else:
-        t = (0.0, 0.0, 1.0)
+    # a joint on top of the one before has no direction: it keeps the one before
+    t = apply_transposed(frame, (d0 / size, d1 / size, d2 / size)) if size > 0.0 else (0.0, 0.0, 1.0)
     u0, u1 = bend_towards(chain.rest[j], t[0], t[1], t[2])
     u[j, 0], u[j, 1], u[j, 2] = u0, u1, 0.0
     frame = times(frame, turn(chain.rest[j], u0, u1, 0.0))

@@ -90,7 +90,7 @@ def crossed(field: Field, state: State, which: int, k: int, spacing: float, scra
 @kernel
 def blocked(field: Field, a: Any, b: Any, way: float, spacing: float, scratch: Scratch) -> float:
     """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
-    steps = int(math.ceil(2 * way / spacing))
+    steps = math.ceil(2 * way / spacing)
     last = distance_at(field, b, 0.0, b, scratch)
     limit = max(distance_at(field, a, 0.0, b, scratch), last, 0.0) + HOP * spacing
     for i in range(1, steps):

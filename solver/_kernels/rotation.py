@@ -10,7 +10,7 @@ import math
 
 from solver._kernels.flags import kernel
 
-Triple = tuple[float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 # Below this q a seven-term series is exact to 1e-17 and costs 5 ns; above it sin and cos cost 20 ns.
 SERIES_LIMIT = 0.25
@@ -43,7 +43,7 @@ def jacobian_terms(q: float, s: float, a: float) -> tuple[float, float, float]:
 
 
 @kernel
-def turn(rest: float, u0: float, u1: float, u2: float) -> tuple[float, ...]:
+def turn(rest: float, u0: float, u1: float, u2: float) -> Nine:
     """Return E = B exp(û), row by row: the rest bend about material axis 2, then the control u (rad)."""
     q = u0 * u0 + u1 * u1 + u2 * u2
     s, a = sine_terms(q)
