@@ -306,22 +306,22 @@ def _compare_frames(run: CaseRun) -> None:
                 frame.truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
 
 
-def _static_nulls(run: CaseRun, traced: list[Frame]) -> nulls.Nulls:
+def _static_nulls(run: CaseRun, traced: list[Frame]) -> nulls.Nulls | None:
     if not traced:
-        return nulls.Nulls()
+        return None
     assert run.lumen is not None
     deepest = max(traced, key=lambda f: f.curve.length_mm if f.curve else 0.0)
     assert deepest.curve is not None
-    target = deepest.curve.points_mm[-1]
-    return nulls.build(run.lumen, np.array(run.case.entry_mm), target, run.case.wire.radius_mm)
+    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
+    return nulls.build(run.lumen, entry, direction, deepest.curve.points_mm, run.case.wire.radius_mm)
 
 
-def _score_nulls(run: CaseRun, frame: Frame, static: nulls.Nulls, previous: Any) -> None:
+def _score_nulls(run: CaseRun, frame: Frame, static: nulls.Nulls | None, previous: Any) -> None:
     assert frame.curve is not None
-    guesses = {
-        name: static.at_depth(name, frame.depth_mm) for name in ("centreline", "shortest", "min_bending")
-    }
-    guesses["previous"] = previous
+    guesses = {"previous": previous}
+    if static is not None:
+        guesses |= {name: static.at_depth(name, frame.depth_mm) for name in ("centreline", "shortest")}
+        guesses["min_bending"] = static.min_bending(frame.depth_mm)
     step = run.config.compare.sample_mm
     for name, guess in guesses.items():
         if guess is not None:

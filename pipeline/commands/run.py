@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from reports.html import render_index
 
 from pipeline import sweep
 from pipeline.aggregate import Totals, aggregate, found_results
@@ -28,6 +27,7 @@ from pipeline.run_case import Job, finished, job_key
 from pipeline.settings import Resolved, Setting, SettingsError, parse_assignment, read_settings, to_toml
 from pipeline.suggest import did_you_mean
 from reports.atomic import write_text
+from reports.html import render_index
 
 
 class UsageError(Exception):
@@ -62,8 +62,8 @@ def _run(
     points: list[sweep.Point],
     assumptions: tuple[str, ...],
 ) -> int:
-    info = collect() | {"manifest": str(manifest.path), "manifest_sha256": file_hash(manifest.path)}
-    info |= {"assumptions": assumptions, "config": settings.as_dict()}
+    info = {"manifest": str(manifest.path), "manifest_sha256": file_hash(manifest.path)}
+    info |= {"provenance": collect(), "assumptions": assumptions, "config": settings.as_dict()}
     write_text(args.out / "config.resolved.toml", to_toml(settings))
     name = "run.json" if not args.shard else f"run.{args.shard.replace('/', '-')}.json"
     write_text(args.out / name, json.dumps({"manifest_sha256": info["manifest_sha256"], "cases": []}))
