@@ -46,7 +46,6 @@ _CASE_COLUMNS = (
     "null_centreline_rms_mm",
     "skill",
     "truth_rms_mm",
-    "simulate_s",
     "total_s",
 )
 # shown as value (low to high)
@@ -108,16 +107,16 @@ def _grid(table: pd.DataFrame, columns: Sequence[Column], chosen: Sequence[str])
     heads = [{"name": c.name, "meaning": _meaning(c), "text": c.kind == "text"} for c in kept]
     rows = []
     for record in table.to_dict("records"):
-        cells = [{"value": _cell(record, c.name), "text": c.kind == "text", "link": ""} for c in kept]
+        cells = [_cell(record, c) for c in kept]
         rows.append({"cells": cells, "bad": False})
     return {"columns": heads, "rows": rows}
 
 
-def _cell(record: Mapping[Any, Any], name: str) -> str:
-    value = number(record[name])
-    ends = _INTERVALS.get(name)
-    detail = interval(record.get(ends[0]), record.get(ends[1])) if ends else ""
-    return f"{value} ({detail})" if detail else value.replace(NOTHING, "")
+def _cell(record: Mapping[Any, Any], column: Column) -> dict[str, Any]:
+    value = number(record[column.name]).replace(NOTHING, "")
+    low, high = _INTERVALS.get(column.name, ("", ""))
+    detail = interval(record.get(low), record.get(high))
+    return {"value": value, "detail": detail, "text": column.kind == "text", "link": ""}
 
 
 def _meaning(column: Column) -> str:

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import jinja2
 import pandas as pd
 
 from reports import _grids, tables
 from reports._format import flatten, settings, size
-from reports.atomic import write_text
+from reports._pages import write_page
 from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles
 from reports.scene3d import write_scene
@@ -56,7 +55,7 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "files": _files(case_dir),
         "version": _version(result),
     }
-    return _write("case.html.j2", page, case_dir / "report.html")
+    return write_page("case.html.j2", page, case_dir / "report.html")
 
 
 def render_index(out_dir: Path, embed: bool = False) -> Path:
@@ -81,16 +80,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         ],
         "version": next((v for v in map(_version, runs.values()) if v), ""),
     }
-    return _write("index.html.j2", page, out_dir / "index.html")
-
-
-def _write(template: str, page: dict[str, Any], path: Path) -> Path:
-    loader = jinja2.FileSystemLoader(Path(__file__).parent / "templates")
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
-    write_text(path, environment.get_template(template).render(page))
-    return path
+    return write_page("index.html.j2", page, out_dir / "index.html")
 
 
 def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:

@@ -122,8 +122,8 @@ def _layout(groups: Sequence[tuple[int, int]], n_fixed: int) -> dict[str, Any]:
     ]
     slider = {"active": len(steps) - 1, "steps": steps, "currentvalue": {"prefix": "frame "}}
     axes = {f"{axis}axis": {"title": {"text": f"{axis} (LPS), mm"}} for axis in "xyz"}
-    layout = {"scene": {"aspectmode": "data", **axes}, "sliders": [slider] if steps else [], "height": 760}
-    return layout | {"margin": {"l": 0, "r": 0, "t": 20, "b": 0}}
+    layout = {"scene": {"aspectmode": "data", **axes}, "sliders": [slider] if steps else [], "height": 720}
+    return layout | {"margin": {"l": 0, "r": 0, "t": 20, "b": 50}}
 
 
 def _script_folder(case_dir: Path) -> Path:

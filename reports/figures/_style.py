@@ -26,7 +26,7 @@ BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
 SIMULATED, TRACED, TRUTH = BLUE, ORANGE, GREEN
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {
-    "load": GREY,
+    "load": "#BFBFBF",
     "segment": GREEN,
     "trace": ORANGE,
     "simulate": BLUE,

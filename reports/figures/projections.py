@@ -124,4 +124,5 @@ def _tidy(frame: Frame) -> pd.DataFrame:
         pd.DataFrame(points, columns=columns[2:]).assign(frame=frame.frame, curve=label)[columns]
         for label, points in _curves(frame)
     ]
-    return pd.concat(parts) if parts else pd.DataFrame(columns=columns)
+    nothing = pd.DataFrame([[frame.frame, "none"]], columns=columns[:2])
+    return pd.concat(parts or [nothing])

@@ -14,7 +14,7 @@ def run_time(case: CaseFiles) -> Drawing | None:
     """Stacked seconds per frame, and the totals of the case."""
     stages = [s for s in STAGE_COLOURS if has(case.errors, f"{s}_s")]
     totals = {s: case.result.get("seconds", {}).get(s) for s in STAGE_COLOURS}
-    known = {s: float(v) for s, v in totals.items() if v is not None and np.isfinite(v)}
+    known = {s: float(v) for s, v in totals.items() if v is not None and np.isfinite(v) and v > 0}
     if not stages and not known:
         return None
     figure = new_figure(3.6)

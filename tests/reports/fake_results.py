@@ -144,7 +144,8 @@ def _statistics(case: FakeCase, rows: list[dict[str, Any]]) -> dict[str, Any]:
         return {**counts, **totals, **forces}
 
     def pooled(name: str) -> float:
-        return float(np.sqrt(np.nanmean([float(r[name] or np.nan) ** 2 for r in ok])))
+        values = [r[name] for r in ok if r[name] is not None]
+        return float(np.sqrt(np.mean(np.square(values)))) if values else np.nan
 
     rms = pooled("rms_mm")
     tips = float(np.median([r["tip_mm"] for r in ok]))
@@ -195,7 +196,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "sentence": "two frames have no result" if case.failed else "every frame is ok",
         "frames": [_frame_status(case, row) for row in rows],
         "counts": {"ok": statistics["frames_ok"], "failed": statistics["frames_failed"]},
-        "statistics": {k: v for k, v in statistics.items() if v is not None},
+        "statistics": {k: v for k, v in statistics.items() if v is not None and v == v},
         "seconds": {s: statistics[f"{s}_s"] for s in STAGES} | {"report": 3.0},
         "assumptions": ["voxel spacing taken as 0.5 mm: the file gives none"] if case.simulated_only else [],
         "warnings": ["roll is unknown and was taken as 0"] if case.failed else [],

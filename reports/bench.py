@@ -1,0 +1,125 @@
+"""The page of a benchmark: run time against error, the settings to use, and the outcomes of a stress study.
+
+Reads two tidy CSV files; what they hold in excess of the named columns is kept in the tables of the page.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports._format import number
+from reports._pages import write_page
+from reports.figures.benchmark import BenchFiles, convergence, pareto, stress_outcomes
+from reports.schema import Column
+from reports.sections import draw_sections
+from reports.tables import empty_table, read_table, write_table
+
+BENCH_COLUMNS: tuple[Column, ...] = (
+    Column("scene", "-", "name of the scene", "text"),
+    Column("method", "-", "the solver's method, or another simulator", "text"),
+    Column("segment_mm", "mm", "length of the wire's segments"),
+    Column("hull", "-", "how the wire's thickness meets the wall", "text"),
+    Column("tolerance", "1", "stopping tolerance", "float"),
+    Column("ms_per_mm", "ms/mm", "milliseconds per millimetre inserted", "float", "low"),
+    Column("tip_error_mm", "mm", "distance of the tip from the converged reference's", "float", "low"),
+    Column("shape_error_mm", "mm", "root mean square distance from the converged reference", "float", "low"),
+    Column("iterations", "1", "iterations per millimetre or per step, as the benchmark says", "float", "low"),
+)
+STRESS_COLUMNS: tuple[Column, ...] = (
+    Column("axis", "-", "what is extreme in the scene", "text"),
+    Column("outcome", "-", "converged, or the status", "text"),
+    Column("count", "1", "number of scenes; 1 where each has its own row", "integer"),
+)
+BENCH_FIGURES = {"pareto": pareto, "convergence": convergence, "stress_outcomes": stress_outcomes}
+TARGETS_MM = (0.1, 0.01)
+
+
+def render_bench(
+    bench_csv: Path, out_dir: Path, stress_csv: Path | None = None, note: str = "", embed: bool = False
+) -> Path:
+    """Draw the figures and write bench.html into ``out_dir``; returns its path.
+
+    note : what the reader must know of machine and reference. Also writes recommended.csv: the fastest setting of
+    each scene whose shape error is at most 0.1 mm and 0.01 mm.
+    """
+    bench = read_bench(bench_csv, stress_csv)
+    best = recommended(bench.rows)
+    write_table(out_dir / "recommended.csv", best)
+    counts = bench.stress.groupby(["axis", "outcome"], sort=False)["count"].sum().reset_index()
+    page = {
+        "title": "wireval benchmark",
+        "note": note,
+        "sections": draw_sections("bench", BENCH_FIGURES, bench, out_dir, embed),
+        "recommended": _grid(best) if len(best) else None,
+        "rows": _grid(bench.rows.drop(columns="on_front")),
+        "stress": _grid(_crosstab(counts)) if len(counts) else None,
+        "source": bench_csv.name,
+    }
+    return write_page("bench.html.j2", page, out_dir / "bench.html")
+
+
+def read_bench(bench_csv: Path, stress_csv: Path | None = None) -> BenchFiles:
+    """Read the rows of a benchmark, marking the Pareto front of each scene, and the stress outcomes if any."""
+    rows = read_table(bench_csv, BENCH_COLUMNS)
+    rows["on_front"] = False
+    for _, mine in rows.groupby("scene", sort=False):
+        rows.loc[mine.index, "on_front"] = pareto_front(
+            mine["shape_error_mm"].to_numpy(), mine["ms_per_mm"].to_numpy()
+        )
+    stress = read_table(stress_csv, STRESS_COLUMNS) if stress_csv else empty_table(STRESS_COLUMNS)
+    stress["count"] = stress["count"].fillna(1).astype(int)
+    return BenchFiles(rows, stress)
+
+
+def pareto_front(
+    error: np.ndarray[Any, Any], cost: np.ndarray[Any, Any]
+) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Mark the points (n,) that no other point beats in error and cost; NaN is never on the front."""
+    front = np.zeros(len(error), dtype=bool)
+    cheapest = np.inf
+    for i in np.lexsort((cost, error)):
+        if np.isfinite(error[i]) and cost[i] < cheapest:
+            front[i] = True
+            cheapest = cost[i]
+    return front
+
+
+def recommended(rows: pd.DataFrame) -> pd.DataFrame:
+    """The fastest row of each scene within each target error, the row itself unchanged; none where none is."""
+    found = []
+    for target in TARGETS_MM:
+        within = rows[(rows["shape_error_mm"] <= target) & rows["ms_per_mm"].notna()]
+        if len(within):
+            fastest = rows.loc[within.groupby("scene", sort=False)["ms_per_mm"].idxmin()]
+            found.append(fastest.drop(columns="on_front", errors="ignore").assign(target_mm=target))
+    if not found:
+        return pd.DataFrame(columns=["target_mm", *rows.columns])
+    table = pd.concat(found, ignore_index=True)
+    return table[["target_mm", *[c for c in table.columns if c != "target_mm"]]]
+
+
+def _crosstab(counts: pd.DataFrame) -> pd.DataFrame:
+    """One row per axis, one column per outcome, and the sum."""
+    table = counts.pivot_table(index="axis", columns="outcome", values="count", fill_value=0, sort=False)
+    table = table.astype(int)
+    table["all"] = table.sum(axis=1)
+    return table.reset_index()
+
+
+def _grid(table: pd.DataFrame) -> dict[str, Any]:
+    meanings = {c.name: c.meaning for c in (*BENCH_COLUMNS, *STRESS_COLUMNS)}
+    kept = [str(c) for c in table.columns if table[c].notna().any()]
+    text = {c: not pd.api.types.is_numeric_dtype(table[c]) for c in kept}
+    heads = [{"name": c, "meaning": meanings.get(c, ""), "text": text[c]} for c in kept]
+    rows = [
+        {
+            "cells": [{"value": number(r[c]), "text": text[c], "link": "", "detail": ""} for c in kept],
+            "bad": False,
+        }
+        for r in table.to_dict("records")
+    ]
+    return {"columns": heads, "rows": rows}

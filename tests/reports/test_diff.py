@@ -1,0 +1,122 @@
+"""The gate: closes for what became worse, for what went missing, and for nothing else."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reports import diff, tables
+from reports.schema import ERRORS_COLUMNS
+from tests.reports.fake_results import FakeCase, write_run
+
+TOLERANCE = {"rms_mm": 0.1, "skill": 0.05, "branch_ok": 0.0, "insertion_mm": 0.2}
+
+
+def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
+    return tables._conform(pd.DataFrame(rows), ERRORS_COLUMNS)
+
+
+def _row(**changes: object) -> dict[str, object]:
+    row = {"frame": 0, "status": "ok", "rms_mm": 0.5, "skill": 0.8, "branch_ok": True, "insertion_mm": 30.0}
+    return {**row, **changes}
+
+
+@pytest.mark.parametrize(
+    ("change", "column", "verdict"),
+    [
+        ({}, "rms_mm", "same"),
+        ({"rms_mm": 0.6}, "rms_mm", "within"),
+        ({"rms_mm": 0.61}, "rms_mm", "regression"),
+        ({"rms_mm": 0.1}, "rms_mm", "better"),
+        ({"skill": 0.74}, "skill", "regression"),
+        ({"skill": 0.99}, "skill", "better"),
+        ({"branch_ok": False}, "branch_ok", "regression"),
+        ({"insertion_mm": 29.7}, "insertion_mm", "regression"),
+        ({"insertion_mm": 30.1}, "insertion_mm", "within"),
+        ({"rms_mm": None}, "rms_mm", "regression"),
+        ({"status": "no_wire"}, "status", "regression"),
+    ],
+)
+def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
+    found = diff.diff_tables({"c": _table([_row()])}, {"c": _table([_row(**change)])}, TOLERANCE)
+    rows = found.rows.set_index("column")
+    assert rows.loc[column, "verdict"] == verdict
+    others = rows.drop(index=column)
+    assert set(others["verdict"]) == {"same"}
+    assert len(found.regressions) == (verdict == "regression")
+
+
+def test_a_recovered_frame_is_no_regression() -> None:
+    before = _table([{"frame": 0, "status": "no_wire"}])
+    found = diff.diff_tables({"c": before}, {"c": _table([_row()])}, TOLERANCE)
+    assert found.regressions.empty
+    assert found.rows.set_index("column").loc["status", "verdict"] == "better"
+
+
+def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None:
+    two = _table([_row(), _row(frame=1)])
+    one = _table([_row()])
+    found = diff.diff_tables({"a": two, "b": one}, {"a": one, "c": one}, TOLERANCE)
+    bad = found.regressions[["case", "column", "after"]].to_numpy().tolist()
+    assert bad == [["a", "frame", "missing"], ["b", "case", "missing"]]
+    assert found.rows[found.rows["verdict"] == "new"]["case"].tolist() == ["c"]
+    assert "2 regressions" in found.sentence
+
+
+@given(st.floats(0.01, 10), st.floats(0.01, 10), st.floats(0, 1))
+def test_a_change_one_way_is_undone_the_other_way(before: float, after: float, allowed: float) -> None:
+    pair = ({"c": _table([_row(rms_mm=before)])}, {"c": _table([_row(rms_mm=after)])})
+    there = diff.diff_tables(*pair, {"rms_mm": allowed})
+    back = diff.diff_tables(pair[1], pair[0], {"rms_mm": allowed})
+    assert not (len(there.regressions) and len(back.regressions)), "at most one direction is worse"
+    assert bool(len(there.regressions)) == (after - before > allowed * (1 + 1e-9))
+    assert there.rows["change"].sum() == -back.rows["change"].sum()
+
+
+def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "a", (FakeCase("c", frames=5, failed=(1,)), FakeCase("d", frames=3)))
+    tolerance = diff.load_tolerance()
+    same = diff.diff_folders(out, out, tolerance)
+    assert same.regressions.empty
+    assert same.sentence == "2 cases compared: no regression"
+    worse = tmp_path / "b"
+    shutil.copytree(out, worse)
+    path = worse / "cases" / "d" / "errors.csv"
+    errors = tables.read_errors(path)
+    errors.loc[2, "tip_mm"] += 1.0
+    tables.write_table(path, errors, ERRORS_COLUMNS)
+    found = diff.diff_folders(out, worse, tolerance)
+    assert found.regressions[["case", "frame", "column"]].to_numpy().tolist() == [["d", 2, "tip_mm"]]
+    assert "case d frame 2, tip_mm" in found.sentence
+    tip = found.by_column.set_index("column").loc["tip_mm"]
+    assert tip["worst"] == pytest.approx(1.0)
+    assert tip["regressions"] == 1
+    (path).unlink()
+    assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, (
+        "every frame of the case is missing"
+    )
+
+
+def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="wireval run"):
+        diff.diff_folders(tmp_path, tmp_path, TOLERANCE)
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("rmse_mm = 1", "did you mean"), ("rms_mm = -1", "from 0 up"), ("rms_mm = 'x'", "from 0 up")],
+)
+def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> None:
+    path = tmp_path / "t.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=hint):
+        diff.load_tolerance(path)
+
+
+def test_the_shipped_tolerance_gates_shape_tip_and_skill() -> None:
+    assert {"rms_mm", "tip_mm", "skill", "truth_rms_mm"} <= set(diff.load_tolerance())

@@ -1,0 +1,208 @@
+"""What the figures show is what the files hold: places, geometry, nothing where there is nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from reports import tables
+from reports.case_files import CaseFiles, read_case
+from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _planes
+from reports.figures._style import NULLS, STAGE_COLOURS, positive_axis
+from reports.frames_file import Frame, Scan, frame_numbers, read_frame, read_scan, write_frames
+from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS, SUMMARY_COLUMNS, SWEEP_COLUMNS
+from tests.reports.fake_results import FakeCase, write_run
+
+# no permutation, so that swapped or transposed axes cannot hide
+TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+
+
+def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
+    fields = {
+        "folder": folder,
+        "result": {},
+        "errors": tables.empty_table(ERRORS_COLUMNS),
+        "points": tables.empty_table(POINTS_COLUMNS),
+        "scan": None,
+        "frames": (),
+    }
+    return CaseFiles(**{**fields, **changes})
+
+
+@pytest.mark.parametrize("name", CASE_FIGURES)
+def test_no_data_is_no_figure(name: str, tmp_path: Path) -> None:
+    assert CASE_FIGURES[name](_empty_case(tmp_path)) is None
+    rows = {"frame": [0, 1], "status": ["no_wire", "load_failed"]}
+    tables.write_table(tmp_path / "errors.csv", pd.DataFrame(rows), ERRORS_COLUMNS)
+    failed = _empty_case(tmp_path, errors=tables.read_errors(tmp_path / "errors.csv"))
+    assert CASE_FIGURES[name](failed) is None
+
+
+@pytest.mark.parametrize("name", RUN_FIGURES)
+def test_an_empty_run_has_no_figure(name: str) -> None:
+    run = RunFiles({}, tables.empty_table(SUMMARY_COLUMNS), tables.empty_table(SWEEP_COLUMNS))
+    assert RUN_FIGURES[name](run) is None
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
+    case = read_case(out / "cases" / "c")
+    drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
+    assert set(CASE_FIGURES) - set(drawn) == {"failed_projections", "simulated_wires"}
+    run = RunFiles(
+        {"c": case.errors}, tables.read_summary(out / "summary.csv"), tables.empty_table(SWEEP_COLUMNS)
+    )
+    assert RUN_FIGURES["case_frame_map"](run) is not None
+
+
+def _heat_case(tmp_path: Path) -> CaseFiles:
+    arcs = [np.arange(0, 4.01, 0.5), np.append(np.arange(0, 6.0, 0.5), 6.2)]
+    columns = {
+        "frame": np.concatenate([np.full(len(a), 2 * i) for i, a in enumerate(arcs)]),
+        "arc_mm": np.concatenate(arcs),
+        "error_mm": np.concatenate([a / 10 for a in arcs]),
+    }
+    tables.write_points(tmp_path / "points.csv.gz", columns)
+    return _empty_case(tmp_path, points=tables.read_points(tmp_path / "points.csv.gz"))
+
+
+def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
+    drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
+    assert drawing is not None
+    shown = drawing.table
+    np.testing.assert_allclose(shown["error_mm"], shown["arc_mm"] / 10, atol=0.5 / 10 / 2 + 1e-9)
+    assert shown["frame"].unique().tolist() == [0, 2], "the frame without points stays empty"
+    reach = shown.groupby("frame")["arc_mm"].max()
+    assert reach[0] == 4.0
+    assert abs(reach[2] - 6.2) <= 0.25 + 1e-9, "the last sample is shown although it is off the lattice"
+    mesh = drawing.figure.axes[0].collections[0]
+    grid = np.ma.filled(np.ma.masked_invalid(mesh.get_array()), -1.0)
+    assert grid.shape[0] == 3
+    assert np.all(grid[1] == -1.0)
+
+
+@pytest.mark.parametrize("direction", [np.eye(3), TURN], ids=["aligned", "oblique"])
+def test_curves_fall_on_the_voxels_they_run_through(direction: np.ndarray) -> None:
+    scan = Scan(np.array([0.5, 0.8, 1.1]), np.array([10.0, -20.0, 5.0]), direction, (12, 9, 7))
+    index = np.array([[3, 4, 5], [11, 8, 6], [0, 0, 0]])
+    points = scan.origin_mm + (index * scan.spacing_mm) @ direction.T
+    view = _planes.whole(scan)
+    place = view.coordinates(points)
+    for axis, (across, up) in _planes.PLANES:
+        picture = np.zeros(scan.shape, np.uint8)
+        picture[tuple(index.T)] = 1
+        projected = picture.max(axis=axis)
+        left, right, bottom, top = view.extent(across, up)
+        columns = (place[:, across] - left) / (right - left) * projected.shape[0]
+        rows = (place[:, up] - bottom) / (top - bottom) * projected.shape[1]
+        found = projected[np.floor(columns).astype(int), np.floor(rows).astype(int)]
+        assert found.tolist() == [1, 1, 1]
+        np.testing.assert_allclose(columns % 1, 0.5, atol=1e-9)
+    assert view.aligned == bool(np.array_equal(direction, np.eye(3)))
+    assert ("LPS" in view.label(0)) or ("left" in view.label(0)) == view.aligned
+
+
+def test_views_follow_the_curves_and_stay_in_the_crop() -> None:
+    scan = Scan(np.ones(3), np.zeros(3), np.eye(3), (50, 50, 50))
+    curve = np.array([[10.0, 20.0, 1.0], [12.0, 20.0, 30.0]])
+    view = _planes.around(scan, [curve])
+    np.testing.assert_allclose(view.low, [5.0, 15.0, -0.5])
+    np.testing.assert_allclose(view.high, [17.0, 25.0, 35.0])
+    for nothing in ([], [curve + 500.0]):
+        outside = _planes.around(scan, nothing)
+        np.testing.assert_allclose(outside.size, 50.0)
+
+
+def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=9, failed=(0,)),))
+    path = out / "cases" / "c" / "errors.csv"
+    errors = tables.read_errors(path)
+    errors.loc[errors["frame"] == 3, "rms_mm"] = 99.0
+    tables.write_table(path, errors, ERRORS_COLUMNS)
+    case = read_case(path.parent)
+    drawing = CASE_FIGURES["projections"](case)
+    failed = CASE_FIGURES["failed_projections"](case)
+    assert drawing is not None
+    assert failed is not None
+    titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
+    assert [t for t in titles if "frame" in t] == [
+        "frame 1 (first)",
+        "frame 3 (worst)",
+        "frame 5 (middle)",
+        "frame 8 (last)",
+    ]
+    assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
+
+
+def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=6, failed=(2,)),))
+    drawing = CASE_FIGURES["error_by_depth"](read_case(out / "cases" / "c"))
+    assert drawing is not None
+    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    assert len(lines["frame without result"].get_xdata()) == 1
+    assert len(lines["simulated to traced, rms"].get_xdata()) == 5
+    assert len(drawing.table) == 6
+
+
+def test_frames_file_reads_back(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    scan = Scan(
+        np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)}
+    )
+    curve, picture = rng.normal(size=(7, 3)), rng.integers(0, 255, (5, 6), dtype=np.uint8)
+    frames = (Frame(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
+    write_frames(tmp_path / "frames.h5", scan, frames)
+    back = read_scan(tmp_path / "frames.h5")
+    assert back is not None
+    assert (back.shape, list(back.lumen_mips)) == ((4, 5, 6), [1])
+    np.testing.assert_array_equal(back.direction, TURN)
+    np.testing.assert_allclose(
+        back.to_index(scan.origin_mm + TURN @ (scan.spacing_mm * [1, 2, 3])), [1, 2, 3]
+    )
+    assert frame_numbers(tmp_path / "frames.h5") == (2, 11)
+    frame = read_frame(tmp_path / "frames.h5", 11)
+    np.testing.assert_array_equal(frame.traced_mm, curve + 11)
+    np.testing.assert_array_equal(frame.mips[0], picture)
+    assert frame.simulated_mm is None
+
+
+def test_colours_are_told_apart_by_dichromats() -> None:
+    """Machado et al. (2009), severity 1: neighbours in a legend stay apart for protan and deutan readers."""
+    matrices = (
+        np.array(
+            [
+                [0.152286, 1.052583, -0.204868],
+                [0.114503, 0.786281, 0.099216],
+                [-0.003882, -0.048116, 1.051998],
+            ]
+        ),
+        np.array(
+            [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+        ),
+    )
+    stages = [np.array(to_rgba(c)[:3]) for c in STAGE_COLOURS.values()]
+    for matrix in (np.eye(3), *matrices):
+        seen = np.array([matrix @ _linear(c) for c in stages])
+        apart = np.linalg.norm(seen[:, None] - seen[None], axis=2) + np.eye(len(seen))
+        assert apart.min() > 0.08
+    assert len({(style, marker) for _, _, _, style, marker in NULLS}) == len(NULLS)
+
+
+def _linear(colour: np.ndarray) -> np.ndarray:
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize(
+    ("values", "scale"), [([0.1, 0.2], "linear"), ([0.01, 3.0], "log"), ([0.0, np.nan], "linear")]
+)
+def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float], scale: str) -> None:
+    axes = Figure().subplots()
+    positive_axis(axes, [values])
+    assert axes.get_yscale() == scale

@@ -1,0 +1,198 @@
+"""The pages: built from files alone, whole, escaped, small, the same bytes twice, failures first."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from reports import tables
+from reports.case_files import find_cases, read_case
+from reports.figures import CASE_FIGURES, RUN_FIGURES
+from reports.html import render_case, render_index
+from reports.sections import declared
+from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
+
+PAGE_BUDGET = 2_000_000
+KINDS = tuple(replace(kind, frames=7, failed=kind.failed and (2, 3)) for kind in EVERY_KIND)
+FAILED = KINDS[1].name
+
+
+class _Links(HTMLParser):
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.ids: list[str] = []
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found += [v for k, v in attrs if k in ("href", "src") and v]
+        self.ids += [v for k, v in attrs if k == "id" and v]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One rendered run with a case of every kind; tests only read it."""
+    out = write_run(tmp_path_factory.mktemp("run") / "out", KINDS, sweep=True)
+    for folder in find_cases(out):
+        render_case(folder)
+    render_index(out)
+    return out
+
+
+def _pages(run: Path) -> list[Path]:
+    return [run / "index.html", *(f / "report.html" for f in find_cases(run))]
+
+
+def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
+    assert [s["figure"] for s in declared("case")] == list(CASE_FIGURES)
+    assert {s["figure"] for s in declared("run")} == set(RUN_FIGURES)
+    for page in ("case", "run", "bench"):
+        for section in declared(page):
+            assert section["read"].endswith(".")
+            assert section["bad"].startswith(("Bad:", "Look"))
+
+
+def test_every_link_leads_somewhere(run: Path) -> None:
+    for page in _pages(run):
+        links = _Links(page)
+        for link in links.found:
+            if link.startswith("#"):
+                assert link[1:] in links.ids, (page, link)
+            else:
+                assert (page.parent / unquote(link)).exists(), (page, link)
+
+
+def test_each_kind_of_case_has_its_sections(run: Path) -> None:
+    ids = {f.name: set(_Links(f / "report.html").ids) for f in find_cases(run)}
+    always = {"forces_by_depth", "contact_along_wire", "run_time", "frames", "settings", "provenance", "cite"}
+    compared = {"error_by_depth", "projections", "error_along_wire", "tip_by_depth", "skill_by_depth"}
+    assert all(always <= found for found in ids.values())
+    assert all(compared <= found for name, found in ids.items() if name != "aneurysm")
+    assert not compared & ids["aneurysm"]
+    assert {name for name, found in ids.items() if "truth_by_depth" in found} == {"cow-seed-100"}
+    assert {name for name, found in ids.items() if "simulated_wires" in found} == {"aneurysm"}
+    assert {name for name, found in ids.items() if "failed_projections" in found} == {FAILED}
+    assert {name for name, found in ids.items() if "failures" in found} == {FAILED}
+
+
+def test_every_picture_has_its_numbers_beside_it(run: Path) -> None:
+    pictures = list(run.rglob("figures/*.png"))
+    assert len(pictures) > 25
+    for picture in pictures:
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        lines = picture.with_suffix(".csv").read_text().splitlines()
+        assert len(lines) > 1, picture
+
+
+def test_failures_come_first_and_are_escaped(run: Path) -> None:
+    for page in (run / "index.html", run / "cases" / FAILED / "report.html"):
+        text = page.read_text(encoding="utf-8")
+        assert re.findall(r'<h2 id="(\w+)"', text)[0] == "failures"
+        assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
+        assert "<b>&" not in text
+        assert "phantom &lt;run&gt; 2" in text
+    assert "None: every frame" not in (run / "index.html").read_text(encoding="utf-8")
+
+
+def test_pages_stay_within_the_budget(run: Path) -> None:
+    for page in _pages(run):
+        links = [unquote(link) for link in _Links(page).found if link.endswith(".png")]
+        total = page.stat().st_size + sum((page.parent / link).stat().st_size for link in links)
+        assert total < PAGE_BUDGET, (page, total)
+
+
+def test_no_value_is_shown_as_nan(run: Path) -> None:
+    for page in _pages(run):
+        cells = re.findall(r"<td[^>]*>(.*?)</td>", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        assert len(cells) > 20
+        assert not [c for c in cells if re.search(r"\b(nan|NaN|None|NA)\b|&lt;NA&gt;", c)]
+
+
+def test_rendering_again_gives_the_same_bytes_and_leaves_results_alone(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "moved"
+    shutil.copytree(run, copy)
+    before = {p.relative_to(copy): p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+    for folder in find_cases(copy):
+        render_case(folder)
+    render_index(copy)
+    after = {p.relative_to(copy): p.read_bytes() for p in copy.rglob("*") if p.is_file()}
+    assert after.keys() == before.keys()
+    assert [str(name) for name in before if after[name] != before[name]] == []
+
+
+def test_embedding_makes_one_file(run: Path, tmp_path: Path) -> None:
+    case = tmp_path / "case"
+    shutil.copytree(run / "cases" / "calibration", case)
+    page = render_case(case, embed=True)
+    sources = re.findall(r'<img src="([^"]*)"', page.read_text(encoding="utf-8"))
+    assert len(sources) >= 6
+    assert all(s.startswith("data:image/png;base64,") for s in sources)
+
+
+def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
+    summary = tables.read_summary(run / "summary.csv").set_index("case")
+    text = (run / "cases" / "cow-seed-100" / "report.html").read_text(encoding="utf-8")
+    assert f"<b>{summary.loc['cow-seed-100', 'rms_mm']:.3f}</b>" in text
+    errors = tables.read_errors(run / "cases" / "cow-seed-100" / "errors.csv")
+    assert f"<td>{errors['p95_mm'][5]:.3f}</td>" in text
+
+
+def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("fine", frames=3),))
+    dead = out / "cases" / "dead"
+    dead.mkdir()
+    (dead / "log.txt").write_text("load: 3 frames\n")
+    render_case(dead)
+    render_case(out / "cases" / "fine")
+    text = render_index(out).read_text(encoding="utf-8")
+    assert "no result.json" in (dead / "report.html").read_text(encoding="utf-8")
+    assert '<a href="cases/dead/report.html">dead</a>' in text
+    assert 'class="status bad"' in text
+
+
+def test_a_case_that_failed_as_a_whole_says_why(tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "cases" / "c"
+    folder.mkdir(parents=True)
+    result = {
+        "case": "c",
+        "status": "segment_failed",
+        "sentence": "no lumen",
+        "message": "segment: seed 0 < 1",
+    }
+    (folder / "result.json").write_text(json.dumps(result))
+    text = render_case(folder).read_text(encoding="utf-8")
+    assert "segment: seed 0 &lt; 1" in text
+    assert not list((folder / "figures").glob("*")) if (folder / "figures").exists() else True
+
+
+def test_a_run_without_cases_is_no_success(tmp_path: Path) -> None:
+    text = render_index(tmp_path).read_text(encoding="utf-8")
+    assert "0 cases" in text
+    assert 'class="status bad"' in text
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("result.json", b"{"), ("result.json", b"[]"), ("frames.h5", b"x" * 99)]
+)
+def test_a_damaged_file_is_named(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=re.escape(name)):
+        read_case(tmp_path)
+
+
+def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=3),))
+    folder = out / "cases" / "c"
+    render_case(folder)
+    assert (folder / "figures" / "error_along_wire.png").exists()
+    (folder / "points.csv.gz").unlink()
+    render_case(folder)
+    assert not (folder / "figures" / "error_along_wire.png").exists()
+    assert not (folder / "figures" / "error_along_wire.csv").exists()
