@@ -25,6 +25,13 @@ lint: setup
 study: setup
 	$(BIN)/python -m pytest -q -m slow
 
+# a real scan (needs WIREVAL_DATA): segmented, then a wire is simulated from the carotid past the aneurysm
+aneurism: setup
+	@if [ -z "$$WIREVAL_DATA" ]; then echo "skipped: set WIREVAL_DATA to the folder of real scans"; else \
+	  mkdir -p $(OUT)/aneurism && cp tests/studies/aneurism/* $(OUT)/aneurism/ && \
+	  ln -sf "$$WIREVAL_DATA/aneurism_3dra/aneurism.raw.gz" $(OUT)/aneurism/ && \
+	  $(BIN)/wireval run $(OUT)/aneurism/manifest.toml -o $(OUT)/aneurism/out; fi
+
 setup: $(VENV)/.ready
 
 $(VENV)/.ready: pyproject.toml requirements.lock

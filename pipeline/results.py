@@ -210,7 +210,7 @@ def _first_sentence(frames: list[Frame]) -> str:
     return next((f.sentence for f in frames if not f.ok), "every frame is ok")
 
 
-def write_tables(folder: Path, run: CaseRun) -> None:
+def write_tables(folder: Path, run: CaseRun, view: bool = True) -> None:
     """Everything of a case but result.json, which is written last: its presence says that the case is complete."""
     tables.write_errors(folder / "errors.csv", [error_row(f) for f in run.frames])
     columns = point_columns(run.frames)
@@ -218,7 +218,8 @@ def write_tables(folder: Path, run: CaseRun) -> None:
         tables.write_points(folder / "points.csv.gz", columns)
     scan = None if run.lumen is None else _scan_of(run.lumen)
     frames_file.write_frames(folder / "frames.h5", scan, map(_arrays_of, run.frames))
-    _write_view(folder / "view", run)
+    if view:
+        _write_view(folder / "view", run)
 
 
 def failure_rows(run: CaseRun) -> list[dict[str, Any]]:

@@ -86,7 +86,7 @@ def run_case(job: Job) -> str:
     run_stages(run)
     progress.close()
     row = case_row(run, perf_counter() - clock, peak_memory_mib())
-    results.write_tables(job.folder, run)
+    results.write_tables(job.folder, run, view=job.pictures)
     extra = {"key": key, "failures": results.failure_rows(run), "summary": row, "provenance": collect()}
     results.write_json(job.folder / "result.json", results.result_of(run, row, job.settings.as_dict(), extra))
     if job.pictures and run.wants("report"):
