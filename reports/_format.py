@@ -21,7 +21,7 @@ def number(value: Any, digits: int = 3) -> str:
         return f"{value:g}" if isinstance(value, float) else str(value)
     exponent = math.floor(math.log10(abs(value)))
     if not -4 <= exponent < 6:
-        return f"{value:.{digits - 1}e}"
+        return f"{value:.{digits}g}"
     return f"{value:.{max(digits - 1 - exponent, 0)}f}"
 
 

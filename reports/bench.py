@@ -64,7 +64,7 @@ def render_bench(
 
 def read_bench(bench_csv: Path, stress_csv: Path | None = None) -> BenchFiles:
     """Read the rows of a benchmark, marking the Pareto front of each scene, and the stress outcomes if any."""
-    rows = read_table(bench_csv, BENCH_COLUMNS)
+    rows = _numeric(read_table(bench_csv, BENCH_COLUMNS))
     rows["on_front"] = False
     for _, mine in rows.groupby("scene", sort=False):
         rows.loc[mine.index, "on_front"] = pareto_front(
@@ -100,6 +100,13 @@ def recommended(rows: pd.DataFrame) -> pd.DataFrame:
         return pd.DataFrame(columns=["target_mm", *rows.columns])
     table = pd.concat(found, ignore_index=True)
     return table[["target_mm", *[c for c in table.columns if c != "target_mm"]]]
+
+
+def _numeric(rows: pd.DataFrame) -> pd.DataFrame:
+    """Columns beyond the named ones are numbers where every value of theirs is."""
+    known = {c.name for c in BENCH_COLUMNS}
+    extra = {c: pd.to_numeric(rows[c], errors="coerce") for c in rows.columns if c not in known}
+    return rows.assign(**{c: v for c, v in extra.items() if v.notna().equals(rows[c].notna())})
 
 
 def _crosstab(counts: pd.DataFrame) -> pd.DataFrame:
