@@ -30,3 +30,13 @@ HOP_VOXELS = 0.02
 """Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
+WORST_LEVENBERG = 1e9
+"""Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
+SLIP_MM = 1e-3
+"""Tangential way in mm below which a point in contact still sticks: a thousandth of a usual step."""
+FRICTION_CHANGE = 1e-4
+"""Relative change of the contact loads at which friction counts as settled."""
+FRICTION_ROUNDS = 60
+"""Relaxations allowed for the contact loads of one step to settle."""
+PARALLEL = 1e-6
+"""Sine of the angle below which a material axis counts as parallel to the wire."""

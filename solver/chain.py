@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.energy import COUNTERS, Scratch, State, Switch
+from solver import _tolerances as tol
 from solver._kernels.layout import Chain, Rule, empty_chain, lay_out, tabulate
+from solver._kernels.problem import COUNTERS, Friction, Problem, Scratch, State, Switch
 from solver._kernels.spline import Field
+from solver.errors import refuse
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
 
-ALL_SKIPS = Switch(clearance=True, cheap=True, idle=True, window=True)
+REPORT = 19
 
 
 def unit(vector: ArrayLike, name: str) -> Array:
@@ -21,8 +23,7 @@ def unit(vector: ArrayLike, name: str) -> Array:
     v = np.asarray(vector, dtype=np.float64)
     size = float(np.linalg.norm(v)) if v.shape == (3,) else 0.0
     if not (np.isfinite(size) and size > 0):
-        msg = f"insertion: {name}: got {np.asarray(vector).tolist()}; allowed: three finite numbers, not all 0; "
-        raise ValueError(msg + "give a direction in LPS, e.g. [0.0, 0.0, 1.0]")
+        refuse("insertion", name, np.asarray(vector).tolist(), "three finite numbers, not all 0", "give LPS")
     return v / size
 
 
@@ -34,9 +35,14 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
     else:
         axis = unit(material_axis, "material_axis")
     across = axis - direction * float(axis @ direction)
-    if float(np.linalg.norm(across)) < 1e-6:
-        msg = f"insertion: material_axis: got {axis.tolist()}, parallel to entry_direction {direction.tolist()}; "
-        raise ValueError(msg + "allowed: any other direction; leave it out for the default")
+    if float(np.linalg.norm(across)) < tol.PARALLEL:
+        refuse(
+            "insertion",
+            "material_axis",
+            axis.tolist(),
+            "not along entry_direction",
+            "leave it out for the default",
+        )
     one = unit(across, "material_axis")
     two = np.cross(direction, one)
     roll = np.deg2rad(roll_deg)
@@ -49,34 +55,42 @@ def no_field() -> Field:
     return Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0)
 
 
-class Buffers:
-    """Room for a chain of up to ``capacity`` segments, and the chain of the moment."""
+def empty_state(k: int, points: int) -> State:
+    """Two states with room for k segments."""
+    return State(
+        u=np.zeros((2, k, 3)),
+        x=np.zeros((2, k + 1, 3)),
+        r=np.zeros((2, k + 1, 3, 3)),
+        depth=np.zeros((2, points)),
+        jet=np.zeros((2, points, 10)),
+        parts=np.zeros((2, 4)),
+    )
 
-    def __init__(self, wire: GuideWire, wall: VesselWall | None, rule: Rule) -> None:
-        self.wire = wire
-        self.rule = rule
+
+class Buffers:
+    """Room for a chain of up to ``capacity`` segments, and the chain of the moment, in state 0."""
+
+    problem: Problem
+
+    def __init__(self, wire: GuideWire, wall: VesselWall | None, rule: Rule, switch: Switch) -> None:
+        self.wire, self.wall, self.rule, self.switch = wire, wall, rule, switch
         self.field = wall.field if wall is not None else no_field()
         self.stiffness = wall.stiffness_N_mm2 if wall is not None else 0.0
+        self.friction = wall.friction if wall is not None else 0.0
         self.spacing = float(wall.distance.spacing_mm.min()) if wall is not None else 1.0
-        self.k = 0
-        self.first_mm = 0.0
+        self.k, self.first_mm, self.capacity = 0, 0.0, 0
         self.counter = np.zeros(COUNTERS, dtype=np.int64)
-        self.report = np.zeros(12)
-        self.parts = np.zeros(3)
-        self.capacity = 0
+        self.report = np.zeros(REPORT)
         self.grow(16)
 
     def grow(self, capacity: int) -> None:
-        """Make room for more segments, keeping the current state."""
-        points = len(self.rule.hull) * (capacity + len(self.rule.tip_at))
-        chain = empty_chain(capacity, points, self.rule.reach)
-        state = State(
-            u=np.zeros((2, capacity, 3)),
-            x=np.zeros((2, capacity + 1, 3)),
-            r=np.zeros((2, capacity + 1, 3, 3)),
-            depth=np.zeros((2, points)),
-            jet=np.zeros((2, points, 10)),
-        )
+        """Make room for more segments, keeping joints, frames and controls of the current state."""
+        points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
+        state = empty_state(capacity, points)
+        if self.capacity:
+            old = self.problem.state
+            for new, was in ((state.u, old.u), (state.x, old.x), (state.r, old.r)):
+                new[:, : was.shape[1]] = was
         scratch = Scratch(
             gain=np.zeros((capacity, 3, 7)),
             anchor=np.ones((points, 4)),
@@ -84,17 +98,39 @@ class Buffers:
             fraction=np.zeros(6),
             weights=np.zeros((3, 3, 4)),
         )
-        if self.capacity:
-            k, old = self.k, self.state
-            for new, was in ((state.u, old.u), (state.x, old.x), (state.r, old.r)):
-                new[:, : was.shape[1]] = was
-            del k
-        self.chain: Chain = chain
-        self.state: State = state
-        self.scratch: Scratch = scratch
+        rubbing = points if self.friction else 0
+        friction = Friction(
+            float(self.friction),
+            tol.SLIP_MM,
+            np.zeros((rubbing, 3)),
+            np.zeros((rubbing, 3)),
+            np.zeros(rubbing),
+        )
+        chain = empty_chain(capacity, points, self.rule.reach)
+        self.problem = Problem(
+            field=self.field,
+            stiffness=float(self.stiffness),
+            spacing=self.spacing,
+            friction=friction,
+            chain=chain,
+            state=state,
+            scratch=scratch,
+            switch=self.switch,
+            twisting=self.wire.twists,
+        )
         self.table = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, self.wire.segment_mm, self.table)
         self.capacity = capacity
+
+    @property
+    def chain(self) -> Chain:
+        """Segments, joints and look-up points."""
+        return self.problem.chain
+
+    @property
+    def state(self) -> State:
+        """Controls, joints and frames."""
+        return self.problem.state
 
     def lay_out(self, depth_mm: float) -> None:
         """Cut the wire at a depth into segments."""
@@ -104,3 +140,15 @@ class Buffers:
         self.k, self.first_mm = k, first
         if k:
             lay_out(self.chain, self.wire.profile, self.rule, self.table, k, first, self.wire.segment_mm)
+
+    @property
+    def points(self) -> int:
+        """Number of look-up points of the current chain."""
+        return int(self.chain.first[self.k + 1])
+
+    def point_arcs(self) -> Array:
+        """Arc length (p,) of each look-up point from the entry, mm."""
+        count = np.diff(self.chain.first[: self.k + 2])
+        node = np.repeat(np.arange(self.k + 1), count)
+        arcs = np.concatenate([[0.0], np.cumsum(self.chain.length[: self.k])])
+        return np.asarray(arcs[node] + self.chain.offset[: self.points, 2])

@@ -12,17 +12,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.energy import Switch
 from solver._kernels.follow import follow
-from solver._kernels.minimise import blocked
-from solver.chain import ALL_SKIPS, base_frame, unit
-from solver.relax import Settings, buffers_for, minimise_buffers, solution_of
+from solver._kernels.passage import free_fraction
+from solver._kernels.problem import Switch
+from solver.chain import base_frame, unit
+from solver.errors import refuse
+from solver.relax import Settings, anchor_friction, buffers_for, relax_buffers, solution_of
 from solver.solution import Solution
 from solver.status import Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
+
+FINAL = (Status.LEFT_GRID, Status.NON_FINITE)
+"""Outcomes that a shorter step cannot help."""
 
 
 class Insertion:
@@ -32,8 +36,8 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
-    tolerance, max_iterations : of one relaxation.     max_joints : longest wire accepted.
-    tip : "integrated" (the wall under the last segment is integrated) or "joint" (its tip joint alone).
+    tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
+    tip_load_N : (3,) dead force on the tip.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status.
     """
 
@@ -52,35 +56,29 @@ class Insertion:
         step_mm: float = 1.0,
         roll_step_deg: float = 15.0,
         max_joints: int = 20_000,
-        tip: str = "integrated",
-        switch: Switch = ALL_SKIPS,
+        quadrature: str = "tip",
+        tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
+        switch: Switch | None = None,
     ) -> None:
-        self.settings = Settings(method, tolerance, max_iterations, tip, switch)
+        self.settings = Settings(method, tolerance, max_iterations, quadrature, switch or Switch())
         if initial not in ("slide", "translate"):
-            msg = f"insertion: initial: got {initial!r}; allowed: 'slide', 'translate'; slide is the default"
-            raise ValueError(msg)
+            refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
         for name, value in (
             ("step_mm", step_mm),
             ("roll_step_deg", roll_step_deg),
             ("max_joints", max_joints),
         ):
             if not (math.isfinite(value) and value > 0):
-                msg = f"insertion: {name}: got {value!r}; allowed: a positive number; leave it out for the default"
-                raise ValueError(msg)
-        self.entry = np.array(entry_mm, dtype=np.float64)
-        if self.entry.shape != (3,) or not np.all(np.isfinite(self.entry)):
-            msg = f"insertion: entry_mm: got {entry_mm!r}; allowed: three finite numbers; give LPS mm"
-            raise ValueError(msg)
+                refuse("insertion", name, value, "a positive number", "leave it out for the default")
+        self.entry = _vector("entry_mm", entry_mm)
+        self.tip_load = _vector("tip_load_N", tip_load_N)
         self.wire, self.wall, self.initial = wire, wall, initial
         self.direction = unit(entry_direction, "entry_direction")
         self.material_axis = material_axis
-        base_frame(self.direction, material_axis, 0.0)
         self.step_mm, self.roll_step_deg, self.max_joints = step_mm, roll_step_deg, max_joints
         self.buffers = buffers_for(wire, wall, self.settings)
         self.depth_mm, self.roll_deg = 0.0, 0.0
-        self._shrink = 1.0
-        self._energy = 0.0
-        self._started = False
+        self._shrink, self._energy, self._started = 1.0, 0.0, False
         self.buffers.state.x[:, 0] = self.entry
         self.buffers.state.r[:, 0] = base_frame(self.direction, material_axis, 0.0)
 
@@ -93,32 +91,35 @@ class Insertion:
         one per depth. A depth that cannot be reached yields the last good state with its own depth and a status.
         """
         depths = [float(d) for d in depths_mm]
-        rolls = np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))
+        rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
         for depth, roll in zip(depths, rolls, strict=True):
             if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
-                msg = f"insertion: to_depths: got depth {depth!r} mm, roll {roll!r} deg; allowed: finite, depth >= 0; "
-                raise ValueError(msg + "depths count from the entry")
+                refuse(
+                    "insertion",
+                    "to_depths",
+                    (depth, roll),
+                    "finite depths >= 0 and rolls",
+                    "mm from the entry",
+                )
         for depth, roll in zip(depths, rolls, strict=True):
-            yield self._go(depth, float(roll))
+            yield self._go(depth, roll)
 
     def _go(self, depth: float, roll: float) -> Solution:
+        """Step until the depth is reached or no step succeeds."""
         self.buffers.counter[:] = 0
         if not self._started:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
             self.roll_deg, self._started = roll, True
-        status = self._refusal(depth)
-        iterations = 0
-        shrink = self._shrink
+        status, iterations, shrink = self._refusal(depth), 0, self._shrink
         while status is Status.CONVERGED:
             ahead, turn = depth - self.depth_mm, roll - self.roll_deg
             if abs(ahead) < tol.MATCH_DEPTH_MM and turn == 0.0:
                 break
-            fraction = min(1.0, shrink * self._allowed(ahead, turn))
-            outcome, used = self._try(ahead, turn, fraction)
+            outcome, used = self._try(ahead, turn, min(1.0, shrink * self._allowed(ahead, turn)))
             iterations += used
             if outcome is Status.CONVERGED:
                 shrink = min(1.0, 2 * shrink)
-            elif shrink > tol.SMALLEST_STEP and outcome is not Status.LEFT_GRID:
+            elif shrink > tol.SMALLEST_STEP and outcome not in FINAL:
                 shrink *= 0.5
             else:
                 status = outcome
@@ -153,68 +154,92 @@ class Insertion:
         if self.wall is None:
             return step
         tip, along = b.state.x[0, b.k], b.state.r[0, b.k, :, 2]
-        count = 1 + math.ceil(2 * step / b.spacing)
-        at = np.linspace(0.0, step, count + 1)
+        at = np.linspace(0.0, step, 2 + math.ceil(2 * step / b.spacing))
         phi = self.wall.look_up(tip + at[:, None] * along)[0]
         rise = max(0.5 * self.wire.radius_mm, 0.25 * b.spacing)
         limit = max(0.0, float(phi[0]) + rise)
         free = step
         over = np.flatnonzero(phi > limit)
         if over.size:
-            i = int(over[0])
-            free = float(np.interp(limit, phi[i - 1 : i + 1], at[i - 1 : i + 1])) if i else rise
-        end = tip + free * along
-        free *= blocked(b.field, tip, end, free, b.spacing, b.scratch)
+            i = max(int(over[0]), 1)
+            free = float(np.interp(limit, phi[i - 1 : i + 1], at[i - 1 : i + 1]))
+        free *= free_fraction(b.field, tip, tip + free * along, free, b.spacing, b.problem.scratch)
         return max(free, min(step, 0.5 * rise))
 
     def _try(self, ahead: float, turn: float, fraction: float) -> tuple[Status, int]:
         """Take a step; on failure put everything back. Returns its status and iterations."""
         b = self.buffers
-        before = (b.k, b.first_mm, b.parts.copy(), b.report.copy(), self._energy)
-        n = b.k + 1
-        kept = [
-            a[0, :m].copy()
-            for a, m in zip(b.state, (b.k, n, n, *(2 * (len(b.state.depth[0]),))), strict=True)
-        ]
-        depth = self.depth_mm + fraction * ahead if fraction < 1.0 else self.depth_mm + ahead
-        roll = self.roll_deg + fraction * turn if fraction < 1.0 else self.roll_deg + turn
-        curve = self._curve(depth - self.depth_mm)
-        b.lay_out(depth)
-        b.state.r[:, 0] = base_frame(self.direction, self.material_axis, roll)
-        b.state.x[:, 0] = self.entry
-        if b.k:
-            follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
-            status, iterations, energy = minimise_buffers(b, self.settings)
-        else:
-            status, iterations, energy = Status.CONVERGED, 0, 0.0
+        sizes = (b.k, b.k + 1, b.k + 1, b.points, b.points, 4)
+        kept = [a[0, :size].copy() for a, size in zip(b.state, sizes, strict=True)]
+        report = b.report.copy()
+        depth, roll = self.depth_mm + fraction * ahead, self.roll_deg + fraction * turn
+        if fraction == 1.0:
+            depth, roll = self.depth_mm + ahead, self.roll_deg + turn
+        status, iterations, energy = self._relax_at(depth, roll)
         if status is Status.CONVERGED and self._left_grid():
             status = Status.LEFT_GRID
         if status is Status.CONVERGED:
             self.depth_mm, self.roll_deg, self._energy = depth, roll, energy
-            return status, iterations
-        b.lay_out(self.depth_mm)
-        for a, was in zip(b.state, kept, strict=True):
-            a[0, : len(was)] = was
-        b.parts[:], b.report[:], self._energy = before[2], before[3], before[4]
+        else:
+            b.lay_out(self.depth_mm)
+            for a, was in zip(b.state, kept, strict=True):
+                a[0, : len(was)] = was
+            b.report[:] = report
         return status, iterations
 
-    def _curve(self, ahead: float) -> Array:
-        """The polyline that the wire is laid along before it relaxes."""
+    def _relax_at(self, depth: float, roll: float) -> tuple[Status, int, float]:
+        """Lay the wire along its own curve at a new depth and roll, and relax it there."""
         b = self.buffers
-        joints: Array = b.state.x[0, : b.k + 1].copy()
+        before = b.state.x[0, : b.k + 1].copy()
+        curve, was = self._curve(before, depth - self.depth_mm), b.k
+        b.lay_out(depth)
+        b.state.r[:, 0] = base_frame(self.direction, self.material_axis, roll)
+        b.state.x[:, 0] = self.entry
         if b.k == 0:
+            b.report[:], b.state.parts[:] = 0.0, 0.0
+            return Status.CONVERGED, 0, 0.0
+        if b.problem.twisting:
+            self._keep_twist(was)
+        b.chain.load[: b.k] = 0.0
+        b.chain.load[b.k] = self.tip_load
+        follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
+        anchor_friction(b, before, depth - self.depth_mm)
+        return relax_buffers(b, self.settings)
+
+    def _keep_twist(self, was: int) -> None:
+        """Twist stays with the material, which is counted from the tip."""
+        b = self.buffers
+        twist = b.state.u[0, :was, 2].copy()
+        b.state.u[0, : b.k, 2] = 0.0
+        common = min(was, b.k)
+        if common:
+            b.state.u[0, b.k - common : b.k, 2] = twist[was - common :]
+
+    def _curve(self, joints: Array, ahead: float) -> Array:
+        """The polyline that the wire is laid along before it relaxes."""
+        if len(joints) == 1:
             return np.array([self.entry, self.entry + self.direction])
-        if self.initial == "translate":
-            moved = joints + ahead * self.direction
-            if ahead >= 0:
-                return np.vstack([self.entry, moved]) if ahead > 0 else moved
-            arcs = self.wire.arcs_at(self.depth_mm)
-            return np.vstack([self.entry, moved[arcs > -ahead]])
-        return joints
+        if self.initial == "slide" or ahead == 0.0:
+            return joints
+        moved = joints + ahead * self.direction
+        kept = moved if ahead > 0 else moved[self.wire.arcs_at(self.depth_mm) > -ahead]
+        return (
+            np.vstack([self.entry, kept])
+            if len(kept)
+            else np.array([self.entry, self.entry + self.direction])
+        )
 
     def _left_grid(self) -> bool:
+        """Whether a joint is further outside the grid than the wire's radius."""
         if self.wall is None:
             return False
         b = self.buffers
         beyond = self.wall.beyond_grid(b.state.x[0, 1 : b.k + 1])
-        return bool(beyond.size and beyond.max() > self.wire.radius_mm)
+        return bool(beyond.max(initial=0.0) > self.wire.radius_mm)
+
+
+def _vector(name: str, value: ArrayLike) -> Array:
+    vector = np.array(value, dtype=np.float64)
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        refuse("insertion", name, value, "three finite numbers", "LPS, in the unit of its name")
+    return vector

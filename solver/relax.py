@@ -9,10 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.energy import CHEAP, CLEAR, FULL, LEVENBERG, ROLLOUTS, SWEEPS, Switch
+from solver._kernels.energy import lag_friction, point_at, total_energy
 from solver._kernels.follow import follow
+from solver._kernels.layout import Rule
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED, minimise
-from solver.chain import ALL_SKIPS, Buffers, base_frame, unit
+from solver._kernels.problem import (
+    CHEAP,
+    CLEAR,
+    FULL,
+    IDLE,
+    LEVENBERG,
+    ROLLOUTS,
+    SAVED,
+    SWEEPS,
+    WINDOW,
+    Switch,
+)
+from solver.chain import Buffers, base_frame, unit
+from solver.errors import refuse
+from solver.forces import contact_forces, node_of, push_force
 from solver.grid import read_only
 from solver.solution import Solution
 from solver.status import Status
@@ -27,138 +42,144 @@ OUTCOMES = {
     STALLED: Status.STALLED,
     BROKEN: Status.NON_FINITE,
 }
+METHODS = ("newton", "closed_form")
+QUADRATURES = ("tip", "joints", "segments")
 TIP_PANELS = 5
+"""Panels of the last segment, each half as long as the one before: the last is 1/16 of it."""
+TIP_ZONE = 4
+"""Segments before the last with two Gauss points each: they cover the tip's contact run where segments are short."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How hard to try. tolerance : Newton decrement relative to the energy.  max_iterations : per relaxation."""
+    """How to relax.
+
+    tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation.
+    quadrature : of the wall's energy. "tip" integrates it under the last segments and sums joints elsewhere,
+    "joints" is the seed's sum over joints (half a weight at the tip), "segments" integrates under all of them.
+    """
 
     method: str = "newton"
     tolerance: float = tol.DECREMENT
     max_iterations: int = 200
-    tip: str = "integrated"
-    switch: Switch = field(default=ALL_SKIPS)
+    quadrature: str = "tip"
+    switch: Switch = field(default_factory=Switch)
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
-        choices = {"method": ("newton", "closed_form"), "tip": ("integrated", "joint")}
-        for name, allowed in choices.items():
+        for name, allowed in (("method", METHODS), ("quadrature", QUADRATURES)):
             if getattr(self, name) not in allowed:
-                msg = (
-                    f"solver: {name}: got {getattr(self, name)!r}; allowed: {', '.join(allowed)}; choose one"
-                )
-                raise ValueError(msg)
+                refuse("solver", name, getattr(self, name), ", ".join(allowed), "choose one of these")
         if not 0 < self.tolerance < 1:
-            msg = f"solver: tolerance: got {self.tolerance!r}; allowed: above 0, below 1; 1e-9 is the default"
-            raise ValueError(msg)
+            refuse("solver", "tolerance", self.tolerance, "above 0, below 1", "1e-9 is the default")
         if self.max_iterations < 1:
-            msg = (
-                f"solver: max_iterations: got {self.max_iterations!r}; allowed: 1 or more; 200 is the default"
-            )
-            raise ValueError(msg)
+            refuse("solver", "max_iterations", self.max_iterations, "1 or more", "200 is the default")
 
 
-def tip_rule(kind: str) -> tuple[Array, Array]:
-    """Places (from the tip, as fractions of the last segment) and weights of its wall integral.
+def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> Rule:
+    """Where a wire's segments look the wall up.
 
-    "joint": the tip joint alone with half a weight. "integrated": two Gauss points on each of a few panels that
-    shrink towards the tip, so that a contact run much shorter than the segment is still seen.
+    The last segment has two Gauss points on each of a few panels that shrink towards the tip, so that a contact
+    run much shorter than the segment is still seen.
     """
-    if kind == "joint":
-        return np.zeros(1), np.ones(1)
+    hull, reach = wall.hull_points(wire.radius_mm) if wall is not None else (np.zeros((0, 2)), 0.0)
+    if quadrature == "joints":
+        return Rule(hull, reach, np.zeros(1), np.ones(1), 0)
     edges = np.concatenate([[0.0], 0.5 ** np.arange(TIP_PANELS - 1, -1, -1)])
     width, centre = np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
     offset = width / (2 * np.sqrt(3.0))
-    return np.concatenate([centre - offset, centre + offset]), np.concatenate([width, width]) / 2
+    at, weight = np.concatenate([centre - offset, centre + offset]), np.concatenate([width, width]) / 2
+    return Rule(hull, reach, at, weight, TIP_ZONE if quadrature == "tip" else 2**62)
 
 
 def buffers_for(wire: GuideWire, wall: VesselWall | None, settings: Settings) -> Buffers:
     """Work space for a wire in a wall."""
-    at, weight = tip_rule(settings.tip)
-    if wall is None:
-        from solver._kernels.layout import Rule
+    if settings.method == "closed_form" and wire.twists:
+        stiffness = wire.torsional_stiffness_N_mm2
+        refuse(
+            "solver",
+            "torsional_stiffness_N_mm2",
+            stiffness,
+            "inf with method closed_form",
+            "use method newton",
+        )
+    return Buffers(wire, wall, look_up_rule(wire, wall, settings.quadrature), settings.switch)
 
-        return Buffers(wire, None, Rule(np.zeros((0, 2)), 0.0, at, weight))
-    return Buffers(wire, wall, wall.rule(wire.radius_mm, at, weight))
 
+def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
+    """Relax the current state of a work space in place; return status, iterations and energy.
 
-def minimise_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
-    """Relax the current state of a work space in place; return status, iterations and energy."""
-    outcome, iterations, which, energy = minimise(
-        b.field,
-        b.stiffness,
-        b.spacing,
-        b.chain,
-        b.state,
-        b.k,
-        b.scratch,
-        settings.switch,
-        b.wire.twists,
-        settings.tolerance,
-        settings.max_iterations,
-        b.report,
-        b.parts,
-    )
-    if which == 1:
-        for array in b.state:
-            array[0] = array[1]
-    status = OUTCOMES[outcome]
+    With friction the contact loads are taken from the last relaxation until they settle.
+    """
+    if not b.friction:
+        status, iterations, energy = minimised(b, settings)
+    else:
+        iterations = 0
+        b.problem.friction.load[:] = 0.0
+        total_energy(b.problem, 0, b.k)
+        lag_friction(b.problem, 0, b.k)
+        for _ in range(tol.FRICTION_ROUNDS):
+            status, more, energy = minimised(b, settings)
+            iterations += more
+            if status is not Status.CONVERGED:
+                break
+            if lag_friction(b.problem, 0, b.k) < tol.FRICTION_CHANGE:
+                break
+        else:
+            status = Status.FRICTION
     if status is Status.CONVERGED and folded(b):
         status = Status.FOLDED
     return status, iterations, energy
 
 
+def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
+    """One run of the loop; the result is moved to state 0."""
+    outcome, iterations, which, energy = minimise(
+        b.problem, b.k, settings.tolerance, settings.max_iterations, b.report
+    )
+    if which == 1:
+        for array, size in zip(b.state, (b.k, b.k + 1, b.k + 1, b.points, b.points, 4), strict=True):
+            array[0, :size] = array[1, :size]
+    return OUTCOMES[outcome], iterations, energy
+
+
 def folded(b: Buffers) -> bool:
     """Whether two consecutive segments turn by more than a right angle."""
     along = b.state.r[0, : b.k + 1, :, 2]
-    return bool(np.any(np.einsum("na,na->n", along[1:], along[:-1]) < tol.FOLD_COSINE))
+    return bool(np.einsum("na,na->n", along[1:], along[:-1]).min(initial=1.0) < tol.FOLD_COSINE)
 
 
-def contact_forces(b: Buffers) -> tuple[Array, float]:
-    """The wall's force on the wire at each joint (k + 1, 3) and the deepest penetration, mm."""
-    k, first = b.k, b.chain.first
-    force = np.zeros((k + 1, 3))
-    count = int(first[k + 1]) if k and b.stiffness else 0
-    if not count:
-        return force, 0.0
-    depth = b.state.depth[0, :count]
-    touching = np.flatnonzero(depth)
-    if not touching.size:
-        return force, 0.0
-    size = b.stiffness * b.chain.weight[touching] * depth[touching]
-    each = -size[:, None] * b.state.jet[0, touching, 1:4]
-    node = np.searchsorted(first[: k + 2], touching, side="right") - 1
-    # a point inside the last segment belongs to its two ends in proportion
-    share = -b.chain.offset[touching, 2] / b.chain.length[node - 1]
-    np.add.at(force, node, (1 - share)[:, None] * each)
-    np.add.at(force, node - 1, share[:, None] * each)
-    return force, float(depth.max())
+def anchor_friction(b: Buffers, curve: Array, ahead: float) -> None:
+    """Note where each look-up point was before the step: its material was ``ahead`` mm further back.
+
+    curve : (m, 3) the wire before the step, which continues straight back into the introducer.
+    """
+    if not b.friction or not b.k:
+        return
+    arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    at = b.point_arcs() - ahead
+    start = b.problem.friction.start
+    direction = b.state.r[0, 0, :, 2]
+    for a in range(3):
+        start[: b.points, a] = np.interp(at, arcs, curve[:, a]) + np.minimum(at, 0.0) * direction[a]
 
 
-def push_force(b: Buffers) -> float:
-    """dU/d(depth), N: the axial force of the hand, at the minimum, when the introducer guides without friction."""
-    if b.k == 0:
-        return 0.0
-    c, u = b.chain, b.state.u[0]
-    force = float(b.report[6:9] @ b.state.r[0, 1, :, 2])
-    force -= 0.5 * c.bend[0] * float(u[0, :2] @ u[0, :2]) / b.first_mm
-    if b.k > 1:
-        force -= 0.5 * c.bend[1] * float(u[1, :2] @ u[1, :2]) / (b.first_mm + c.length[1])
-    return float(force)
-
-
-def work_of(counter: NDArray[np.int64]) -> Mapping[str, float]:
-    """Counters by name."""
-    looked = int(counter[FULL] + counter[CHEAP] + counter[CLEAR])
+def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, float]:
+    """Counters by name: what was computed and what was proven unnecessary."""
+    full, cheap, clear = (float(counter[i]) for i in (FULL, CHEAP, CLEAR))
+    looked = full + cheap + clear
     return {
-        "wall_look_ups": float(counter[FULL]),
-        "wall_look_ups_cheap": float(counter[CHEAP]),
-        "wall_look_ups_proven_unnecessary": float(counter[CLEAR]),
-        "wall_look_ups_done_fraction": float(counter[FULL]) / looked if looked else 0.0,
+        "wall_look_ups": full,
+        "wall_look_ups_cheap": cheap,
+        "wall_look_ups_proven_unnecessary": clear,
+        "wall_look_ups_done_fraction": full / looked if looked else 0.0,
         "sweeps": float(counter[SWEEPS]),
         "rollouts": float(counter[ROLLOUTS]),
         "levenberg": float(counter[LEVENBERG]),
+        "rest_shapes": float(counter[IDLE]),
+        "window_sweeps": float(counter[WINDOW]),
+        "joint_sweeps_saved": float(counter[SAVED]),
+        "start_energy_N_mm": start_energy,
     }
 
 
@@ -168,12 +189,14 @@ def solution_of(
     """Dress the current state of a work space."""
     n = b.k + 1
     force, deepest = contact_forces(b)
+    parts = b.state.parts[0]
     return Solution(
         joints_mm=read_only(b.state.x[0, :n].copy()),
         frames=read_only(b.state.r[0, :n].copy()),
         energy_N_mm=energy,
-        bending_energy_N_mm=float(b.parts[0]),
-        wall_energy_N_mm=float(b.parts[1]),
+        bending_energy_N_mm=float(parts[0]),
+        wall_energy_N_mm=float(parts[1]),
+        friction_energy_N_mm=float(parts[3]),
         status=status,
         iterations=iterations,
         contact_force_N=read_only(force),
@@ -183,7 +206,7 @@ def solution_of(
         max_penetration_mm=deepest,
         depth_mm=depth,
         roll_deg=roll,
-        work=work_of(b.counter),
+        work=work_of(b.counter, float(b.report[18])),
     )
 
 
@@ -201,36 +224,46 @@ def relax(
     method: str = "newton",
     tolerance: float = tol.DECREMENT,
     max_iterations: int = 200,
-    tip: str = "integrated",
+    quadrature: str = "tip",
+    switch: Switch | None = None,
 ) -> Solution:
     """Relax one wire from a start shape, with optional dead loads and no wall if there is none.
 
     depth_mm : length beyond the entry.     start_mm : (m, 3) polyline from the entry that the wire is laid along
-    before it relaxes (straight along entry_direction by default).
+    before it relaxes (straight along entry_direction by default); friction acts against leaving it.
     load_N : (3,) dead force on the tip, or (k + 1, 3) on every joint, k from ``wire.segments_at(depth_mm)``.
     Raises ValueError for arguments that cannot be used; failures of the relaxation are a Status.
     """
-    settings = Settings(method=method, tolerance=tolerance, max_iterations=max_iterations, tip=tip)
+    settings = Settings(method, tolerance, max_iterations, quadrature, switch or Switch())
     if not (np.isfinite(depth_mm) and depth_mm > 0):
-        msg = (
-            f"relax: depth_mm: got {depth_mm!r}; allowed: a positive length; give the length beyond the entry"
-        )
-        raise ValueError(msg)
+        refuse("relax", "depth_mm", depth_mm, "a positive length", "give the length beyond the entry")
     b = buffers_for(wire, wall, settings)
     b.lay_out(depth_mm)
     set_loads(b, load_N)
     direction = unit(entry_direction, "entry_direction")
     entry = np.asarray(entry_mm, dtype=np.float64)
-    b.state.x[:, 0] = entry
-    b.state.r[:, 0] = base_frame(direction, material_axis, roll_deg)
     curve = (
         np.array([entry, entry + direction * depth_mm])
         if start_mm is None
         else np.array(start_mm, dtype=float)
     )
+    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.all(np.isfinite(curve)):
+        refuse("relax", "start_mm", curve.shape, "(m, 3) finite points, m >= 2", "start at the entry")
+    b.state.x[:, 0] = entry
+    b.state.r[:, 0] = base_frame(direction, material_axis, roll_deg)
     follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
-    status, iterations, energy = minimise_buffers(b, settings)
+    hold_friction(b)
+    status, iterations, energy = relax_buffers(b, settings)
     return solution_of(b, status, iterations, energy, depth_mm, roll_deg)
+
+
+def hold_friction(b: Buffers) -> None:
+    """Friction holds every look-up point where it is now."""
+    if not b.friction or not b.k:
+        return
+    points = np.arange(b.points)
+    for point, node in zip(points, node_of(b, points), strict=True):
+        point_at(b.problem, 0, int(node), int(point), b.problem.friction.start[point])
 
 
 def set_loads(b: Buffers, load_N: ArrayLike | None) -> None:
@@ -238,10 +271,9 @@ def set_loads(b: Buffers, load_N: ArrayLike | None) -> None:
     if load_N is None:
         return
     load = np.asarray(load_N, dtype=np.float64)
-    if load.shape == (3,):
-        b.chain.load[b.k] = load
-    elif load.shape == (b.k + 1, 3):
-        b.chain.load[: b.k + 1] = load
-    else:
-        msg = f"relax: load_N: got shape {load.shape}; allowed: (3,) on the tip or ({b.k + 1}, 3); see segments_at"
-        raise ValueError(msg)
+    if load.shape not in ((3,), (b.k + 1, 3)) or not np.all(np.isfinite(load)):
+        refuse(
+            "relax", "load_N", load.shape, f"(3,) on the tip or ({b.k + 1}, 3)", "see GuideWire.segments_at"
+        )
+    b.chain.load[:] = 0.0
+    b.chain.load[b.k if load.ndim == 1 else slice(0, b.k + 1)] = load

@@ -14,6 +14,7 @@ class Status(Enum):
         "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
     )
+    FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
     CROSSED_WALL = (
         "the way on leads through the wall; look for a lumen that is closed or narrower than the wire"
     )

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.layout import Rule
 from solver._kernels.spline import Field, bounds, look_up, prefilter
 from solver.errors import refuse
 from solver.grid import Grid
@@ -81,12 +80,12 @@ class VesselWall:
             )
         return int(count)
 
-    def rule(self, radius_mm: float, tip_at: Array, tip_weight: Array) -> Rule:
-        """Where a wire of this radius looks the distance up."""
+    def hull_points(self, radius_mm: float) -> tuple[Array, float]:
+        """Offsets (h, 2) across a wire of this radius where the distance is looked up, and what is added to it."""
         if self.samples == 0:
-            return Rule(np.zeros((1, 2)), float(radius_mm), tip_at, tip_weight)
+            return np.zeros((1, 2)), float(radius_mm)
         angle = 2 * np.pi * np.arange(self.samples) / self.samples
-        return Rule(radius_mm * np.column_stack([np.cos(angle), np.sin(angle)]), 0.0, tip_at, tip_weight)
+        return radius_mm * np.column_stack([np.cos(angle), np.sin(angle)]), 0.0
 
     def look_up(self, points_mm: ArrayLike) -> tuple[Array, Array, Array]:
         """Distance (n,) mm, gradient (n, 3) and Hessian (n, 3, 3) per mm of the interpolant at points (n, 3)."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
-from solver._kernels.rotation import bend_towards, turn
+from solver._kernels.rotation import bend_towards, turn, with_twist
 from solver._kernels.small import apply_transposed, load9, store9, times
 
 
@@ -76,15 +76,16 @@ def extend(curve: Any, m: int, x: Any, j: int, length: float) -> None:
 
 @kernel
 def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
-    """Bend joint j, without twist, towards x[j + 1]; then put that joint at its exact distance."""
+    """Bend joint j towards x[j + 1], keeping the twist it has; then put that joint at its exact distance."""
     d0, d1, d2 = x[j + 1, 0] - x[j, 0], x[j + 1, 1] - x[j, 1], x[j + 1, 2] - x[j, 2]
     size = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     frame = load9(r[j])
     # a joint on top of the one before has no direction: it keeps the one before
     t = apply_transposed(frame, (d0 / size, d1 / size, d2 / size)) if size > 0.0 else (0.0, 0.0, 1.0)
     u0, u1 = bend_towards(chain.rest[j], t[0], t[1], t[2])
-    u[j, 0], u[j, 1], u[j, 2] = u0, u1, 0.0
-    frame = times(frame, turn(chain.rest[j], u0, u1, 0.0))
+    u0, u1, u2 = with_twist(u0, u1, u[j, 2])
+    u[j, 0], u[j, 1], u[j, 2] = u0, u1, u2
+    frame = times(frame, turn(chain.rest[j], u0, u1, u2))
     store9(r[j + 1], frame)
     length = chain.length[j]
     x[j + 1, 0] = x[j, 0] + length * frame[2]

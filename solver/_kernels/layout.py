@@ -12,6 +12,8 @@ import numpy as np
 
 from solver._kernels.flags import kernel
 
+GAUSS = 1 / math.sqrt(3.0)
+
 
 class Profile(NamedTuple):
     """Piecewise linear functions of the distance from the tip; two equal abscissae make a jump."""
@@ -35,6 +37,7 @@ class Rule(NamedTuple):
     reach: float
     tip_at: Any
     tip_weight: Any
+    zone: int
 
 
 class Chain(NamedTuple):
@@ -131,40 +134,44 @@ def lay_out(
 
 @kernel
 def place_points(chain: Chain, rule: Rule, k: int) -> int:
-    """Fill the look-up points: nodes weigh half of each neighbour, the last segment has its own rule."""
-    hulls = rule.hull.shape[0]
+    """Fill the look-up points of every node and of the segment that ends there.
+
+    A segment is integrated by the trapezium rule (half of it at each end), except the last one, which has the
+    rule's own points, and ``zone`` segments before it, which have two Gauss points each.
+    """
+    inner = rule.tip_at.size > 1
     p = 0
     chain.first[0] = chain.first[1] = 0
     for n in range(1, k + 1):
-        if n < k:
-            weight = 0.5 * chain.length[n - 1]
-            if n < k - 1 or rule.tip_at.size == 1:
-                weight += 0.5 * chain.length[n]
-            for h in range(hulls):
-                chain.offset[p, 0] = rule.hull[h, 0]
-                chain.offset[p, 1] = rule.hull[h, 1]
-                chain.offset[p, 2] = 0.0
-                chain.weight[p] = weight / hulls
-                p += 1
-        else:
-            p = place_tip(chain, rule, k, p)
+        behind = k - n if inner else rule.zone + 1
+        length = chain.length[n - 1]
+        share = 0.0
+        if behind > rule.zone:
+            share += 0.5 * length
+        if n < k and (behind - 1 > rule.zone or not inner):
+            share += 0.5 * chain.length[n]
+        if share > 0.0:
+            p = place_point(chain, rule, p, 0.0, share)
+        if inner and n == k:
+            for t in range(rule.tip_at.size):
+                p = place_point(chain, rule, p, -length * rule.tip_at[t], length * rule.tip_weight[t])
+        elif behind <= rule.zone:
+            for side in (-1.0, 1.0):
+                p = place_point(chain, rule, p, -0.5 * length * (1 + side * GAUSS), 0.5 * length)
         chain.first[n + 1] = p
     return p
 
 
 @kernel
-def place_tip(chain: Chain, rule: Rule, k: int, p: int) -> int:
-    """Fill the look-up points of the last segment; one point means the tip joint with half a weight."""
+def place_point(chain: Chain, rule: Rule, p: int, along: float, weight: float) -> int:
+    """Fill the points of the hull around one place on the wire; return the next free one."""
     hulls = rule.hull.shape[0]
-    length = chain.length[k - 1]
-    for t in range(rule.tip_at.size):
-        share = 0.5 if rule.tip_at.size == 1 else rule.tip_weight[t]
-        for h in range(hulls):
-            chain.offset[p, 0] = rule.hull[h, 0]
-            chain.offset[p, 1] = rule.hull[h, 1]
-            chain.offset[p, 2] = -length * rule.tip_at[t]
-            chain.weight[p] = share * length / hulls
-            p += 1
+    for h in range(hulls):
+        chain.offset[p, 0] = rule.hull[h, 0]
+        chain.offset[p, 1] = rule.hull[h, 1]
+        chain.offset[p, 2] = along
+        chain.weight[p] = weight / hulls
+        p += 1
     return p
 
 

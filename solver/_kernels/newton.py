@@ -15,9 +15,10 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.energy import Scratch, State
+from solver._kernels.energy import slide_of
 from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
+from solver._kernels.problem import Problem, State
 from solver._kernels.rotation import jacobian_terms, sine_terms, turn
 from solver._kernels.small import (
     Nine,
@@ -82,8 +83,8 @@ def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, proje
 
 
 @kernel
-def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six, Three]:
-    """What a point off its node adds to V_pr, V_rr and v_r: its place moves by δr x offset, and curves."""
+def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six]:
+    """What a point off its node adds to V_pr and V_rr: its place moves by δr x offset, and curves."""
     d = cross_matrix((-offset[0], -offset[1], -offset[2]))
     c = times(full(stiffness), d)
     h = times(transpose(d), c)
@@ -97,7 +98,7 @@ def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six, Three
         h[2] + 0.5 * (f[0] * o[2] + f[2] * o[0]),
         h[5] + 0.5 * (f[1] * o[2] + f[2] * o[1]),
     )
-    return c, rr, cross(o, f)
+    return c, rr
 
 
 @kernel
@@ -205,103 +206,127 @@ def solve_block(q: Six, twisting: bool) -> Nine:
 
 
 @kernel
-def sweep(
-    chain: Chain,
-    stiffness: float,
-    state: State,
-    which: int,
-    k: int,
-    scratch: Scratch,
-    twisting: bool,
-    project: bool,
-    levenberg: float,
-    report: Any,
-) -> None:
-    """One backward Riccati recursion; gains go to scratch.gain (k, 3, 7), see ``rollout``.
+def node_gradient(problem: Problem, which: int, n: int, frame: Nine) -> tuple[Three, Three]:
+    """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
+    chain, state = problem.chain, problem.state
+    load = apply_transposed(frame, load3(chain.load[n]))
+    f, g = (-load[0], -load[1], -load[2]), ZERO3
+    for i in range(chain.first[n], chain.first[n + 1]):
+        d = state.depth[which, i]
+        if d != 0.0:
+            force = point_force(frame, state.jet[which, i], problem.stiffness * chain.weight[i] * d)
+            f, g = add3(f, force), add3(g, cross(load3(chain.offset[i]), force))
+        if problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0:
+            force, _ = rubbing(problem, which, n, i, frame)
+            f, g = add3(f, force), add3(g, cross(load3(chain.offset[i]), force))
+    return f, g
 
-    report (12,): [0] Newton decrement (predicted fall of the energy), [1] largest gradient, N mm, [2] joint of
-    the first indefinite block from the tip or -1, [3:5] its direction of negative curvature, [5] that curvature,
-    [6:9] gradient with respect to the entry point, N, [9:12] with respect to turning the base frame, N mm.
+
+@kernel
+def node_hessian(problem: Problem, which: int, n: int, frame: Nine, project: bool) -> tuple[Six, Nine, Six]:
+    """Hessian of the same: V_pp, V_pr and V_rr."""
+    chain, state = problem.chain, problem.state
+    p, c, h = ZERO6, ZERO9, ZERO6
+    for i in range(chain.first[n], chain.first[n + 1]):
+        d = state.depth[which, i]
+        rubs = problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0
+        if d == 0.0 and not rubs:
+            continue
+        force, hessian = ZERO3, ZERO6
+        if d != 0.0:
+            curvature = problem.stiffness * chain.weight[i]
+            jet = state.jet[which, i]
+            force = point_force(frame, jet, curvature * d)
+            hessian = point_stiffness(frame, jet, curvature * d, curvature, project)
+        if rubs:
+            more, stiffer = rubbing(problem, which, n, i, frame)
+            force, hessian = add3(force, more), add6(hessian, stiffer)
+        p = add6(p, hessian)
+        offset = load3(chain.offset[i])
+        if offset != ZERO3:
+            dc, dh = lever(offset, force, hessian)
+            c, h = add9(c, dc), add6(h, dh)
+    return p, c, h
+
+
+@kernel
+def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[Three, Six]:
+    """Gradient and Hessian of a point's friction, in the frame of its node."""
+    way = problem.scratch.fraction[3:]
+    size = slide_of(problem, which, n, i, way)
+    s = apply_transposed(frame, load3(way))
+    m = apply_transposed(frame, load3(problem.friction.normal[i]))
+    w = problem.friction.coefficient * problem.friction.load[i] / size
+    q = w / (size * size)
+    hessian = (
+        w * (1 - m[0] * m[0]) - q * s[0] * s[0],
+        w * (1 - m[1] * m[1]) - q * s[1] * s[1],
+        w * (1 - m[2] * m[2]) - q * s[2] * s[2],
+        -w * m[0] * m[1] - q * s[0] * s[1],
+        -w * m[0] * m[2] - q * s[0] * s[2],
+        -w * m[1] * m[2] - q * s[1] * s[2],
+    )
+    return (w * s[0], w * s[1], w * s[2]), hessian
+
+
+@kernel
+def joint_blocks(
+    chain: Chain, j: int, u: Three, jac: Nine, h: Six, g: Three, twisting: bool, levenberg: float, report: Any
+) -> tuple[Three, Nine]:
+    """Q_u of a joint and minus the inverse of its Q_uu, made positive where it is not (and that noted)."""
+    bend = chain.bend[j]
+    twist = chain.twist[j] if twisting else 0.0
+    q_u = add3(apply_transposed(jac, g), (bend * u[0], bend * u[1], twist * u[2]))
+    q = add6(conjugate(transpose(jac), h), jacobian_curvature(g, u))
+    extra = 1.0 + levenberg
+    q = (q[0] + bend * extra, q[1] + bend * extra, q[2] + twist * extra, q[3], q[4], q[5])
+    shift = smallest_shift(q[0], q[3], q[1], CURVATURE_FLOOR * bend)
+    if shift > 0.0:
+        if report[2] < 0.0:
+            note_direction(q, j, report)
+        q = (q[0] + shift, q[1] + shift, q[2] + shift, q[3], q[4], q[5])
+    if twisting:
+        q = lift_twist(q, twist)
+    return q_u, solve_block(q, twisting)
+
+
+@kernel
+def sweep(
+    problem: Problem, which: int, k: int, near: int, project: bool, levenberg: float, report: Any
+) -> None:
+    """One backward Riccati recursion, from the tip to joint ``near``; gains go to scratch.gain, see ``rollout``.
+
+    report: [0] Newton decrement (predicted fall of the energy), [2] joint of the first indefinite block from
+    the tip or -1, [3:5] its direction of negative curvature, [5] that curvature.
     """
-    x_u, x_r = state.u[which], state.r[which]
+    chain, state = problem.chain, problem.state
     p, c, h, f, g = ZERO6, ZERO9, ZERO6, ZERO3, ZERO3
-    exact_f, exact_g = ZERO3, ZERO3
     decrement = 0.0
-    largest = 0.0
     report[2] = -1.0
-    for n in range(k, 0, -1):
+    for n in range(k, near, -1):
         j = n - 1
-        frame = load9(x_r[n])
-        load = apply_transposed(frame, load3(chain.load[n]))
-        f = (f[0] - load[0], f[1] - load[1], f[2] - load[2])
-        exact_f = (exact_f[0] - load[0], exact_f[1] - load[1], exact_f[2] - load[2])
-        for i in range(chain.first[n], chain.first[n + 1]):
-            d = state.depth[which, i]
-            if d != 0.0:
-                curvature = stiffness * chain.weight[i]
-                jet = state.jet[which, i]
-                force = point_force(frame, jet, curvature * d)
-                hessian = point_stiffness(frame, jet, curvature * d, curvature, project)
-                p, f, exact_f = add6(p, hessian), add3(f, force), add3(exact_f, force)
-                offset = load3(chain.offset[i])
-                if offset != ZERO3:
-                    dc, dh, dg = lever(offset, force, hessian)
-                    c, h, g, exact_g = add9(c, dc), add6(h, dh), add3(g, dg), add3(exact_g, dg)
-        length = chain.length[j]
-        c, h, g = cross_segment(length, p, c, h, f, g)
-        exact_g = (exact_g[0] - length * exact_f[1], exact_g[1] + length * exact_f[0], exact_g[2])
-        bend, twist = chain.bend[j], chain.twist[j]
-        u = load3(x_u[j])
+        frame = load9(state.r[which, n])
+        df, dg = node_gradient(problem, which, n, frame)
+        dp, dc, dh = node_hessian(problem, which, n, frame, project)
+        p, c, h, f, g = add6(p, dp), add9(c, dc), add6(h, dh), add3(f, df), add3(g, dg)
+        c, h, g = cross_segment(chain.length[j], p, c, h, f, g)
+        u = load3(state.u[which, j])
         jac = jacobian(u[0], u[1], u[2])
-        if not twisting:
+        if not problem.twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
-            twist = 0.0
-        moment = (bend * u[0], bend * u[1], twist * u[2])
-        q_u = add3(apply_transposed(jac, g), moment)
-        exact = add3(apply_transposed(jac, exact_g), moment)
-        largest = max(largest, abs(exact[0]), abs(exact[1]), abs(exact[2]))
+        q_u, inverse = joint_blocks(chain, j, u, jac, h, g, problem.twisting, levenberg, report)
         jac_t = transpose(jac)
-        curved = jacobian_curvature(g, u)
-        q_uu = add6(conjugate(jac_t, h), curved)
-        extra = bend * (1.0 + levenberg)
-        q_uu = (
-            q_uu[0] + extra,
-            q_uu[1] + extra,
-            q_uu[2] + twist * (1.0 + levenberg),
-            q_uu[3],
-            q_uu[4],
-            q_uu[5],
-        )
-        shift = smallest_shift(q_uu[0], q_uu[3], q_uu[1], CURVATURE_FLOOR * bend)
-        if shift > 0.0:
-            if report[2] < 0.0:
-                note_direction(q_uu, j, report)
-            q_uu = (q_uu[0] + shift, q_uu[1] + shift, q_uu[2] + shift, q_uu[3], q_uu[4], q_uu[5])
-        if twisting:
-            q_uu = lift_twist(q_uu, twist)
-        inverse = solve_block(q_uu, twisting)
         q_up = times_transposed(jac_t, c)
         q_ur = times(jac_t, add9(full(h), cross_matrix((0.5 * g[0], 0.5 * g[1], 0.5 * g[2]))))
-        feed = apply(inverse, q_u)
-        gain_p = times(inverse, q_up)
-        gain_r = times(inverse, q_ur)
-        store_gain(scratch.gain[j], feed, gain_p, gain_r)
+        feed, gain_p, gain_r = apply(inverse, q_u), times(inverse, q_up), times(inverse, q_ur)
+        store_gain(problem.scratch.gain[j], feed, gain_p, gain_r)
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
-        p = add6(p, gram(q_up, gain_p))
-        c = add9(c, times(transpose(q_up), gain_r))
-        h = add6(h, gram(q_ur, gain_r))
-        f = add3(f, apply_transposed(q_up, feed))
-        g = add3(g, apply_transposed(q_ur, feed))
         e = turn(chain.rest[j], u[0], u[1], u[2])
-        p, h = conjugate(e, p), conjugate(e, h)
-        c = times_transposed(times(e, c), e)
-        f, g = apply(e, f), apply(e, g)
-        exact_f, exact_g = apply(e, exact_f), apply(e, exact_g)
-    base = load9(x_r[0])
-    report[0], report[1] = decrement, largest
-    world = apply(base, exact_f)
-    report[6], report[7], report[8] = world[0], world[1], world[2]
-    report[9], report[10], report[11] = exact_g[0], exact_g[1], exact_g[2]
+        p, h = conjugate(e, add6(p, gram(q_up, gain_p))), conjugate(e, add6(h, gram(q_ur, gain_r)))
+        c = times_transposed(times(e, add9(c, times(transpose(q_up), gain_r))), e)
+        f = apply(e, add3(f, apply_transposed(q_up, feed)))
+        g = apply(e, add3(g, apply_transposed(q_ur, feed)))
+    report[0] = decrement
 
 
 @kernel
@@ -347,47 +372,52 @@ def place(chain: Chain, state: State, which: int, k: int) -> None:
 
 
 @kernel
-def rollout(
-    chain: Chain, state: State, which: int, k: int, gain: Any, fraction: float, twisting: bool
-) -> None:
-    """Take a fraction of Newton's step forward with feedback: the other state becomes the trial.
+def rollout(problem: Problem, which: int, k: int, near: int, fraction: float) -> None:
+    """Take a fraction of Newton's step forward with feedback, from joint ``near`` on: the trial state.
 
     Feedback answers the true displacement of each node, so the trial stays close to the plan even where the
     second-order model of a thousand rotations would not.
     """
+    chain, state = problem.chain, problem.state
     old_u, old_x, old_r = state.u[which], state.x[which], state.r[which]
     u, x, r = state.u[1 - which], state.x[1 - which], state.r[1 - which]
-    x[0, :] = old_x[0]
-    frame = load9(old_r[0])
-    store9(r[0], frame)
-    place3 = load3(x[0])
-    for j in range(k):
-        old = load9(old_r[j])
-        moved = (place3[0] - old_x[j, 0], place3[1] - old_x[j, 1], place3[2] - old_x[j, 2])
-        turned = relative(old, frame)
+    for n in range(near + 1):
+        x[n, 0], x[n, 1], x[n, 2] = old_x[n, 0], old_x[n, 1], old_x[n, 2]
+        store9(r[n], load9(old_r[n]))
+        if n < near:
+            u[n, 0], u[n, 1], u[n, 2] = old_u[n, 0], old_u[n, 1], old_u[n, 2]
+    frame = load9(old_r[near])
+    at = load3(x[near])
+    for j in range(near, k):
+        moved = (at[0] - old_x[j, 0], at[1] - old_x[j, 1], at[2] - old_x[j, 2])
+        turned = relative(load9(old_r[j]), frame)
         ahead = load9(old_r[j + 1])
-        dp = apply_transposed(ahead, moved)
-        dr = apply_transposed(ahead, turned)
-        m = gain[j]
-        s0 = fraction * m[0, 0] + m[0, 1] * dp[0] + m[0, 2] * dp[1] + m[0, 3] * dp[2]
-        s1 = fraction * m[1, 0] + m[1, 1] * dp[0] + m[1, 2] * dp[1] + m[1, 3] * dp[2]
-        s2 = 0.0
-        s0 += m[0, 4] * dr[0] + m[0, 5] * dr[1] + m[0, 6] * dr[2]
-        s1 += m[1, 4] * dr[0] + m[1, 5] * dr[1] + m[1, 6] * dr[2]
-        if twisting:
-            s2 = fraction * m[2, 0] + m[2, 1] * dp[0] + m[2, 2] * dp[1] + m[2, 3] * dp[2]
-            s2 += m[2, 4] * dr[0] + m[2, 5] * dr[1] + m[2, 6] * dr[2]
-        v0, v1, v2 = limited(old_u[j, 0], old_u[j, 1], old_u[j, 2], s0, s1, s2)
-        u[j, 0], u[j, 1], u[j, 2] = v0, v1, v2
-        frame = times(frame, turn(chain.rest[j], v0, v1, v2))
+        s = answer(
+            problem.scratch.gain[j], fraction, apply_transposed(ahead, moved), apply_transposed(ahead, turned)
+        )
+        v = limited(old_u[j, 0], old_u[j, 1], old_u[j, 2], s[0], s[1], s[2])
+        u[j, 0], u[j, 1], u[j, 2] = v
+        frame = times(frame, turn(chain.rest[j], v[0], v[1], v[2]))
         store9(r[j + 1], frame)
         length = chain.length[j]
-        place3 = (
-            place3[0] + length * frame[2],
-            place3[1] + length * frame[5],
-            place3[2] + length * frame[8],
-        )
-        x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = place3
+        at = (at[0] + length * frame[2], at[1] + length * frame[5], at[2] + length * frame[8])
+        x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = at
+
+
+@kernel
+def answer(gain: Any, fraction: float, dp: Three, dr: Three) -> Three:
+    """Change of a joint's control: a fraction of its own step, plus feedback to where its node came to be."""
+    s = (fraction * gain[0, 0], fraction * gain[1, 0], fraction * gain[2, 0])
+    out = (
+        s[0] + gain[0, 1] * dp[0] + gain[0, 2] * dp[1] + gain[0, 3] * dp[2],
+        s[1] + gain[1, 1] * dp[0] + gain[1, 2] * dp[1] + gain[1, 3] * dp[2],
+        s[2] + gain[2, 1] * dp[0] + gain[2, 2] * dp[1] + gain[2, 3] * dp[2],
+    )
+    return (
+        out[0] + gain[0, 4] * dr[0] + gain[0, 5] * dr[1] + gain[0, 6] * dr[2],
+        out[1] + gain[1, 4] * dr[0] + gain[1, 5] * dr[1] + gain[1, 6] * dr[2],
+        out[2] + gain[2, 4] * dr[0] + gain[2, 5] * dr[1] + gain[2, 6] * dr[2],
+    )
 
 
 @kernel
@@ -415,33 +445,31 @@ def limited(u0: float, u1: float, u2: float, s0: float, s1: float, s2: float) ->
 
 
 @kernel
-def costate(
-    chain: Chain, stiffness: float, state: State, which: int, k: int, twisting: bool, report: Any
-) -> None:
-    """Exact gradient of the total energy: the first-order part of ``sweep``, into report[1] and report[6:12]."""
+def costate(problem: Problem, which: int, k: int, report: Any) -> None:
+    """Exact gradient of the total energy: the first-order part of ``sweep``, without elimination.
+
+    report: [1] largest component with respect to a joint, N mm, [6:9] with respect to the entry point, N,
+    [9:12] to turning the base frame, N mm, [12:15], [15:18] to turning segments 0 and 1, in their own frames.
+    """
+    chain, state = problem.chain, problem.state
     f, g = ZERO3, ZERO3
     largest = 0.0
     for n in range(k, 0, -1):
-        frame = load9(state.r[which, n])
-        load = apply_transposed(frame, load3(chain.load[n]))
-        f = (f[0] - load[0], f[1] - load[1], f[2] - load[2])
-        for i in range(chain.first[n], chain.first[n + 1]):
-            d = state.depth[which, i]
-            if d != 0.0:
-                force = point_force(frame, state.jet[which, i], stiffness * chain.weight[i] * d)
-                f = add3(f, force)
-                g = add3(g, cross(load3(chain.offset[i]), force))
-        length = chain.length[n - 1]
+        j = n - 1
+        df, dg = node_gradient(problem, which, n, load9(state.r[which, n]))
+        f, g = add3(f, df), add3(g, dg)
+        length = chain.length[j]
         g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
-        u = load3(state.u[which, n - 1])
-        bend = chain.bend[n - 1]
+        u = load3(state.u[which, j])
         moment = apply_transposed(jacobian(u[0], u[1], u[2]), g)
-        largest = max(largest, abs(moment[0] + bend * u[0]), abs(moment[1] + bend * u[1]))
-        if twisting:
-            largest = max(largest, abs(moment[2] + chain.twist[n - 1] * u[2]))
-        e = turn(chain.rest[n - 1], u[0], u[1], u[2])
+        largest = max(largest, abs(moment[0] + chain.bend[j] * u[0]), abs(moment[1] + chain.bend[j] * u[1]))
+        if problem.twisting:
+            largest = max(largest, abs(moment[2] + chain.twist[j] * u[2]))
+        if j < 2:
+            at = 12 + 3 * j
+            report[at], report[at + 1], report[at + 2] = g
+        e = turn(chain.rest[j], u[0], u[1], u[2])
         f, g = apply(e, f), apply(e, g)
-    world = apply(load9(state.r[which, 0]), f)
     report[1] = largest
-    report[6], report[7], report[8] = world[0], world[1], world[2]
-    report[9], report[10], report[11] = g[0], g[1], g[2]
+    report[6], report[7], report[8] = apply(load9(state.r[which, 0]), f)
+    report[9], report[10], report[11] = g

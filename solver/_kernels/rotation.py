@@ -89,3 +89,19 @@ def bend_towards(rest: float, t0: float, t1: float, t2: float) -> tuple[float, f
     if sine < 1e-300:
         return (angle, 0.0)
     return -t1 * angle / sine, p0 * angle / sine
+
+
+@kernel
+def with_twist(u0: float, u1: float, twist: float) -> tuple[float, float, float]:
+    """Return the control of a bend (u0, u1) followed by a twist about e3: the direction stays, the frame turns."""
+    if twist == 0.0:
+        return u0, u1, 0.0
+    s, _ = sine_terms(0.25 * (u0 * u0 + u1 * u1))
+    c = math.cos(0.5 * math.sqrt(u0 * u0 + u1 * u1))
+    b0, b1 = 0.5 * s * u0, 0.5 * s * u1
+    ct, st = math.cos(0.5 * twist), math.sin(0.5 * twist)
+    # product of the two unit quaternions
+    w, v0, v1, v2 = c * ct, b0 * ct + b1 * st, b1 * ct - b0 * st, c * st
+    size = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    factor = 2 * math.atan2(size, w) / size if size > 0.0 else 2.0
+    return factor * v0, factor * v1, factor * v2

@@ -1,0 +1,76 @@
+"""What the kernels hand to each other: named tuples of arrays and scalars, nothing else."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from solver._kernels.layout import Chain
+from solver._kernels.spline import Field
+
+# places in the work counters
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, WINDOW, SAVED = range(9)
+COUNTERS = 9
+# places in the list of energies
+BENDING, WALL, LOAD, RUBBING = range(4)
+
+
+class State(NamedTuple):
+    """Two states of a chain side by side (axis 0), the current one and the trial.
+
+    u : (2, k, 3) rad.   x : (2, k + 1, 3) mm.   r : (2, k + 1, 3, 3), columns are material axes 1, 2 and e3.
+    depth : (2, p) penetration mm.   jet : (2, p, 10), see ``spline``, per mm.   parts : (2, 4) energies, N mm.
+    """
+
+    u: Any
+    x: Any
+    r: Any
+    depth: Any
+    jet: Any
+    parts: Any
+
+
+class Scratch(NamedTuple):
+    """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights."""
+
+    gain: Any
+    anchor: Any
+    counter: Any
+    fraction: Any
+    weights: Any
+
+
+class Switch(NamedTuple):
+    """Skips, all on except in tests."""
+
+    clearance: bool = True
+    cheap: bool = True
+    idle: bool = True
+    window: bool = True
+
+
+class Friction(NamedTuple):
+    """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
+
+    coefficient : 0 is no friction at all.     slip : length below which a point still sticks, mm.
+    start : (p, 3) where each point was before the step, mm.     normal : (p, 3).     load : (p,) N.
+    """
+
+    coefficient: float
+    slip: float
+    start: Any
+    normal: Any
+    load: Any
+
+
+class Problem(NamedTuple):
+    """A wire in a wall. stiffness : wall, N/mm per mm, 0 is no wall.  spacing : of the grid, mm."""
+
+    field: Field
+    stiffness: float
+    spacing: float
+    friction: Friction
+    chain: Chain
+    state: State
+    scratch: Scratch
+    switch: Switch
+    twisting: bool
