@@ -1,0 +1,150 @@
+"""Triangles and polylines from .vtp (ASCII, inline base64 or appended, zlib or not) and .stl (ASCII or binary)."""
+
+from __future__ import annotations
+
+import base64
+import re
+import struct
+import xml.etree.ElementTree as ET
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.load import LoadError
+
+_TYPES = {
+    "Float32": "f4", "Float64": "f8", "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2",
+    "Int32": "i4", "UInt32": "u4", "Int64": "i8", "UInt64": "u8",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """points_mm (n, 3) as in the file; triangles (t, 3) and lines of point indices; ``ras`` if the file says so."""
+
+    points_mm: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    lines: tuple[NDArray[np.int64], ...] = ()
+    ras: bool = False
+
+
+def _bad(path: Path, got: str, allowed: str, do: str) -> LoadError:
+    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
+
+
+def _is_ras(text: bytes) -> bool:
+    """3D Slicer notes its coordinate system in a comment or header."""
+    return re.search(rb"SPACE=RAS", text[:4096]) is not None
+
+
+def _blocks(data: bytes, header: str, compressed: bool) -> bytes:
+    """The payload of one binary array (after base64): a length, or a table of zlib blocks, comes first."""
+    size = struct.calcsize(header)
+    first = struct.unpack(header, data[:size])[0]
+    if not compressed:
+        return data[size : size + first]
+    sizes = struct.unpack(f"{header[0]}{first}{header[1]}", data[3 * size : (3 + first) * size])
+    out, at = [], (3 + first) * size
+    for n in sizes:
+        out.append(zlib.decompress(data[at : at + n]))
+        at += n
+    return b"".join(out)
+
+
+def _base64(text: str, header: str, compressed: bool) -> bytes:
+    """Decode base64 in which VTK codes the header apart from the data when it compresses."""
+    clean = "".join(text.split())
+    if not compressed:
+        return base64.b64decode(clean)
+    size = struct.calcsize(header)
+    blocks = struct.unpack(header, base64.b64decode(clean[:24])[:size])[0]
+    coded = 4 * ((((3 + blocks) * size) + 2) // 3)
+    return base64.b64decode(clean[:coded]) + base64.b64decode(clean[coded:])
+
+
+class _Vtp:
+    """One parsed .vtp file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        raw = path.read_bytes()
+        self.ras = _is_ras(raw)
+        self.tail = b""
+        match = re.search(rb"<AppendedData[^>]*encoding=\"(raw|base64)\"[^>]*>\s*_", raw)
+        if match:
+            self.encoding = match.group(1).decode()
+            end = raw.rfind(b"</AppendedData>")
+            self.tail = raw[match.end() : end]
+            raw = raw[: match.end()] + b"</AppendedData></VTKFile>"
+        try:
+            self.root = ET.fromstring(raw)
+        except ET.ParseError as error:
+            raise _bad(path, f"broken XML ({error})", "a VTK PolyData file", "write it again") from error
+        order = "<" if self.root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
+        self.header = order + ("Q" if self.root.get("header_type") == "UInt64" else "I")
+        self.compressed = bool(self.root.get("compressor"))
+        if self.compressed and "ZLib" not in str(self.root.get("compressor")):
+            got = f"compressor {self.root.get('compressor')}"
+            raise _bad(path, got, "vtkZLibDataCompressor or none", "save it uncompressed")
+
+    def array(self, node: ET.Element) -> NDArray[Any]:
+        """One DataArray, flat."""
+        kind = np.dtype(self.header[0] + _TYPES[str(node.get("type"))])
+        form = node.get("format")
+        if form == "ascii":
+            return np.array((node.text or "").split(), dtype=float).astype(kind)
+        if form == "binary":
+            data = _blocks(
+                _base64(node.text or "", self.header, self.compressed), self.header, self.compressed
+            )
+            return np.frombuffer(data, kind)
+        tail = self.tail[int(node.get("offset", "0")) :]
+        data = tail if self.encoding == "raw" else _base64(tail.decode(), self.header, self.compressed)
+        return np.frombuffer(_blocks(data, self.header, self.compressed), kind)
+
+
+def _cells(file: _Vtp, piece: ET.Element, kind: str) -> list[NDArray[np.int64]]:
+    node = piece.find(kind)
+    if node is None:
+        return []
+    arrays = {str(a.get("Name")): file.array(a).astype(np.int64) for a in node.findall("DataArray")}
+    if "offsets" not in arrays or len(arrays["offsets"]) == 0:
+        return []
+    return [c for c in np.split(arrays["connectivity"], arrays["offsets"]) if len(c)]
+
+
+def read_vtp(path: Path) -> Shapes:
+    """Points, lines and triangles (polygons are fanned) of a .vtp file. Raises LoadError for any other content."""
+    file = _Vtp(path)
+    piece = file.root.find("./PolyData/Piece")
+    node = None if piece is None else piece.find("./Points/DataArray")
+    if piece is None or node is None:
+        raise _bad(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
+    points = file.array(node).astype(np.float64).reshape(-1, 3)
+    fans = [
+        np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
+        for p in _cells(file, piece, "Polys")
+        if len(p) > 2
+    ]
+    triangles = np.concatenate(fans) if fans else np.zeros((0, 3), np.int64)
+    return Shapes(points, triangles, tuple(_cells(file, piece, "Lines")), file.ras)
+
+
+def read_stl(path: Path) -> Shapes:
+    """Triangles of an .stl file; equal corners are merged so that the surface is closed."""
+    raw = path.read_bytes()
+    count = struct.unpack("<I", raw[80:84])[0] if len(raw) >= 84 else -1
+    if len(raw) == 84 + 50 * count:
+        record = np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("extra", "<u2")])
+        corners = np.frombuffer(raw[84:], record)["corner"].reshape(-1, 3).astype(np.float64)
+    else:
+        found = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", raw)
+        corners = np.array(found, dtype=float).reshape(-1, 3)
+    if len(corners) == 0 or len(corners) % 3:
+        raise _bad(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
+    points, index = np.unique(corners, axis=0, return_inverse=True)
+    return Shapes(points, index.reshape(-1, 3).astype(np.int64), (), _is_ras(raw))

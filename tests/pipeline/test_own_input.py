@@ -1,0 +1,142 @@
+"""Own lumens and curves: each kind of file against the analytic shape it was written from."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import SimpleITK as sitk
+from skimage.measure import marching_cubes
+
+from pipeline.load import LoadError
+from pipeline.lumen_input import read_lumen
+from pipeline.trace_input import read_curve
+from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
+
+RADIUS, LENGTH = 1.5, 12.0
+START = np.array([3.0, -2.0, 1.0])
+
+
+def true_distance(points):
+    """A capsule along x."""
+    local = points - START
+    along = np.clip(local[..., 0], 0, LENGTH)
+    foot = np.stack([along, 0 * along, 0 * along], axis=-1)
+    return np.linalg.norm(local - foot, axis=-1) - RADIUS
+
+
+def errors(lumen, within=1.0):
+    """Errors (mm) of the distance near the wall."""
+    index = np.argwhere(np.abs(lumen.distance.values) < within)
+    return lumen.distance.values[tuple(index.T)] - true_distance(lumen.distance.to_mm(index))
+
+
+def capsule(voxel=0.25):
+    """Signed distance on a lattice, its voxel size and origin."""
+    origin = START - RADIUS - 1.0
+    shape = np.ceil((np.array([LENGTH, 0, 0]) + 2 * RADIUS + 2.0) / voxel).astype(int)
+    index = np.stack(np.meshgrid(*[np.arange(n) for n in shape], indexing="ij"), axis=-1)
+    return true_distance(index * voxel + origin), voxel, origin
+
+
+def surface():
+    distance, voxel, origin = capsule()
+    vertices, triangles, _, _ = marching_cubes(distance, 0.0)
+    return vertices * voxel + origin, triangles
+
+
+def test_centreline_with_radius(tmp_path):
+    rows = ["# a comment", f"1 0 {START[0]} {START[1]} {START[2]} {RADIUS} -1"]
+    rows += [
+        f"{n + 2} 0 {START[0] + LENGTH * (n + 1) / 3} {START[1]} {START[2]} {RADIUS} {n + 1}"
+        for n in range(3)
+    ]
+    (tmp_path / "tree.swc").write_text("\n".join(rows))
+    assert np.abs(errors(read_lumen(tmp_path / "tree.swc"))).max() < 1e-5
+    points = [{"position": list((START + np.array([LENGTH * t, 0, 0])) * [-1, -1, 1])} for t in (0, 0.5, 1)]
+    measure = [{"name": "Radius", "controlPointValues": [RADIUS] * 3}]
+    markup = {"markups": [{"coordinateSystem": "RAS", "controlPoints": points, "measurements": measure}]}
+    (tmp_path / "tree.mrk.json").write_text(json.dumps(markup))
+    assert np.abs(errors(read_lumen(tmp_path / "tree.mrk.json"))).max() < 1e-5
+
+
+def write_binary_stl(path, vertices, triangles):
+    with path.open("wb") as file:
+        file.write(b"\0" * 80 + struct.pack("<I", len(triangles)))
+        for t in triangles:
+            file.write(struct.pack("<12fH", 0, 0, 0, *vertices[t].ravel(), 0))
+
+
+@pytest.mark.parametrize("kind", ["stl", "ascii.stl", "vtp"])
+def test_closed_surface(tmp_path, kind):
+    vertices, triangles = surface()
+    path = tmp_path / f"lumen.{kind}"
+    if kind == "stl":
+        write_binary_stl(path, vertices, triangles)
+    elif kind == "vtp":
+        write_surface_vtp(path, vertices, triangles)
+    else:
+        corners = "\n".join(f"vertex {p[0]} {p[1]} {p[2]}" for t in triangles for p in vertices[t])
+        path.write_text(f"solid lumen\n{corners}\nendsolid")
+    error = errors(read_lumen(path))
+    assert np.sqrt(np.mean(error**2)) < 0.02
+    assert np.abs(error).max() < 0.15
+
+
+def test_an_open_surface_is_refused(tmp_path):
+    vertices, triangles = surface()
+    write_binary_stl(tmp_path / "open.stl", vertices, triangles[:-20])
+    with pytest.raises(LoadError, match="open edges"):
+        read_lumen(tmp_path / "open.stl")
+
+
+def test_label_map(tmp_path):
+    distance, voxel, origin = capsule()
+    image = sitk.GetImageFromArray((distance < 0).astype(np.uint8).T)
+    image.SetSpacing([voxel] * 3)
+    image.SetOrigin(origin.tolist())
+    sitk.WriteImage(image, str(tmp_path / "label.nrrd"))
+    error = errors(read_lumen(tmp_path / "label.nrrd"), within=0.3)
+    assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
+
+
+def test_curves_come_back_as_they_were_written(tmp_path):
+    points = np.cumsum(np.random.default_rng(0).normal(size=(20, 3)), axis=0)
+    write_polyline_vtp(tmp_path / "a.vtp", points)
+    write_markups_curve(tmp_path / "a.mrk.json", points, "wire")
+    lines = [",".join(map(str, p)) for p in points]
+    (tmp_path / "a.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]))
+    (tmp_path / "bare.csv").write_text("\n".join(lines))
+    for name in ("a.vtp", "a.mrk.json", "a.csv", "bare.csv"):
+        np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, atol=1e-6)
+
+
+@pytest.mark.parametrize("text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5"])
+def test_a_curve_that_is_none_is_refused(tmp_path, text):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(LoadError, match="expected"):
+        read_curve(tmp_path / "a.csv")
+
+
+def test_ascii_and_compressed_vtp(tmp_path):
+    import base64
+    import zlib
+
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 2, 0]])
+    cells = "<Lines><DataArray type='Int64' Name='connectivity' format='ascii'>0 1 2</DataArray>"
+    cells += "<DataArray type='Int64' Name='offsets' format='ascii'>3</DataArray></Lines>"
+    ascii_points = f"format='ascii'>{' '.join(map(str, points.ravel()))}"
+    raw = points.astype("<f4").tobytes()
+    squeezed = zlib.compress(raw)
+    header = struct.pack("<4I", 1, len(raw), 0, len(squeezed))
+    packed = f"format='binary'>{(base64.b64encode(header) + base64.b64encode(squeezed)).decode()}"
+    for name, kind, body, extra in (
+        ("a.vtp", "Float64", ascii_points, ""),
+        ("z.vtp", "Float32", packed, "compressor='vtkZLibDataCompressor' header_type='UInt32'"),
+    ):
+        text = f"<VTKFile type='PolyData' byte_order='LittleEndian' {extra}><PolyData><Piece><Points>"
+        text += f"<DataArray type='{kind}' Name='p' NumberOfComponents='3' {body}</DataArray></Points>{cells}"
+        (tmp_path / name).write_text(text + "</Piece></PolyData></VTKFile>")
+        np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points)
