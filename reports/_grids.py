@@ -79,6 +79,16 @@ def cards(statistics: Mapping[str, Any]) -> list[dict[str, str]]:
     return shown
 
 
+def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The one number over all validation cases, with what it rests on."""
+    if number(pooled.get("rms_mm")) == NOTHING:
+        return []
+    label = "mm rms, simulated to traced wire, all validation cases"
+    groups = f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}"
+    first = {"value": number(pooled["rms_mm"]), "label": _with_detail("rms_mm", label, pooled)}
+    return [first, {"value": groups, "label": "validation cases / groups of them, which the interval resamples"}]
+
+
 def frames(errors: pd.DataFrame) -> Grid:
     """One row per frame; columns without any value are left out."""
     grid = _grid(errors, ERRORS_COLUMNS, _FRAME_COLUMNS)

@@ -42,13 +42,14 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "warnings": result.get("warnings", ()),
         "assumptions": result.get("assumptions", ()),
         "cards": _grids.cards(result.get("statistics", {})),
+        "points": (case_dir / "points.csv.gz").exists(),
         "compared": bool(case.errors["rms_mm"].notna().any()),
         "scene": scene.name if scene else "",
         "scene_note": scene_note,
         "sections": sections,
         "frames": _grids.frames(case.errors) if len(case.errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
-        "physics": list(flatten({k: result.get(k, {}) for k in ("wire", "wall", "geometry")})),
+        "physics": list(flatten({k: result.get(k, {}) for k in ("wire", "wall", "entry", "geometry")})),
         "config": settings(result.get("config", {})),
         "provenance": list(flatten(result.get("provenance", {}))),
         "inputs": result.get("inputs", ()),
@@ -64,13 +65,15 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
     summary = _optional(out_dir / "summary.csv", tables.read_summary, SUMMARY_COLUMNS)
     sweep = _optional(out_dir / "sweep.csv", tables.read_sweep, SWEEP_COLUMNS)
     run = RunFiles({case.name: case.errors for case in cases}, summary, sweep)
-    links = {case.name: f"cases/{quote(case.folder.name)}/report.html" for case in cases}
+    links = _links(cases)
     failures = _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     page = {
         "title": "wireval",
         **_headline(cases, failures),
         "failures": failures,
+        "assumptions": [text for content in runs.values() for text in content.get("assumptions", ())],
+        "cards": _grids.overall(next((c["overall"] for c in runs.values() if c.get("overall")), {})),
         "sections": draw_sections("run", RUN_FIGURES, run, out_dir, embed),
         "cases": _grids.cases(summary, links),
         "sweep": _grids.sweep(sweep) if len(sweep) else None,
@@ -107,6 +110,12 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     return [{**row, "link": links.get(row["case"], "")} for row in rows]
 
 
+def _links(cases: list[CaseFiles]) -> dict[str, str]:
+    """Pages by case; a case that was not rendered has none."""
+    pages = {case.name: case.folder / "report.html" for case in cases}
+    return {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
+
+
 def _headline(cases: list[CaseFiles], failures: list[dict[str, Any]]) -> dict[str, Any]:
     n_good = sum(len(case.good) for case in cases)
     n_frames = sum(len(case.errors) for case in cases)
@@ -137,4 +146,4 @@ def _files(case_dir: Path) -> list[dict[str, str]]:
 
 
 def _version(result: Any) -> str:
-    return str(result.get("provenance", {}).get("versions", {}).get("wireval", ""))
+    return str(result.get("provenance", {}).get("wireval", ""))

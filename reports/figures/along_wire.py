@@ -20,7 +20,22 @@ def error_along_wire(case: CaseFiles) -> Drawing | None:
 
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
     """Magnitude of the wall's force along the simulated wire."""
-    return _heat_map(case.points, "contact_force_N", "contact force, N")
+    points = case.points if has(case.points, "contact_force_N") else _joints(case)
+    return _heat_map(points, "contact_force_N", "contact force, N")
+
+
+def _joints(case: CaseFiles) -> pd.DataFrame:
+    """Contact force at the joints, for a case that was not compared and so has no points.csv.gz."""
+    parts = [case.points]
+    for number in case.frames:
+        frame = case.read_frame(number)
+        wire, force = frame.simulated_mm, frame.contact_force_N
+        if wire is not None and force is not None and len(wire) == len(force) > 1:
+            steps = np.linalg.norm(np.diff(wire, axis=0), axis=1)
+            size = np.linalg.norm(force.reshape(len(force), -1), axis=1)
+            arc = np.concatenate([[0.0], np.cumsum(steps)])
+            parts.append(pd.DataFrame({"frame": number, "arc_mm": arc, "contact_force_N": size}))
+    return pd.concat(parts, ignore_index=True) if len(parts) > 1 else case.points
 
 
 def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from reports.figures._style import (
     BLUE,
@@ -21,48 +24,76 @@ from reports.figures._style import (
 )
 from reports.figures.overview import RunFiles
 
+UNCHANGED = "(plain)"  # the parameter of the rows in which nothing was changed
 _CYCLE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
-_MAX_LINES = 12  # beyond, one colour and no names: the spread is what is read
+_MAX_CASES = 6  # beyond, one colour and no names: the spread is what is read
 _LOG_FROM_RATIO = 5.0
+_STYLES = (("rms_mm", "-o", "traced"), ("truth_rms_mm", ":D", "true"))
 
 
 def sensitivity(run: RunFiles) -> Drawing | None:
-    """Pooled error against each varied setting; to the true wire where only that is known."""
-    columns = [c for c in ("rms_mm", "truth_rms_mm") if has(run.sweep, c)]
-    parameters = list(dict.fromkeys(run.sweep["parameter"]))
-    if not parameters or not columns:
+    """Pooled error against each varied setting, to the traced and to the true wire where there is one."""
+    varied = run.sweep[run.sweep["parameter"] != UNCHANGED]
+    parameters = list(dict.fromkeys(varied["parameter"]))
+    if not parameters or not has(varied, *(column for column, *_ in _STYLES)):
         return None
-    rows, wide = (len(parameters) + 1) // 2, min(2, len(parameters))
+    rows = -(-len(parameters) // 2)
     figure = new_figure(3.2 * rows)
-    panels = figure.subplots(rows, wide, squeeze=False).ravel()
+    panels = list(figure.subplots(rows, min(2, len(parameters)), squeeze=False).ravel())
+    unchanged = run.sweep[run.sweep["parameter"] == UNCHANGED].set_index("case")
     for axes, parameter in zip(panels, parameters, strict=False):
-        _panel(axes, run.sweep[run.sweep["parameter"] == parameter], columns)
-        axes.set_xlabel(parameter)
-    handles, labels = panels[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)
+        _panel(axes, varied[varied["parameter"] == parameter], unchanged)
+        axes.set_xlabel(str(parameter))
     for axes in panels[len(parameters) :]:
         axes.remove()
+    _legend(figure, panels[0])
     return Drawing(figure, run.sweep)
 
 
-def _panel(axes: Axes, rows: pd.DataFrame, columns: list[str]) -> None:
-    values = pd.to_numeric(rows["value"], errors="coerce")
-    numeric = bool(values.notna().all())
+def _panel(axes: Axes, rows: pd.DataFrame, unchanged: pd.DataFrame) -> None:
+    places = _places(rows["value"])
     cases = list(dict.fromkeys(rows["case"]))
     for i, case in enumerate(cases):
-        mine = rows["case"] == case
-        own = rows[mine].assign(place=values[mine] if numeric else rows.loc[mine, "value"].astype(str))
-        own = own.sort_values("place") if numeric else own
-        colour = _CYCLE[i % len(_CYCLE)] if len(cases) <= _MAX_LINES else GREY
-        for column, style, what in zip(columns, ("-o", ":D"), ("traced", "true"), strict=False):
-            label = f"{case}: to the {what} wire" if len(cases) <= _MAX_LINES else None
-            axes.plot(own["place"], own[column], style, color=colour, markersize=4, label=label)
-    if numeric and values.min() > 0 and values.max() > _LOG_FROM_RATIO * values.min():
-        axes.set_xscale("log")
-        places = np.unique(values.to_numpy())
-        axes.set_xticks(places, [f"{v:g}" for v in places], minor=False)
-        axes.minorticks_off()
-    axes.set_ylim(bottom=0.0, top=1.1 * float(rows[columns].max().max()))
+        colour = _CYCLE[i % len(_CYCLE)] if len(cases) <= _MAX_CASES else GREY
+        mine = rows.assign(place=places)[(rows["case"] == case).to_numpy()].sort_values("place")
+        name = f"{case}: " if 1 < len(cases) <= _MAX_CASES else ""
+        for column, style, what in _STYLES:
+            if has(mine, column):
+                label = f"{name}to the {what} wire" if len(cases) <= _MAX_CASES else None
+                axes.plot(mine["place"], mine[column], style, color=colour, markersize=4, label=label)
+        if case in unchanged.index and np.isfinite(unchanged.loc[case, "rms_mm"]):
+            label = "nothing changed, to the traced wire" if i == 0 else None
+            axes.axhline(
+                unchanged.loc[case, "rms_mm"], color=colour, linestyle="--", linewidth=0.9, label=label
+            )
+    _value_axis(axes, rows["value"], places)
+    # the whole range from zero: a slope must not be drawn steeper than it is
+    shown = [rows["rms_mm"], rows["truth_rms_mm"], unchanged["rms_mm"]]
+    axes.set_ylim(bottom=0.0, top=1.1 * max(float(np.nan_to_num(values.max())) for values in shown))
     axes.set_ylabel("pooled rms distance, mm")
     plain(axes)
+
+
+def _places(values: pd.Series[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Numbers as they are; words in their order."""
+    numbers = pd.to_numeric(values, errors="coerce")
+    if numbers.notna().all():
+        return numbers.to_numpy(dtype=float)
+    order = {value: i for i, value in enumerate(dict.fromkeys(values))}
+    return values.map(order).to_numpy(dtype=float)
+
+
+def _value_axis(axes: Axes, values: pd.Series[Any], places: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+    numeric = bool(pd.to_numeric(values, errors="coerce").notna().all())
+    if numeric and places.min() > 0 and places.max() > _LOG_FROM_RATIO * places.min():
+        axes.set_xscale("log")
+        axes.minorticks_off()
+    known = dict(zip(places, values, strict=True))
+    axes.set_xticks(sorted(known), [str(known[place]) for place in sorted(known)])
+    axes.margins(x=0.15)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)
