@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline._kernels.solids import cones, enclosed, splat_triangles
-from pipeline._kernels.wall import propagate
+from pipeline._kernels.wall import distances, propagate
 from pipeline.config import SegmentConfig
 from pipeline.load import LoadError, load, read_header
 from pipeline.memory_order import in_memory_order, reorder
@@ -78,15 +78,10 @@ def lumen_from_surface(shapes: Shapes, path: Path, config: SegmentConfig) -> Lum
     foot = np.zeros((room, 3))
     found = splat_triangles(corners, spacing, 1.5 * voxel, owner, foot)
     voxels = found[:, 0]
-    node = np.stack(np.unravel_index(voxels, grid.shape), axis=1) * spacing
-    away = node - foot[: len(voxels)]
-    size = np.linalg.norm(away, axis=1)
-    sign = np.where(inside.reshape(-1)[voxels] > 0, -1.0, 1.0)
-    normal = sign[:, None] * away / np.maximum(size, 1e-9)[:, None]
-    distance = np.full(grid.shape, config.outer_mm, np.float32)
-    distance.reshape(-1)[voxels] = sign * size
-    flat = np.zeros(len(voxels))
-    propagate(distance, owner, inside, spacing, voxels, foot[: len(voxels)], normal, flat, config.outer_mm)
+    feet, normal, flat = foot[: len(voxels)], np.zeros((len(voxels), 3)), np.zeros(len(voxels))
+    propagate(owner, inside, spacing, voxels, feet, config.outer_mm)
+    distance = owner.view(np.float32)
+    distances(owner, inside, spacing, feet, normal, flat, config.outer_mm, distance)
     return _lumen(
         grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)"
     )

@@ -225,15 +225,17 @@ def mean_around(
 
 @njit(cache=True, inline="always")
 def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float) -> float:
-    """Signed distance of a point to the sphere of curvature ``bend`` that osculates the surface at its foot p."""
+    """Signed distance of a point to the sphere of curvature ``bend`` that osculates the surface at its foot p.
+
+    For bend 0 (a surface of flat facets, closest points exact) it is the distance to the foot.
+    """
     ax, ay, az = x - p[0], y - p[1], z - p[2]
     along = ax * n[0] + ay * n[1] + az * n[2]
     square = ax * ax + ay * ay + az * az
-    across = max(0.0, square - along * along)
     lift = 1.0 + bend * along
-    if lift <= 0.2:
+    if bend == 0.0 or lift <= 0.2:
         return float(np.sqrt(square) if along > 0 else -np.sqrt(square))
-    return float(along + 0.5 * bend * across / lift)
+    return float(along + 0.5 * bend * max(0.0, square - along * along) / lift)
 
 
 @njit(cache=True, inline="always")
@@ -243,32 +245,28 @@ def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
 
 @njit(cache=True)
 def propagate(
-    distance: NDArray[Any],
     owner: NDArray[Any],
     inside: NDArray[Any],
     spacing: NDArray[Any],
     voxels: NDArray[Any],
     foot: NDArray[Any],
-    normal: NDArray[Any],
-    bend: NDArray[Any],
     outer: float,
 ) -> int:
     """Hand closest points on from voxel to voxel: all of the inside, and outside as far as ``outer`` mm.
 
-    ``distance`` holds the surface voxels' own values where ``owner`` > 0 and is rewritten where a neighbour's foot
-    is nearer. Breadth first with re-visits on improvement. Returns the number of visits.
+    owner : (box) int32, 0 or position of the foot + 1, set for ``voxels`` (ascending, for the sake of the cache)
+    beforehand. Layer by layer; a voxel that gets a nearer foot hands it on again. Returns the number of hand-overs.
     """
-    ni, nj, nk = distance.shape
+    ni, nj, nk = owner.shape
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
-    size = max(4096, voxels.shape[0])
-    front = np.empty(size, np.int64)
+    front = np.empty(max(4096, voxels.shape[0]), np.int64)
+    following = np.empty(front.shape[0], np.int64)
     count = 0
     for n in range(voxels.shape[0]):
         if owner.flat[voxels[n]] > 0:
             front[count] = voxels[n]
             count += 1
     visits = count
-    following = np.empty(size, np.int64)
     while count:
         fresh = 0
         for n in range(count):
@@ -277,7 +275,9 @@ def propagate(
             rest = flat // nk
             j = rest % nj
             i = rest // nj
+            inside[i, j, k] &= 1
             m = owner[i, j, k] - 1
+            p = foot[m]
             for a in range(max(0, i - 1), min(ni, i + 2)):
                 for b in range(max(0, j - 1), min(nj, j + 2)):
                     for c in range(max(0, k - 1), min(nk, k + 2)):
@@ -285,16 +285,16 @@ def propagate(
                         if known == m + 1:
                             continue
                         x, y, z = a * hx, b * hy, c * hz
-                        far = _square(x, y, z, foot[m])
-                        if known > 0 and far >= _square(x, y, z, foot[known - 1]) - 1e-9:
-                            continue
-                        if inside[a, b, c]:
-                            distance[a, b, c] = -abs(_from_foot(x, y, z, foot[m], normal[m], bend[m]))
-                        elif far < outer * outer:
-                            distance[a, b, c] = abs(_from_foot(x, y, z, foot[m], normal[m], bend[m]))
-                        else:
+                        far = _square(x, y, z, p)
+                        if known > 0:
+                            if far >= _square(x, y, z, foot[known - 1]) - 1e-9:
+                                continue
+                        elif far > outer * outer and not inside[a, b, c] & 1:
                             continue
                         owner[a, b, c] = m + 1
+                        if inside[a, b, c] & 2:
+                            continue
+                        inside[a, b, c] |= 2
                         if fresh + 1 >= following.shape[0]:
                             following = _grown(following)
                         following[fresh] = (a * nj + b) * nk + c
@@ -303,3 +303,31 @@ def propagate(
         front, following = following, front
         count = fresh
     return visits
+
+
+@njit(cache=True)
+def distances(
+    owner: NDArray[Any],
+    inside: NDArray[Any],
+    spacing: NDArray[Any],
+    foot: NDArray[Any],
+    normal: NDArray[Any],
+    bend: NDArray[Any],
+    outer: float,
+    out: NDArray[Any],
+) -> None:
+    """Signed distance (float32) of every voxel from its owner's foot; ``outer`` where it has none.
+
+    ``out`` may be ``owner``'s own memory seen as float32: one box instead of two is held.
+    """
+    ni, nj, nk = owner.shape
+    hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    for i in range(ni):
+        for j in range(nj):
+            for k in range(nk):
+                m = owner[i, j, k] - 1
+                if m < 0:
+                    out[i, j, k] = -outer if inside[i, j, k] & 1 else outer
+                    continue
+                d = abs(_from_foot(i * hx, j * hy, k * hz, foot[m], normal[m], bend[m]))
+                out[i, j, k] = -d if inside[i, j, k] & 1 else min(d, outer)

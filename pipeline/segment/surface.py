@@ -8,13 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.wall import PAD, dilate, feet, mean_around, propagate, smooth_lattice, surface_voxels
+from pipeline._kernels.wall import (
+    PAD,
+    dilate,
+    distances,
+    feet,
+    mean_around,
+    propagate,
+    smooth_lattice,
+    surface_voxels,
+)
 from pipeline.segment.affinity import Levels
 from pipeline.segment.blur import blur_of_wall, half_level_offset
 from solver.grid import Array, Grid
 
-LAYERS = 5
-"""Layers around the mask in which grey is smoothed: two may still be inside, three more feed the spline."""
+LAYERS = 4
+"""Layers around the mask in which grey is smoothed: two may still be inside, two more feed the spline."""
 DEEP = 3
 """Mark of the last layer (mask = 1) that may be inside: connectedness is off by up to half a voxel, noise by one."""
 SPLINE_VARIANCE = 1.0 / 3.0
@@ -97,7 +106,8 @@ def signed_distance(
     state = np.zeros(box.shape, np.uint8)
     flat = box.flat(index)
     state.reshape(-1)[flat] = 1
-    near = np.concatenate([flat, dilate(state, flat, LAYERS, 2)])
+    dilate(state, flat, LAYERS, 2)
+    near = np.flatnonzero(state)
     lattice = np.zeros(box.shape, np.float32)
     smooth_lattice(volume.values, box.corner, taps, near, lattice)
     inside = np.zeros(box.shape, np.uint8)
@@ -110,11 +120,10 @@ def signed_distance(
     owner.reshape(-1)[voxels[good]] = np.flatnonzero(good) + 1
     blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
     wall, bend = corrected(wall, owner, blur, spacing)
-    distance = np.full(box.shape, outer_mm, np.float32)
-    distance.reshape(-1)[voxels[good]] = wall.distance[good]
-    flip = (wall.distance < 0) & good
-    inside.reshape(-1)[voxels[good]] = flip[good]
-    visits = propagate(distance, owner, inside, spacing, voxels, wall.foot, wall.normal, bend, outer_mm)
+    inside.reshape(-1)[voxels[good]] = wall.distance[good] < 0
+    visits = propagate(owner, inside, spacing, voxels, wall.foot, outer_mm)
+    distance = owner.view(np.float32)
+    distances(owner, inside, spacing, wall.foot, wall.normal, bend, outer_mm, distance)
     keep = tuple(slice(PAD, n - PAD) for n in box.shape)
     origin = volume.to_mm(box.corner)
     values = np.ascontiguousarray(distance[keep])
