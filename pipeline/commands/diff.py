@@ -17,9 +17,9 @@ def main(args: Namespace) -> int:
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
         return complain([str(error)], "the two outputs")
     if len(difference.by_column):
-        say(difference.by_column.to_string(index=False, float_format="%.4g"))
+        say(difference.by_column.to_string(index=False, float_format="{:.4g}".format))
     bad = difference.regressions
     if len(bad):
-        say(bad.to_string(index=False, float_format="%.4g", max_rows=30))
+        say(bad.to_string(index=False, float_format="{:.4g}".format, max_rows=30))
     say(difference.sentence)
     return 1 if len(bad) else 0

@@ -1,0 +1,344 @@
+"""The whole pipeline on a small study of real files, through the command line, as a user types it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import SimpleITK as sitk
+
+from pipeline.cli import main
+from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS, SUMMARY_COLUMNS, names
+from reports.tables import read_errors
+
+SIZE, FRAMES = 64, 4
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    assert (
+        main(
+            [
+                "synth",
+                "bifurcation",
+                "-o",
+                str(folder),
+                "--size",
+                str(SIZE),
+                "--frames",
+                str(FRAMES),
+                "--seed",
+                "7",
+            ]
+        )
+        == 0
+    )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out")
+    store = tmp_path_factory.mktemp("store")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WIREVAL_CACHE", str(store))
+        assert run(study, out) == 0
+    return out
+
+
+def run(study: Path, out: Path, *more: str) -> int:
+    return main(["run", str(study / "manifest.toml"), "-o", str(out), *more])
+
+
+def errors_of(out: Path) -> pd.DataFrame:
+    return read_errors(next((out / "cases").iterdir()) / "errors.csv")
+
+
+def test_every_frame_is_ok_and_near_the_truth(finished: Path, study: Path) -> None:
+    """The bars of the full study, in voxels: the small scan has voxels of 0.75 mm."""
+    table = errors_of(finished)
+    voxel = sitk.ReadImage(str(study / "reference.mha")).GetSpacing()[0]
+    assert list(table["status"]) == ["ok"] * FRAMES
+    assert table["trace_mean_mm"].median() < 0.25 * voxel
+    assert table["trace_tip_mm"].median() < 1.0 * voxel
+    assert table["truth_rms_mm"].median() < 1.0 * voxel
+
+
+def test_the_output_tree_is_complete(finished: Path) -> None:
+    case = finished / "cases" / "bifurcation"
+    for name in ("run.json", "config.resolved.toml", "summary.csv", "failures.csv", "index.html"):
+        assert (finished / name).stat().st_size > 0, name
+    for name in ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "report.html", "log.txt"):
+        assert (case / name).stat().st_size > 0, name
+    for name in ("lumen.seg.nrrd", "lumen.vtp", "wire_traced_000.mrk.json", "wire_simulated_003.mrk.json"):
+        assert (case / "view" / name).stat().st_size > 0, name
+    assert (case / "view" / "wire_simulated_003.vtp").exists()
+    assert any((case / "figures").glob("*.png"))
+    assert not list(finished.rglob(".tmp*"))
+
+
+def test_the_columns_are_the_contract(finished: Path) -> None:
+    case = finished / "cases" / "bifurcation"
+    assert tuple(pd.read_csv(case / "errors.csv").columns) == names(ERRORS_COLUMNS)
+    assert tuple(pd.read_csv(case / "points.csv.gz").columns) == names(POINTS_COLUMNS)
+    assert tuple(pd.read_csv(finished / "summary.csv").columns) == names(SUMMARY_COLUMNS)
+    with h5py.File(case / "frames.h5") as file:
+        group = file["frames/000"]
+        assert {"traced_mm", "simulated_mm", "error_mm", "arc_mm", "contact_force_N"} <= set(group)
+        assert group["simulated_mm"].shape == group["contact_force_N"].shape
+
+
+def test_points_and_frames_tell_the_same_story(finished: Path) -> None:
+    case = finished / "cases" / "bifurcation"
+    points, table = pd.read_csv(case / "points.csv.gz"), errors_of(finished)
+    for frame, group in points.groupby("frame"):
+        rms = float(np.sqrt((group["error_mm"] ** 2).mean()))
+        assert rms == pytest.approx(float(table.loc[table["frame"] == frame, "rms_mm"].iloc[0]), rel=1e-6)
+    pooled = float(np.sqrt((points["error_mm"] ** 2).mean()))
+    assert pooled == pytest.approx(float(pd.read_csv(finished / "summary.csv")["rms_mm"][0]), rel=1e-6)
+
+
+def test_insertion_is_arc_length_from_the_entry(finished: Path) -> None:
+    table = errors_of(finished)
+    with h5py.File(finished / "cases" / "bifurcation" / "frames.h5") as file:
+        for frame, depth in zip(table["frame"], table["insertion_mm"], strict=True):
+            joints = file[f"frames/{frame:03d}/simulated_mm"][...]
+            assert np.linalg.norm(np.diff(joints, axis=0), axis=1).sum() == pytest.approx(depth, abs=1e-6)
+
+
+def test_the_same_command_again_keeps_what_is_finished(
+    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    before = (out / "cases" / "bifurcation" / "frames.h5").stat().st_mtime_ns
+    assert run(study, out) == 0
+    assert "unchanged since the last run, kept" in capsys.readouterr().err
+    assert (out / "cases" / "bifurcation" / "frames.h5").stat().st_mtime_ns == before
+
+
+def test_a_case_that_was_cut_off_is_finished_by_the_same_command(
+    finished: Path, study: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "cases" / "bifurcation" / "result.json").unlink()
+    assert run(study, out) == 0
+    pd.testing.assert_frame_equal(without_times(errors_of(finished)), without_times(errors_of(out)))
+
+
+def without_times(table: pd.DataFrame) -> pd.DataFrame:
+    return table.drop(columns=[name for name in table.columns if name.endswith("_s")])
+
+
+def test_another_manifest_into_the_same_folder_is_refused(
+    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, other = tmp_path / "out", tmp_path / "study"
+    shutil.copytree(finished, out)
+    shutil.copytree(study, other)
+    (other / "manifest.toml").write_text((study / "manifest.toml").read_text() + "\n# changed\n")
+    assert run(other, out) == 2
+    assert "--resume" in capsys.readouterr().err
+
+
+def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(study, tmp_path / "out", "--dry-run", "--sweep", "simulate.wall_scale=0.5,2") == 0
+    assert "sweep simulate.wall_scale = 0.5" in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert (
+        run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", str(tmp_path / "junit.xml"))
+        == 0
+    )
+    table = pd.read_csv(out / "sweep.csv")
+    assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
+    assert table["rms_mm"].nunique() == 3
+    turned = json.loads(
+        (out / "sweep" / "simulate.roll_offset_deg=60" / "cases" / "bifurcation" / "result.json").read_text()
+    )
+    assert turned["counters"]["trace"]["reused"] == FRAMES
+    assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text()
+
+
+def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    for name in ("summary.csv", "index.html"):
+        (out / name).unlink()
+    shutil.rmtree(out / "cases" / "bifurcation" / "figures")
+    assert main(["report", str(out)]) == 0
+    pd.testing.assert_frame_equal(pd.read_csv(out / "summary.csv"), pd.read_csv(finished / "summary.csv"))
+    assert any((out / "cases" / "bifurcation" / "figures").glob("*.png"))
+    assert main(["report", str(tmp_path / "nothing")]) == 2
+
+
+def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
+    assert main(["diff", str(finished), str(finished)]) == 0
+    worse = tmp_path / "worse"
+    shutil.copytree(finished, worse)
+    path = worse / "cases" / "bifurcation" / "errors.csv"
+    table = pd.read_csv(path)
+    table["rms_mm"] += 1.0
+    table.to_csv(path, index=False)
+    assert main(["diff", str(finished), str(worse)]) == 1
+    assert main(["diff", str(worse), str(finished)]) == 0
+
+
+def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
+    shutil.copytree(study, folder)
+    text = (folder / "manifest.toml").read_text()
+    second = text[text.index("[[case]]") :].replace('id = "bifurcation"', 'id = "second"')
+    if broken:
+        second = second.replace('frames = "frames/*.mha"', 'frames = "broken/*.mha"')
+        shutil.copytree(folder / "frames", folder / "broken")
+        damaged = sorted((folder / "broken").iterdir())[1]
+        damaged.write_bytes(damaged.read_bytes()[:-5000])
+    (folder / "manifest.toml").write_text(text + "\n" + second)
+    return folder
+
+
+def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
+    both = two_cases(study, tmp_path / "study")
+    assert run(both, tmp_path / "pool", "-j", "2", "--no-cache") == 0
+    for shard in ("1/2", "2/2"):
+        assert run(both, tmp_path / "shards", "--shard", shard) == 0
+    assert main(["report", str(tmp_path / "shards")]) == 0
+    for out in ("pool", "shards"):
+        for case in ("bifurcation", "second"):
+            table = read_errors(tmp_path / out / "cases" / case / "errors.csv")
+            pd.testing.assert_frame_equal(without_times(table), without_times(errors_of(finished)))
+        assert len(pd.read_csv(tmp_path / out / "summary.csv")) == 2
+
+
+def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> None:
+    both = two_cases(study, tmp_path / "study", broken=True)
+    out = tmp_path / "out"
+    assert run(both, out) == 1
+    statuses = list(read_errors(out / "cases" / "second" / "errors.csv")["status"])
+    assert statuses == ["ok", "load_failed", "ok", "ok"]
+    failures = pd.read_csv(out / "failures.csv")
+    assert list(failures["case"]) == ["second"]
+    assert "cut short" in failures["message"][0] or "cannot be read" in failures["message"][0]
+
+
+def test_an_unexpected_error_costs_one_case(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    both = two_cases(study, tmp_path / "study")
+
+    def burst(job: object) -> str:
+        if job.case.id == "second":  # type: ignore[attr-defined]
+            msg = "burst pipe"
+            raise RuntimeError(msg)
+        from pipeline.run_case import run_case
+
+        return run_case(job)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("pipeline.batch.run_case", burst)
+    assert run(both, tmp_path / "out") == 1
+    failures = pd.read_csv(tmp_path / "out" / "failures.csv")
+    assert "burst pipe" in failures["message"][0]
+    assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text()
+
+
+def test_a_folder_of_scans_is_enough(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "scans"
+    shutil.copytree(study, folder)
+    (folder / "manifest.toml").unlink()
+    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text())
+    entry, direction = case["entry"]["entry_mm"], case["entry"]["entry_direction"]
+    words = [f"--entry={','.join(map(str, entry))}", f"--direction={','.join(map(str, direction))}"]
+    code = main(["run", str(folder), "-o", str(tmp_path / "out"), *words])
+    printed = capsys.readouterr().out
+    assert code in (0, 1)
+    assert "assumed: frames: 4 scans in natural order" in printed
+    assert "[wires.assumed]" in printed
+    assert list(errors_of(tmp_path / "out")["trace_sigma_mm"].notna()) == [True] * FRAMES
+
+
+def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "scans"
+    shutil.copytree(study, folder)
+    (folder / "manifest.toml").unlink()
+    assert main(["run", str(folder), "-o", str(tmp_path / "out"), "--until", "segment"]) in (0, 1)
+    text = (tmp_path / "out" / "manifest.inferred.toml").read_text()
+    found = [json.loads(line.split("=")[1]) for line in text.splitlines() if line.startswith("entry_")]
+    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text())["entry"]
+    assert np.linalg.norm(np.subtract(found[0], case["entry_mm"])) < 3.0
+    assert np.dot(found[1], case["entry_direction"]) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--set", "solver.segmnt_mm=1"], "did you mean 'segment_mm'"),
+        (["--only", "bifurcatoin"], "did you mean 'bifurcation'"),
+        (["--shard", "3/2"], "expected I/N"),
+        (["--until", "simulat"], "did you mean 'simulate'"),
+        (["-j", "0"], "expected 1 or more"),
+        (["--sweep", "simulate.wall_scale"], "write table.key=value1,value2"),
+    ],
+)
+def test_a_wrong_command_line_runs_nothing(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: str
+) -> None:
+    assert run(study, tmp_path / "out", *words) == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_check_lists_problems_of_the_scans(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(study / "manifest.toml")]) == 0
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    image = sitk.ReadImage(str(folder / "reference.mha"))
+    image.SetOrigin([c + 5.0 for c in image.GetOrigin()])
+    sitk.WriteImage(image, str(folder / "reference.mha"))
+    assert main(["check", str(folder / "manifest.toml")]) == 2
+    assert "geometry differs" in capsys.readouterr().err
+    text = (study / "manifest.toml").read_text().replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
+    (folder / "manifest.toml").write_text(text)
+    shutil.copy(study / "reference.mha", folder / "reference.mha")
+    assert main(["check", str(folder / "manifest.toml")]) == 2
+    assert "lies outside the scan" in capsys.readouterr().err
+
+
+def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    lines = (folder / "manifest.toml").read_text().splitlines()
+    kept = [line for line in lines if not line.startswith(("frames", "truth"))]
+    (folder / "manifest.toml").write_text("\n".join(kept))
+    assert run(folder, tmp_path / "out") == 0
+    table = errors_of(tmp_path / "out")
+    assert list(table["status"]) == ["simulated"] * FRAMES
+    assert table["rms_mm"].isna().all()
+    assert table["joints"].notna().all()
+
+
+def test_interruption_is_130(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pipeline.commands.run.run_jobs", interrupted)
+    assert run(study, tmp_path / "out") == 130
+
+
+def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("wireval ")
+    assert main([]) == 2
