@@ -86,7 +86,10 @@ def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
     label = "mm rms, simulated to traced wire, all validation cases"
     groups = f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}"
     first = {"value": number(pooled["rms_mm"]), "label": _with_detail("rms_mm", label, pooled)}
-    return [first, {"value": groups, "label": "validation cases / groups of them, which the interval resamples"}]
+    return [
+        first,
+        {"value": groups, "label": "validation cases / groups of them, which the interval resamples"},
+    ]
 
 
 def frames(errors: pd.DataFrame) -> Grid:

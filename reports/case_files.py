@@ -43,13 +43,18 @@ class CaseFiles:
         return frames_file.read_frame(self.folder / "frames.h5", frame)
 
 
-def read_case(folder: Path) -> CaseFiles:
-    """Read a case's folder; raises ValueError, naming the file, where one is damaged."""
+def read_case(folder: Path, points: bool = True) -> CaseFiles:
+    """Read a case's folder; raises ValueError, naming the file, where one is damaged.
+
+    points : False leaves points.csv.gz unread, by far the largest table, where a page of the run needs none.
+    """
     frames = folder / "frames.h5"
     errors = _table(folder / "errors.csv", tables.read_errors, ERRORS_COLUMNS)
-    points = _table(folder / "points.csv.gz", tables.read_points, POINTS_COLUMNS)
+    samples = tables.empty_table(POINTS_COLUMNS)
+    if points:
+        samples = _table(folder / "points.csv.gz", tables.read_points, POINTS_COLUMNS)
     scan, numbers = _frames(frames) if frames.exists() else (None, ())
-    return CaseFiles(folder, read_json(folder / "result.json"), errors, points, scan, numbers)
+    return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, scan, numbers)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -61,12 +61,12 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
 
 def render_index(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
-    cases = [read_case(folder) for folder in find_cases(out_dir)]
+    cases, failures = _read_cases(out_dir)
     summary = _optional(out_dir / "summary.csv", tables.read_summary, SUMMARY_COLUMNS)
     sweep = _optional(out_dir / "sweep.csv", tables.read_sweep, SWEEP_COLUMNS)
     run = RunFiles({case.name: case.errors for case in cases}, summary, sweep)
     links = _links(cases)
-    failures = _run_failures(out_dir, cases, links)
+    failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     page = {
         "title": "wireval",
@@ -108,6 +108,25 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
         if case.name not in known and case.result.get("status") not in GOOD:
             rows += _case_failures(case)
     return [{**row, "link": links.get(row["case"], "")} for row in rows]
+
+
+def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
+    """Every case that can be read, and a failure for each that cannot: one bad file must not hide the others."""
+    cases, broken = [], []
+    for folder in find_cases(out_dir):
+        try:
+            cases.append(read_case(folder, points=False))
+        except ValueError as error:
+            row = {
+                "case": folder.name,
+                "frame": "",
+                "stage": "report",
+                "status": "damaged",
+                "log": "",
+                "link": "",
+            }
+            broken.append(row | {"sentence": "a result file cannot be read", "message": str(error)})
+    return cases, broken
 
 
 def _links(cases: list[CaseFiles]) -> dict[str, str]:

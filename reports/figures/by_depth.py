@@ -184,7 +184,9 @@ def _predictors(statistics: Any) -> pd.DataFrame:
 def _dots(axes: Axes, table: pd.DataFrame) -> None:
     places = range(len(table))
     colours = [SIMULATED if name == "simulated" else GREY for name in table["predictor"]]
-    axes.hlines(places, table["rms_low_mm"], table["rms_high_mm"], color=SIMULATED, linewidth=2)
+    for column in ("rms_low_mm", "rms_high_mm"):
+        axes.plot(table[column], places, "|", color=SIMULATED, markersize=11, markeredgewidth=1.5)
+    axes.hlines(places, table["rms_low_mm"], table["rms_high_mm"], color=SIMULATED, linewidth=1.5)
     axes.scatter(table["rms_mm"], places, c=colours, zorder=3)
     axes.set_yticks(places, list(table["predictor"]))
     axes.invert_yaxis()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,8 @@ from reports.figures._style import (
 
 _CLIP_PERCENTILE = 98.0  # one lost frame must not turn the others dark
 _MAX_INCH = 24.0
+_BAR_INCH = 4.0
+_TOP_TICKS_FROM = 30  # rows from which the lower axis is out of sight
 _MAX_NAMES = 90  # more labels than that overlap at the largest height
 
 
@@ -91,7 +94,7 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
     _name_rows(axes, list(table["case"]))
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
-    axes.legend(frameon=False, fontsize=8, loc="best")
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     plain(axes)
     return Drawing(figure, shown)
 
@@ -109,7 +112,14 @@ def _tall(n_rows: int) -> tuple[Figure, Axes]:
     return figure, figure.subplots()
 
 
+def _bar(figure: Figure) -> dict[str, Any]:
+    """A colour bar of readable size at the top, however tall the figure is."""
+    share = min(1.0, _BAR_INCH / figure.get_figheight())
+    return {"pad": 0.01, "shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
+
+
 def _name_rows(axes: Axes, names: Sequence[str]) -> None:
     every = -(-len(names) // _MAX_NAMES)
     axes.set_yticks(range(0, len(names), every), list(names)[::every], fontsize=8)
     axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.tick_params(axis="x", labeltop=len(names) >= _TOP_TICKS_FROM)

@@ -185,6 +185,16 @@ def test_a_damaged_file_is_named(tmp_path: Path, name: str, content: bytes) -> N
         read_case(tmp_path)
 
 
+def test_one_damaged_case_does_not_hide_the_others(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("fine", frames=3), FakeCase("hurt", frames=3)))
+    (out / "cases" / "hurt" / "frames.h5").write_bytes(b"x" * 99)
+    text = render_index(out).read_text(encoding="utf-8")
+    assert "a result file cannot be read" in text
+    assert "frames.h5: not a readable HDF5 file" in text
+    assert "1 case, 3 frames: 3 ok" in text
+    assert 'class="status bad"' in text
+
+
 def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=2, simulated_only=True),))
     figures = out / "cases" / "c" / "figures"
