@@ -40,3 +40,9 @@ FRICTION_ROUNDS = 60
 """Relaxations allowed for the contact loads of one step to settle."""
 PARALLEL = 1e-6
 """Sine of the angle below which a material axis counts as parallel to the wire."""
+CLOSED_FORM_ANGLE = 0.2
+"""Largest turn of a segment in one sweep of the closed form, rad: its model is linear in the turn."""
+CLOSED_FORM_SMALLEST = 1e-12
+"""Smallest share of the closed form's own step that is tried before the sweep counts as stalled."""
+SWEEPS_PER_ITERATION = 1000
+"""Sweeps of the closed form that max_iterations allows for each of its iterations: it needs O(k²) of them."""

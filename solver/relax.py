@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
+from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.energy import lag_friction, point_at, total_energy
 from solver._kernels.follow import follow
 from solver._kernels.layout import Rule
@@ -54,7 +55,8 @@ TIP_ZONE = 4
 class Settings:
     """How to relax.
 
-    tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation.
+    tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation; the closed form
+    may use a thousand sweeps for each.
     quadrature : of the wall's energy. "tip" integrates it under the last segments and sums joints elsewhere,
     "joints" is the seed's sum over joints (half a weight at the tip), "segments" integrates under all of them.
     """
@@ -134,9 +136,10 @@ def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
 
 def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     """One run of the loop; the result is moved to state 0."""
-    outcome, iterations, which, energy = minimise(
-        b.problem, b.k, settings.tolerance, settings.max_iterations, b.report
-    )
+    run, limit = minimise, settings.max_iterations
+    if settings.method == "closed_form":
+        run, limit = minimise_closed_form, limit * tol.SWEEPS_PER_ITERATION
+    outcome, iterations, which, energy = run(b.problem, b.k, settings.tolerance, limit, b.report)
     if which == 1:
         for array, size in zip(b.state, (b.k, b.k + 1, b.k + 1, b.points, b.points, 4), strict=True):
             array[0, :size] = array[1, :size]

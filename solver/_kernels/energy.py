@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
 from solver._kernels.spline import basis, locate, spline, to_world, trilinear
@@ -48,7 +48,7 @@ def load_energy(chain: Chain, x: Any, k: int) -> float:
     return total
 
 
-@kernel
+@inlined
 def point_at(problem: Problem, which: int, n: int, p: int, q: Any) -> None:
     """Where look-up point p of node n is, mm, into q (3,)."""
     x, r, o = problem.state.x[which, n], problem.state.r[which, n], problem.chain.offset[p]
@@ -73,7 +73,7 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
     return total
 
 
-@kernel
+@inlined
 def penetration(problem: Problem, which: int, p: int, q: Any) -> float:
     """How far the wire's hull is beyond the lumen at q, mm; fills the point's jet where it is.
 
@@ -108,7 +108,7 @@ def penetration(problem: Problem, which: int, p: int, q: Any) -> float:
     return float(jet[0] + reach)
 
 
-@kernel
+@inlined
 def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
     """Tangential way (3,) of a point since the step began; returns its smoothed length, at least ``slip``."""
     friction = problem.friction

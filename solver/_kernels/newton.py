@@ -16,7 +16,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import slide_of
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import Problem, State
 from solver._kernels.rotation import jacobian_terms, sine_terms, turn
@@ -51,14 +51,14 @@ ZERO6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ZERO9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@kernel
+@inlined
 def point_force(frame: Nine, jet: Any, force: float) -> Three:
     """The wall's energy gradient at a point in contact, in the frame of its node; force = k w d."""
     n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
     return force * n[0], force * n[1], force * n[2]
 
 
-@kernel
+@inlined
 def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, project: bool) -> Six:
     """The wall's energy Hessian at a point in contact, k w (∇φ ∇φᵀ + d ∇²φ), in the frame of its node.
 
@@ -82,7 +82,7 @@ def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, proje
     return add6(own, bend)
 
 
-@kernel
+@inlined
 def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six]:
     """What a point off its node adds to V_pr and V_rr: its place moves by δr x offset, and curves."""
     d = cross_matrix((-offset[0], -offset[1], -offset[2]))
@@ -101,7 +101,7 @@ def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six]:
     return c, rr
 
 
-@kernel
+@inlined
 def jacobian(u0: float, u1: float, u2: float) -> Nine:
     """Right Jacobian of exp at u."""
     q = u0 * u0 + u1 * u1 + u2 * u2
@@ -120,7 +120,7 @@ def jacobian(u0: float, u1: float, u2: float) -> Nine:
     )
 
 
-@kernel
+@inlined
 def jacobian_curvature(g: Three, u: Three) -> Six:
     """The symmetric S with g·(∂_v J) v = vᵀ S v: the part of a joint's Hessian that its own bend makes."""
     q = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
@@ -142,7 +142,7 @@ def jacobian_curvature(g: Three, u: Three) -> Six:
     )
 
 
-@kernel
+@inlined
 def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) -> tuple[Nine, Six, Three]:
     """Carry V from the far end of a segment to its near end, at the same frame."""
     # C = V_pr + V_pp A: A moves columns, (M A)[:, 0] = -l M[:, 1], (M A)[:, 1] = l M[:, 0]
@@ -169,7 +169,7 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
     return n, rr, (g[0] - length * f[1], g[1] + length * f[0], g[2])
 
 
-@kernel
+@inlined
 def smallest_shift(a: float, b: float, d: float, floor: float) -> float:
     """What to add to the diagonal of [[a, b], [b, d]] so that it is safely positive; 0 where it is already."""
     mean = 0.5 * (a + d)
@@ -179,7 +179,7 @@ def smallest_shift(a: float, b: float, d: float, floor: float) -> float:
     return max(-least, floor) - least
 
 
-@kernel
+@inlined
 def solve_block(q: Six, twisting: bool) -> Nine:
     """Minus the inverse of Q_uu; without a twist variable its last row and column are zero."""
     if not twisting:
@@ -205,7 +205,7 @@ def solve_block(q: Six, twisting: bool) -> Nine:
     )
 
 
-@kernel
+@inlined
 def node_gradient(problem: Problem, which: int, n: int, frame: Nine) -> tuple[Three, Three]:
     """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
     chain, state = problem.chain, problem.state
@@ -222,7 +222,7 @@ def node_gradient(problem: Problem, which: int, n: int, frame: Nine) -> tuple[Th
     return f, g
 
 
-@kernel
+@inlined
 def node_hessian(problem: Problem, which: int, n: int, frame: Nine, project: bool) -> tuple[Six, Nine, Six]:
     """Hessian of the same: V_pp, V_pr and V_rr."""
     chain, state = problem.chain, problem.state
@@ -249,7 +249,7 @@ def node_hessian(problem: Problem, which: int, n: int, frame: Nine, project: boo
     return p, c, h
 
 
-@kernel
+@inlined
 def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[Three, Six]:
     """Gradient and Hessian of a point's friction, in the frame of its node."""
     way = problem.scratch.fraction[3:]
@@ -269,7 +269,7 @@ def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[
     return (w * s[0], w * s[1], w * s[2]), hessian
 
 
-@kernel
+@inlined
 def joint_blocks(
     chain: Chain, j: int, u: Three, jac: Nine, h: Six, g: Three, twisting: bool, levenberg: float, report: Any
 ) -> tuple[Three, Nine]:
@@ -340,7 +340,7 @@ def note_direction(q: Six, j: int, report: Any) -> None:
     report[5] = 0.5 * (q[0] + q[1]) - radius
 
 
-@kernel
+@inlined
 def lift_twist(q: Six, twist: float) -> Six:
     """Raise the twist entry of Q_uu until the 3x3 block is positive (its bending block already is)."""
     det = q[0] * q[1] - q[3] * q[3]
@@ -348,7 +348,7 @@ def lift_twist(q: Six, twist: float) -> Six:
     return q[0], q[1], max(q[2], least + CURVATURE_FLOOR * twist), q[3], q[4], q[5]
 
 
-@kernel
+@inlined
 def store_gain(gain: Any, feed: Three, gain_p: Nine, gain_r: Nine) -> None:
     """Write one joint's gains: column 0 the step, 1-3 the answer to δp, 4-6 to δr."""
     for a in range(3):
@@ -404,7 +404,7 @@ def rollout(problem: Problem, which: int, k: int, near: int, fraction: float) ->
         x[j + 1, 0], x[j + 1, 1], x[j + 1, 2] = at
 
 
-@kernel
+@inlined
 def answer(gain: Any, fraction: float, dp: Three, dr: Three) -> Three:
     """Change of a joint's control: a fraction of its own step, plus feedback to where its node came to be."""
     s = (fraction * gain[0, 0], fraction * gain[1, 0], fraction * gain[2, 0])
@@ -420,7 +420,7 @@ def answer(gain: Any, fraction: float, dp: Three, dr: Three) -> Three:
     )
 
 
-@kernel
+@inlined
 def relative(old: Nine, new: Nine) -> Three:
     """Rotation vector (world) from an old frame to a new one, to first order: sin of the angle times the axis."""
     a = cross((old[0], old[3], old[6]), (new[0], new[3], new[6]))
@@ -429,7 +429,7 @@ def relative(old: Nine, new: Nine) -> Three:
     return 0.5 * (a[0] + b[0] + c[0]), 0.5 * (a[1] + b[1] + c[1]), 0.5 * (a[2] + b[2] + c[2])
 
 
-@kernel
+@inlined
 def limited(u0: float, u1: float, u2: float, s0: float, s1: float, s2: float) -> Three:
     """u + s with the step kept below STEP_ANGLE and the result below CONTROL_ANGLE."""
     size = s0 * s0 + s1 * s1 + s2 * s2

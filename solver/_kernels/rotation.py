@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -16,7 +16,7 @@ Nine = tuple[float, float, float, float, float, float, float, float, float]
 SERIES_LIMIT = 0.25
 
 
-@kernel
+@inlined
 def sine_terms(q: float) -> tuple[float, float]:
     """Return s = sin θ/θ and a = (1 - cos θ)/θ² of q = θ²."""
     if q < SERIES_LIMIT:
@@ -28,7 +28,7 @@ def sine_terms(q: float) -> tuple[float, float]:
     return math.sin(angle) / angle, 2 * half * half / q
 
 
-@kernel
+@inlined
 def jacobian_terms(q: float, s: float, a: float) -> tuple[float, float, float]:
     """Return b = (θ - sin θ)/θ³, a'/θ and b'/θ of q = θ²."""
     if q < SERIES_LIMIT:
@@ -42,7 +42,7 @@ def jacobian_terms(q: float, s: float, a: float) -> tuple[float, float, float]:
     return b, (s - 2 * a) / q, (a - 3 * b) / q
 
 
-@kernel
+@inlined
 def turn(rest: float, u0: float, u1: float, u2: float) -> Nine:
     """Return E = B exp(û), row by row: the rest bend about material axis 2, then the control u (rad)."""
     q = u0 * u0 + u1 * u1 + u2 * u2
@@ -73,7 +73,7 @@ def turn(rest: float, u0: float, u1: float, u2: float) -> Nine:
     )
 
 
-@kernel
+@inlined
 def bend_towards(rest: float, t0: float, t1: float, t2: float) -> tuple[float, float]:
     """Return the twist-free control (u0, u1) whose turn E = B exp(û) takes e3 to the unit vector t.
 
@@ -91,7 +91,7 @@ def bend_towards(rest: float, t0: float, t1: float, t2: float) -> tuple[float, f
     return -t1 * angle / sine, p0 * angle / sine
 
 
-@kernel
+@inlined
 def with_twist(u0: float, u1: float, twist: float) -> tuple[float, float, float]:
     """Return the control of a bend (u0, u1) followed by a twist about e3: the direction stays, the frame turns."""
     if twist == 0.0:

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined
 
 Six = tuple[float, float, float, float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 Three = tuple[float, float, float]
 
 
-@kernel
+@inlined
 def times(a: Nine, b: Nine) -> Nine:
     """A B."""
     return (
@@ -30,7 +30,7 @@ def times(a: Nine, b: Nine) -> Nine:
     )
 
 
-@kernel
+@inlined
 def times_transposed(a: Nine, b: Nine) -> Nine:
     """A Bᵀ."""
     return (
@@ -46,13 +46,13 @@ def times_transposed(a: Nine, b: Nine) -> Nine:
     )
 
 
-@kernel
+@inlined
 def transpose(a: Nine) -> Nine:
     """Aᵀ."""
     return a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]
 
 
-@kernel
+@inlined
 def apply(a: Nine, v: Three) -> Three:
     """A v."""
     return (
@@ -62,7 +62,7 @@ def apply(a: Nine, v: Three) -> Three:
     )
 
 
-@kernel
+@inlined
 def apply_transposed(a: Nine, v: Three) -> Three:
     """Aᵀ v."""
     return (
@@ -72,13 +72,13 @@ def apply_transposed(a: Nine, v: Three) -> Three:
     )
 
 
-@kernel
+@inlined
 def full(m: Six) -> Nine:
     """The nine entries of a symmetric matrix."""
     return m[0], m[3], m[4], m[3], m[1], m[5], m[4], m[5], m[2]
 
 
-@kernel
+@inlined
 def conjugate(e: Nine, m: Six) -> Six:
     """E M Eᵀ of a symmetric M."""
     t = times(e, full(m))
@@ -92,13 +92,13 @@ def conjugate(e: Nine, m: Six) -> Six:
     )
 
 
-@kernel
+@inlined
 def add6(a: Six, b: Six) -> Six:
     """A + B."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
-@kernel
+@inlined
 def add9(a: Nine, b: Nine) -> Nine:
     """A + B."""
     return (
@@ -114,31 +114,31 @@ def add9(a: Nine, b: Nine) -> Nine:
     )
 
 
-@kernel
+@inlined
 def add3(a: Three, b: Three) -> Three:
     """A + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel
+@inlined
 def cross(a: Three, b: Three) -> Three:
     """A x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
+@inlined
 def cross_matrix(a: Three) -> Nine:
     """[a]x, the matrix whose product with v is a x v."""
     return 0.0, -a[2], a[1], a[2], 0.0, -a[0], -a[1], a[0], 0.0
 
 
-@kernel
+@inlined
 def load9(r: Any) -> Nine:
     """The nine entries of a (3, 3) array."""
     return r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]
 
 
-@kernel
+@inlined
 def store9(r: Any, a: Nine) -> None:
     """Write nine entries into a (3, 3) array."""
     r[0, 0], r[0, 1], r[0, 2] = a[0], a[1], a[2]
@@ -146,13 +146,13 @@ def store9(r: Any, a: Nine) -> None:
     r[2, 0], r[2, 1], r[2, 2] = a[6], a[7], a[8]
 
 
-@kernel
+@inlined
 def load3(x: Any) -> Three:
     """Three entries of an array."""
     return x[0], x[1], x[2]
 
 
-@kernel
+@inlined
 def gram(q: Nine, k: Nine) -> Six:
     """The symmetric part of Qᵀ K, which is symmetric where K = -S Q with symmetric S."""
     return (

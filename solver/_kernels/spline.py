@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined, kernel
 
 
 class Field(NamedTuple):
@@ -60,7 +60,7 @@ def prefilter(values: Any) -> None:
             values[:, j, k] = line[:nx]
 
 
-@kernel
+@inlined
 def locate(field: Field, x: float, y: float, z: float, fraction: Any) -> tuple[int, int, int, bool]:
     """Cell of a point and its place in it (into ``fraction``); the flag says that it lies in the grid."""
     inside = True
@@ -84,7 +84,7 @@ def locate(field: Field, x: float, y: float, z: float, fraction: Any) -> tuple[i
     return cell[0], cell[1], cell[2], inside
 
 
-@kernel
+@inlined
 def trilinear(field: Field, i: int, j: int, k: int, fraction: Any) -> float:
     """Trilinear look-up among the coefficients: within ``field.gap`` of the spline, at a tenth of its cost."""
     c = field.coefficients
@@ -96,7 +96,7 @@ def trilinear(field: Field, i: int, j: int, k: int, fraction: Any) -> float:
     return float(low * (1 - r) + high * r)
 
 
-@kernel
+@inlined
 def basis(t: float, weights: Any) -> None:
     """Fill (3, 4) weights: value, first and second derivative per index of the four coefficients around t."""
     if t < 0.0 or t > 1.0:
@@ -171,7 +171,7 @@ def value(field: Field, i: int, j: int, k: int, weights: Any) -> float:
     return total
 
 
-@kernel
+@inlined
 def to_world(field: Field, jet: Any) -> None:
     """Turn the derivatives of a jet from per index into per mm, in place: g <- Mᵀ g, H <- Mᵀ H M."""
     m = field.to_index

@@ -1,0 +1,148 @@
+"""The seed's relaxation (its eq. 8-10) in the form that its own model leads to.
+
+Segment i is turned by a_i = |G⊥ - Υ_i| λ / (ρ_i - G^P), away from the gradient, all segments at once; later
+segments move along without turning (eq. 9). Deviations from the printed eq. 10, which moves uphill:
+- α_i keeps the segment's length, so its longitudinal part is -a_i²/(2λ) and the denominator has the sign shown;
+- Υ_i and ρ_i hold the sum of the two joints that α_i bends, c_i b̂_i and c_{i+1} n̂, divided by λ;
+- the numerator is the exact gradient of the total energy: θ of eq. 1 instead of sin θ, the roll that turning a
+  segment hands on to every rest bend behind it, and the wall under a segment;
+- a step counts only where the total energy falls, is limited, and the loop stops on Newton's decrement, never
+  on a_i: at 40 segments a_i/λ < 1e-3 leaves the tip wrong by 16 % of the length.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels.energy import total_energy
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.follow import aim
+from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, ROUND_OFF, STALLED, admissible, scale_of
+from solver._kernels.newton import costate, jacobian, node_gradient, sweep
+from solver._kernels.problem import ROLLOUTS, SWEEPS, Problem
+from solver._kernels.rotation import turn
+from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9
+
+STEP = tol.CLOSED_FORM_ANGLE
+SMALLEST = tol.CLOSED_FORM_SMALLEST
+
+
+@inlined
+def keep_direction(jac: Nine, incoming: Three) -> tuple[float, float, float]:
+    """Change (δu0, δu1) of a control that undoes an incoming rotation's turn, and the roll that is left."""
+    det = jac[0] * jac[4] - jac[1] * jac[3]
+    v0 = -(jac[4] * incoming[0] - jac[1] * incoming[1]) / det
+    v1 = -(jac[0] * incoming[1] - jac[3] * incoming[0]) / det
+    return v0, v1, incoming[2] + jac[6] * v0 + jac[7] * v1
+
+
+@kernel
+def gradients(problem: Problem, which: int, k: int) -> None:
+    """Fill gain[i, 0:2, 0] with minus the gradient and gain[i, 2, 0] with ρ_i - G^P of turning segment i alone.
+
+    Backward over the segments: f is the wall's G in the frame of segment i; ``roll`` is what rolling the frame
+    that enters joint i + 1 costs while all directions behind it stay, gain[i, 0, 1] the same for segment i.
+    """
+    chain, state, gain = problem.chain, problem.state, problem.scratch.gain
+    f, roll = (0.0, 0.0, 0.0), 0.0
+    for i in range(k - 1, -1, -1):
+        frame = load9(state.r[which, i + 1])
+        df, dg = node_gradient(problem, which, i + 1, frame)
+        f = add3(f, df)
+        u = load3(state.u[which, i])
+        bend, length = chain.bend[i], chain.length[i]
+        jac = jacobian(u[0], u[1], u[2])
+        rho = bend * math.cos(math.sqrt(u[0] * u[0] + u[1] * u[1])) - length * f[2]
+        if i < k - 1:
+            w = load3(state.u[which, i + 1])
+            rho += chain.bend[i + 1] * math.cos(math.sqrt(w[0] * w[0] + w[1] * w[1]))
+        gain[i, 2, 0] = rho
+        gain[i, 0, 1] = dg[2] + roll
+        for a in range(2):
+            # turn segment i by a unit rotation about its own axis a
+            back = (-1.0, 0.0, 0.0) if a == 0 else (0.0, -1.0, 0.0)
+            v0, v1, twist = keep_direction(jac, back)
+            slope = bend * (u[0] * v0 + u[1] * v1) + dg[a] + dg[2] * twist
+            slope += -length * f[1] if a == 0 else length * f[0]
+            slope += after(problem, which, k, i + 1, a) + roll * twist
+            gain[i, a, 0] = -slope
+        e = turn(chain.rest[i], u[0], u[1], u[2])
+        v0, v1, twist = keep_direction(jac, (e[6], e[7], e[8]))
+        roll = bend * (u[0] * v0 + u[1] * v1) + gain[i, 0, 1] * twist
+        f = apply(e, f)
+
+
+@inlined
+def after(problem: Problem, which: int, k: int, j: int, axis: int) -> float:
+    """What turning the segment before joint j, without rolling it, costs at that joint and behind it."""
+    if j >= k:
+        return 0.0
+    u = load3(problem.state.u[which, j])
+    e = turn(problem.chain.rest[j], u[0], u[1], u[2])
+    incoming = apply_transposed(e, (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0))
+    v0, v1, left = keep_direction(jacobian(u[0], u[1], u[2]), incoming)
+    return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
+
+
+@kernel
+def propose(problem: Problem, which: int, k: int, share: float) -> None:
+    """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
+    chain, state, gain = problem.chain, problem.state, problem.scratch.gain
+    new = 1 - which
+    state.x[new, 0, :] = state.x[which, 0]
+    state.r[new, 0, :, :] = state.r[which, 0]
+    for i in range(k):
+        rho = gain[i, 2, 0]
+        if rho <= 0.0:
+            # beyond the validity of eq. 10 (the wire is compressed past its own buckling load)
+            rho = chain.bend[i]
+        d0, d1 = share * gain[i, 0, 0] / rho, share * gain[i, 1, 0] / rho
+        size = math.sqrt(d0 * d0 + d1 * d1)
+        if size > STEP:
+            d0, d1 = d0 * STEP / size, d1 * STEP / size
+        for a in range(3):
+            r = state.r[which, i + 1, a]
+            state.x[new, i + 1, a] = state.x[new, i, a] + chain.length[i] * (r[2] + d1 * r[0] - d0 * r[1])
+        state.u[new, i, 2] = 0.0
+        aim(chain, state.u[new], state.x[new], state.r[new], i)
+
+
+@kernel
+def minimise_closed_form(
+    problem: Problem, k: int, tolerance: float, max_sweeps: int, report: Any
+) -> tuple[int, int, int, float]:
+    """Relax state 0 by the seed's sweeps; arguments and results as ``minimise``, iterations are sweeps."""
+    which, share = 0, 1.0
+    energy = total_energy(problem, which, k)
+    report[18] = energy
+    check = 32
+    for count in range(max_sweeps):
+        if not math.isfinite(energy):
+            return BROKEN, count, which, energy
+        if count == check or count == 0:
+            check += check // 4
+            sweep(problem, which, k, 0, False, 0.0, report)
+            problem.scratch.counter[SWEEPS] += 1
+            noise = ROUND_OFF * scale_of(problem, which, k)
+            if report[2] < 0.0 and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
+                costate(problem, which, k, report)
+                return CONVERGED, count, which, energy
+        gradients(problem, which, k)
+        trial = math.inf
+        while share > SMALLEST:
+            propose(problem, which, k, share)
+            problem.scratch.counter[ROLLOUTS] += 1
+            trial = total_energy(problem, 1 - which, k)
+            if trial <= energy and admissible(problem, which, k):
+                break
+            trial = math.inf
+            share *= 0.5
+        if trial == math.inf:
+            costate(problem, which, k, report)
+            return STALLED, count, which, energy
+        which, energy = 1 - which, trial
+        share = min(1.0, 1.1 * share)
+    costate(problem, which, k, report)
+    return EXHAUSTED, max_sweeps, which, energy
