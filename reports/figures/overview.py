@@ -59,9 +59,8 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
         *edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, edgecolors="white", linewidth=0.4
     )
     axes.plot(table["frame"].to_numpy(dtype=int)[failed], rows[failed], "x", color=VERMILION, markersize=5)
-    figure.colorbar(
-        mesh, ax=axes, label="95th percentile, mm", extend="max" if clipped else "neither", pad=0.01
-    )
+    extend = "max" if clipped else "neither"
+    figure.colorbar(mesh, ax=axes, label="95th percentile, mm", extend=extend, **_bar(figure))
     _name_rows(axes, cases)
     axes.set_xlabel("frame")
     whole_numbers(axes.xaxis)
