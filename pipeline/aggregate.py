@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline import results
-from pipeline.summary import intervals
+from pipeline.summary import intervals, pooled_rms
 from reports import tables
 from reports.schema import FAILURES_COLUMNS, SUMMARY_COLUMNS, names
 
@@ -62,10 +62,9 @@ def overall(out: Path, found: list[dict[str, Any]], draws: int = 2000) -> dict[s
         return {}
     table = np.array(rows)
     units = [np.flatnonzero([g == name for g in groups]) for name in dict.fromkeys(groups)]
-    pooled = lambda t: float(np.sqrt(t[:, 1].sum() / t[:, 0].sum()))  # noqa: E731
-    (low, high), *_ = intervals(table, units, (pooled,), draws)
+    (low, high), *_ = intervals(table, units, (pooled_rms,), draws)
     return {
-        "rms_mm": pooled(table),
+        "rms_mm": pooled_rms(table),
         "rms_low_mm": low,
         "rms_high_mm": high,
         "groups": len(units),

@@ -57,7 +57,12 @@ def record_crash(job: Job, reason: str, error: BaseException | None = None) -> N
         handle.write("".join(traceback.format_exception(error)) if error else reason + "\n")
     status = "crashed"
     sentence = "the case ended in an unexpected error; its log has the traceback"
-    row = {"case": job.case.id, "group": job.case.group, "role": job.case.role, "status": status}
+    row: dict[str, Any] = {
+        "case": job.case.id,
+        "group": job.case.group,
+        "role": job.case.role,
+        "status": status,
+    }
     count = job.case.frame_count
     row |= {"frames": count, "frames_ok": 0, "frames_failed": count}
     failure = {"case": job.case.id, "status": status, "sentence": sentence, "message": reason}

@@ -14,6 +14,7 @@ from pipeline import nulls, scans
 from pipeline.cache import Store, file_hash, key_of
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
 from pipeline.config import Config
+from pipeline.curves import to_length
 from pipeline.frame import Frame
 from pipeline.load import Header, LoadError
 from pipeline.manifest import Case
@@ -325,5 +326,5 @@ def _score_nulls(run: CaseRun, frame: Frame, static: nulls.Nulls | None, previou
     step = run.config.compare.sample_mm
     for name, guess in guesses.items():
         if guess is not None:
-            points = nulls.to_length(guess, frame.depth_mm, step)
+            points = to_length(guess, frame.depth_mm, step)
             frame.nulls_rms_mm[name] = rms(point_to_curve(points, frame.curve.points_mm)[0])

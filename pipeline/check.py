@@ -47,7 +47,9 @@ def _entry_problems(case: Case, scans: Scans) -> list[str]:
         index = header.grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
-                corners = header.grid.to_mm([(0, 0, 0), np.array(header.shape) - 1]).round(1).tolist()
+                corners = (
+                    header.grid.to_mm(np.array([(0, 0, 0), header.shape]) - [[0], [1]]).round(1).tolist()
+                )
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
                     f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "

@@ -18,7 +18,7 @@ def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
     arc = arc_length(curve)
     inside = np.stack([np.interp(wanted, arc, curve[:, a]) for a in range(3)], axis=-1)
     beyond = np.maximum(wanted - arc[-1], 0.0)[..., None] * tip_tangent(curve)
-    return np.asarray(inside + beyond)
+    return np.asarray(inside + beyond, dtype=np.float64)
 
 
 def samples(length_mm: float, step_mm: float) -> Array:
@@ -55,5 +55,4 @@ def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:
     if len(path) < 5:
         return path
     spline, _ = make_splprep(path.T, s=3.0 * len(path) * sigma_mm**2)
-    dense = spline(np.linspace(0.0, 1.0, 4 * len(path))).T
-    return resample(dense, step_mm)
+    return resample(np.asarray(spline(np.linspace(0.0, 1.0, 4 * len(path)))).T, step_mm)

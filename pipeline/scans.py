@@ -61,7 +61,7 @@ def read_headers(case: Case, config: LoadConfig) -> Scans:
 def lumen_box(header: Header, lumen: Lumen) -> Box:
     """The voxels of a scan that the lumen's box covers."""
     grid = lumen.distance
-    corners = header.grid.to_index(grid.to_mm([(0, 0, 0), np.array(grid.shape) - 1]))
+    corners = header.grid.to_index(grid.to_mm(np.array([(0, 0, 0), grid.shape]) - [[0], [1]]))
     low = np.clip(np.floor(corners.min(axis=0) + 1e-6), 0, np.array(header.shape) - 1).astype(int)
     high = np.clip(np.ceil(corners.max(axis=0) - 1e-6) + 1, low + 1, header.shape).astype(int)
     return (int(low[0]), int(low[1]), int(low[2])), (int(high[0]), int(high[1]), int(high[2]))
@@ -79,7 +79,7 @@ def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np
 
     def project(axis: int) -> NDArray[np.uint8]:
         peak = volume.values.max(axis=axis).astype(np.float32)
-        return np.clip((peak - low) * scale, 0, 255).astype(np.uint8)
+        return np.asarray(np.clip((peak - low) * scale, 0, 255), dtype=np.uint8)
 
     return project(0), project(1), project(2)
 

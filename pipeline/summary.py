@@ -58,7 +58,8 @@ def intervals(
     return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
-def _pooled_rms(rows: Array) -> float:
+def pooled_rms(rows: Array) -> float:
+    """Root mean square over rows of (number of points, sum of squares, ...)."""
     return float(np.sqrt(rows[:, 1].sum() / rows[:, 0].sum()))
 
 
@@ -79,9 +80,9 @@ def pooled(frames: Sequence[Frame], draws: int) -> dict[str, float]:
     tips = np.array([f.comparison.tip_mm for f in used if f.comparison])
     rows = np.column_stack([_squares(used), tips])
     units = blocks(len(used), max(round(np.sqrt(len(used))), 1))
-    rms_ci, tip_ci, skill_ci = intervals(rows, units, (_pooled_rms, _median_tip, _pooled_skill), draws)
+    rms_ci, tip_ci, skill_ci = intervals(rows, units, (pooled_rms, _median_tip, _pooled_skill), draws)
     return {
-        "rms_mm": _pooled_rms(rows),
+        "rms_mm": pooled_rms(rows),
         "rms_low_mm": rms_ci[0],
         "rms_high_mm": rms_ci[1],
         "mean_mm": float(errors.mean()),

@@ -62,7 +62,7 @@ def _run(
     points: list[sweep.Point],
     assumptions: tuple[str, ...],
 ) -> int:
-    info = {"manifest": str(manifest.path), "manifest_sha256": file_hash(manifest.path)}
+    info: dict[str, Any] = {"manifest": str(manifest.path), "manifest_sha256": file_hash(manifest.path)}
     info |= {"provenance": collect(), "assumptions": assumptions, "config": settings.as_dict()}
     write_text(args.out / "config.resolved.toml", to_toml(settings))
     name = "run.json" if not args.shard else f"run.{args.shard.replace('/', '-')}.json"
