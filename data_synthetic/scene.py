@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from data_synthetic.rod import Wall
 from data_synthetic.scan_grid import ScanGrid
 from data_synthetic.scanner import Greys
 from data_synthetic.tubes import Anatomy, Tube
@@ -34,7 +35,7 @@ class Setup:
     depths_mm, rolls_deg : one per frame.     stiffness_N_mm2 : of the wall; 2 is that of a 2 MPa silicone.
     bone_gap_mm : what bone keeps from the lumen.     spacing_ratio : voxel edges relative to the voxel size.
     axes : direction matrix of the scan.     visible : which frames show the wire.     others : more wires, always.
-    motion_mm : (frames, 3) shift of the phantom against the reference scan.
+    motion_mm : (frames, 3) shift of the phantom against the reference scan.     wall : when it is not the anatomy.
     """
 
     anatomy: Anatomy
@@ -54,6 +55,7 @@ class Setup:
     visible: tuple[bool, ...] | None = None
     others: Wires = ()
     motion_mm: Array | None = None
+    wall: Wall | None = None
 
 
 @dataclass(frozen=True)

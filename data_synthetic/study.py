@@ -14,7 +14,7 @@ from data_synthetic.scan_grid import ScanGrid, centred_grid
 from data_synthetic.scanner import PsfScanner
 from data_synthetic.scene import Scanner, Scene, Setup, Study, Wires
 from data_synthetic.truth_cache import cached_replay
-from data_synthetic.wire_truth import Insertion, TrueFrame, normal_to, rotate
+from data_synthetic.wire_truth import Insertion, TrueFrame, halving_moves, normal_to, rotate
 
 Array = NDArray[np.float64]
 ScannerFactory = Callable[[Setup, ScanGrid], Scanner]
@@ -24,6 +24,9 @@ ENTRY_ERROR_VOXELS = 0.5
 
 DIRECTION_ERROR_DEG = 2.0
 """How far the manifest's entry direction is from the true one."""
+
+LONGEST_ADVANCE_MM = 0.4
+"""Insertion between two equilibria: a tip cannot pass a wall of 1 mm unseen, and smaller steps change nothing."""
 
 DEPTH_NOISE_MM = 0.2
 """sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
@@ -51,7 +54,8 @@ def make_study(
     ratio = np.array(setup.spacing_ratio)
     nx, ny, nz = (max(2, round(size / r)) for r in ratio)
     grid = centred_grid(setup.centre_mm, (nx, ny, nz), voxel * ratio, setup.axes)
-    truth = true_wire(setup, truth_step_mm)
+    insertion = planned_insertion(setup, truth_step_mm)
+    truth = cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
     machine = _Machine(setup, grid, scanner, seed)
     return Study(
         name=scene.name,
@@ -61,31 +65,33 @@ def make_study(
         truth=tuple(_shifted(f, setup.motion_mm, i) for i, f in enumerate(truth)),
         expected=scene.expected_statuses(frames),
         manifest=_manifest(scene.name, setup, grid, np.random.default_rng([seed, 4])),
-        quality=truth_quality(truth),
+        quality=truth_quality(insertion, truth),
         setup=setup,
         make_frame=lambda i: machine.frame(i, truth[i]),
     )
 
 
-def true_wire(setup: Setup, step_mm: float) -> tuple[TrueFrame, ...]:
-    """The replayed insertion of a set-up."""
-    insertion = Insertion(
+def planned_insertion(setup: Setup, step_mm: float) -> Insertion:
+    """What the true wire goes through in a set-up."""
+    return Insertion(
         setup.wire,
-        setup.anatomy,
+        setup.anatomy if setup.wall is None else setup.wall,
         setup.stiffness_N_mm2,
         setup.entry_mm,
         setup.direction,
         setup.material_axis,
         step_mm,
-        max(step_mm, 0.4),
+        max(step_mm, LONGEST_ADVANCE_MM),
     )
-    return cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
 
 
-def truth_quality(truth: tuple[TrueFrame, ...]) -> dict[str, float]:
-    """Figures that tell how far the truth can be trusted."""
+def truth_quality(insertion: Insertion, truth: tuple[TrueFrame, ...]) -> dict[str, float]:
+    """Figures that tell how far the truth can be trusted; halving is tried on first, middle and last frame."""
+    tried = {0, len(truth) // 2, len(truth) - 1}
     return {
+        "node_spacing_mm": insertion.step_mm,
         "largest_residual_N": max(f.residual_N for f in truth),
+        "halving_moves_mm": max(halving_moves(insertion, truth[i]) for i in tried),
         "largest_tip_jump_mm": max(f.jump_mm for f in truth),
         "largest_contact_N": max(float(np.linalg.norm(f.contact_N, axis=1).max()) for f in truth),
         "newton_iterations": float(sum(f.iterations for f in truth)),

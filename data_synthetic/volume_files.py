@@ -96,7 +96,7 @@ class _Dicom:
     def _write(self, scan: Scan, folder: Path, series: int) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         image = to_image(scan, self.grid)
-        writer: Any = sitk.ImageFileWriter()  # type: ignore[no-untyped-call]
+        writer: Any = sitk.ImageFileWriter()
         writer.KeepOriginalImageUIDOn()
         for k in range(image.GetDepth()):
             sheet = image[:, :, k]

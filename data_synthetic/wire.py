@@ -21,8 +21,8 @@ class TrueWire:
     """
 
     radius_mm: float = 0.18
-    bending_N_mm2: Profile = ((0.0, 0.5), (30.0, 2.5), (80.0, 8.0))
-    rest_curvature_per_mm: Profile = ((0.0, 0.1), (8.0, 0.1), (8.0, 0.0))
+    bending_N_mm2: Profile = ((0.0, 0.5), (10.0, 0.5), (30.0, 1.5), (80.0, 4.0))
+    rest_curvature_per_mm: Profile = ((0.0, 0.12), (8.0, 0.12), (8.0, 0.0))
     torsional_N_mm2: float = float("inf")
     axial_N: float = 2.0e4
 

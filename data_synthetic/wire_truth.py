@@ -9,7 +9,7 @@ as functions of the distance from the tip, a wall energy of half k d squared per
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -168,3 +168,14 @@ def _slide(rod: Rod, shape: Shape, ends: Array, arcs: Array) -> Shape:
     inside = np.minimum(arcs, ends[-1])
     tip = unit(curve(ends[-1], 1))
     return shape_from_points(rod, curve(inside) + (arcs - inside)[:, None] * tip)
+
+
+def halving_moves(insertion: Insertion, frame: TrueFrame) -> float:
+    """How far a frame's wire moves, mm at equal arc length, when relaxed again on nodes half as far apart."""
+    fine = replace(insertion, step_mm=0.5 * insertion.step_mm)
+    rod = _rod(fine, frame.depth_mm, frame.roll_deg)
+    ends = np.concatenate([[0.0], np.cumsum(edge_lengths(frame.depth_mm, insertion.step_mm))])
+    arcs = np.concatenate([[0.0], np.cumsum(rod.lengths)])
+    coarse = _slide(rod, shape_from_points(rod, frame.points_mm), ends, arcs)
+    again = relax(rod, coarse, NEWTON_FORCE_N)
+    return float(np.max(np.linalg.norm(again.shape.points - coarse.points, axis=1)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 from numba import njit
@@ -16,7 +16,10 @@ Array = NDArray[np.float64]
 Volume = NDArray[np.float32]
 
 SUBSAMPLES = 4
-"""Sub-voxels per axis where the wall crosses a voxel: 64 positions, a grain of 1.6 % of a voxel."""
+"""Sub-voxels per axis where the wall crosses a voxel, the wall being a plane in each."""
+
+CUT = 4.0
+"""Gaussians are cut at this many sd: the rest of the weight is 6e-5."""
 
 RING_POINTS, RINGS = 16, 4
 """Points over the wire's cross-section, rings of equal area."""
@@ -47,6 +50,8 @@ def fill_coverage(
 ) -> None:
     """Coverage of listed voxels (n, 3); axes (3, 3) are index steps in mm, reach is half a voxel's diagonal."""
     points, tangents, radii, slopes, starts, steps, blends, balls, block_starts = tables
+    # within a sub-cell the wall is taken as a plane: no grain where it is parallel to a face
+    cell = 2.0 * reach / np.sqrt(3.0) / sub
     for n in range(len(index)):
         p = origin + axes @ index[n].astype(np.float64)
         f, _, _, _ = union_distance(
@@ -55,7 +60,7 @@ def fill_coverage(
         if abs(f) > reach:
             out[n] = 1.0 if f < 0 else 0.0
             continue
-        inside = 0
+        inside = 0.0
         for i in range(sub):
             for j in range(sub):
                 for k in range(sub):
@@ -80,7 +85,7 @@ def fill_coverage(
                         balls,
                         block_starts,
                     )
-                    inside += f < 0
+                    inside += min(max(0.5 - f / cell, 0.0), 1.0)
         out[n] = inside / sub**3
 
 
@@ -98,7 +103,7 @@ def near_voxels(anatomy: Anatomy, grid: ScanGrid, margin_mm: float) -> NDArray[n
 
 
 def lumen_coverage(anatomy: Anatomy, grid: ScanGrid, sub: int = SUBSAMPLES) -> Volume:
-    """Share of every voxel inside the lumen, by ``sub`` cubed positions where the wall crosses it."""
+    """Share of every voxel inside the lumen, by ``sub`` cubed sub-cells where the wall crosses it."""
     reach = 0.5 * float(np.linalg.norm(grid.spacing_mm))
     # a smooth union lies outside its tubes by at most a sixth of the blend width
     blend = max(t.blend_mm for t in anatomy.tubes) / 6.0
@@ -147,19 +152,33 @@ def _disc(radius_mm: float) -> Array:
     return np.column_stack([(ring[:, None] * np.cos(angle)).ravel(), (ring[:, None] * np.sin(angle)).ravel()])
 
 
-def wire_coverage(
-    points_mm: Array, radius_mm: float, grid: ScanGrid, margin: int
-) -> tuple[tuple[slice, ...], Volume]:
-    """Share of wire in every voxel of the smallest box around it, ``margin`` voxels wider; the box and the share."""
-    filled, volume = wire_particles(points_mm, radius_mm, 0.05 * grid.voxel_mm)
-    voxel = np.rint(grid.to_index(filled)).astype(np.int64)
-    low = np.maximum(voxel.min(axis=0) - margin, 0)
-    high = np.minimum(voxel.max(axis=0) + margin + 1, grid.shape)
-    box = tuple(slice(int(a), int(max(a, b))) for a, b in zip(low, high, strict=True))
-    shape = tuple(s.stop - s.start for s in box)
-    inside = np.all((voxel >= low) & (voxel < high), axis=1)
-    share: NDArray[Any] = np.zeros(shape)
-    if np.any(inside):
-        flat = np.ravel_multi_index(tuple((voxel[inside] - low).T), shape)
-        share = np.bincount(flat, minlength=int(np.prod(shape))).reshape(shape) * volume
-    return box, (share / float(np.prod(grid.spacing_mm))).astype(np.float32)
+@njit(cache=True)
+def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
+    """Add weighted points (n, 3), in voxels, blurred by a Gaussian (sd per axis) and integrated over every voxel."""
+    reach = np.ceil(CUT * sigma + 0.5).astype(np.int64)
+    profile = np.zeros((3, 2 * reach.max() + 1))
+    low = np.empty(3, np.int64)
+    for n in range(len(index)):
+        inside = True
+        for a in range(3):
+            low[a] = int(np.rint(index[n, a])) - reach[a]
+            inside = inside and low[a] >= 0 and low[a] + 2 * reach[a] < out.shape[a]
+            scale = 1.0 / (np.sqrt(2.0) * sigma[a])
+            below = math.erf((low[a] - 0.5 - index[n, a]) * scale)
+            for i in range(2 * reach[a] + 1):
+                above = math.erf((low[a] + i + 0.5 - index[n, a]) * scale)
+                profile[a, i] = 0.5 * (above - below)
+                below = above
+        for i in range(2 * reach[0] + 1):
+            x = low[0] + i
+            if not inside and (x < 0 or x >= out.shape[0]):
+                continue
+            for j in range(2 * reach[1] + 1):
+                y = low[1] + j
+                if not inside and (y < 0 or y >= out.shape[1]):
+                    continue
+                part = weights[n] * profile[0, i] * profile[1, j]
+                for k in range(2 * reach[2] + 1):
+                    z = low[2] + k
+                    if inside or (0 <= z < out.shape[2]):
+                        out[x, y, z] += part * profile[2, k]

@@ -182,7 +182,7 @@ def _aneurysm(plan: WillisPlan, carotid: Tube, radius: dict[str, float]) -> list
     if plan.aneurysm == "none":
         return []
     root, axis, neck = places[plan.aneurysm]
-    centre = root + (plan.sac_mm + 0.9) * axis
+    centre = root + (plan.sac_mm - 0.5) * axis
     return [
         sweep("neck", np.array([root, root + 0.5 * (centre - root), centre]), neck, blend_mm=0.8),
         ball("sac", centre, plan.sac_mm, blend_mm=1.2),
