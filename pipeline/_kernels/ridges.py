@@ -13,28 +13,63 @@ from pipeline._kernels.jets import jet, ridge_frame, ridge_step
 
 
 @njit(cache=True)
-def subtract(
-    frame: NDArray[Any],
-    background: NDArray[Any],
-    corner: NDArray[Any],
-    voxels: NDArray[Any],
-    out: NDArray[Any],
-) -> None:
-    """frame - background at flat indices of the box ``out``, whose voxel (0, 0, 0) is ``corner`` of the frame.
+def runs_below(distance: NDArray[Any], limit: float) -> NDArray[Any]:
+    """Runs (n, 4) along the last axis where ``distance`` < limit: i, j, first k, one past the last k."""
+    ni, nj, nk = distance.shape
+    runs = np.empty((4096, 4), np.int64)
+    count = 0
+    for i in range(ni):
+        for j in range(nj):
+            k = 0
+            while k < nk:
+                if distance[i, j, k] >= limit:
+                    k += 1
+                    continue
+                start = k
+                while k < nk and distance[i, j, k] < limit:
+                    k += 1
+                if count >= runs.shape[0]:
+                    larger = np.empty((2 * count, 4), np.int64)
+                    larger[:count] = runs
+                    runs = larger
+                runs[count, 0], runs[count, 1], runs[count, 2], runs[count, 3] = i, j, start, k
+                count += 1
+    return runs[:count]
 
-    ``background`` is on the box. Voxels of the box outside the frame keep their value.
+
+@njit(cache=True)
+def subtract(
+    frame: NDArray[Any], background: NDArray[Any], corner: NDArray[Any], runs: NDArray[Any], out: NDArray[Any]
+) -> int:
+    """frame - background on ``runs`` of the box ``out``, whose voxel (0, 0, 0) is ``corner`` of the frame.
+
+    ``background`` is on the box. Returns the number of voxels read.
     """
-    _, nj, nk = out.shape
-    fi, fj, fk = frame.shape
-    for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
-        a, b, c = i + corner[0], j + corner[1], k + corner[2]
-        if a >= 0 and b >= 0 and c >= 0 and a < fi and b < fj and c < fk:
-            out[i, j, k] = float(frame[a, b, c]) - background[i, j, k]
+    read = 0
+    for n in range(runs.shape[0]):
+        i, j, first, stop = runs[n, 0], runs[n, 1], runs[n, 2], runs[n, 3]
+        a, b, c = i + corner[0], j + corner[1], corner[2]
+        for k in range(first, stop):
+            out[i, j, k] = frame[a, b, k + c] - background[i, j, k]
+        read += stop - first
+    return read
+
+
+@njit(cache=True)
+def above(grey: NDArray[Any], allowed: NDArray[Any], runs: NDArray[Any], level: float) -> NDArray[Any]:
+    """Flat indices of the voxels on ``runs`` that are allowed and brighter than ``level``."""
+    _, nj, nk = grey.shape
+    found = np.empty(4096, np.int64)
+    count = 0
+    for n in range(runs.shape[0]):
+        i, j = runs[n, 0], runs[n, 1]
+        for k in range(runs[n, 2], runs[n, 3]):
+            if grey[i, j, k] > level and allowed[i, j, k]:
+                if count + 1 >= found.shape[0]:
+                    found = _grown(found)
+                found[count] = (i * nj + j) * nk + k
+                count += 1
+    return found[:count]
 
 
 @njit(cache=True)
@@ -175,10 +210,11 @@ def tracklets(
         j = rest % nj
         i = rest // nj
         taken = False
-        for a in range(max(0, i - 1), min(grey.shape[0], i + 2)):
-            for b in range(max(0, j - 1), min(nj, j + 2)):
-                for c in range(max(0, k - 1), min(nk, k + 2)):
-                    taken = taken or stamp[a, b, c] != 0
+        for a in range(max(0, i - 2), min(grey.shape[0], i + 3)):
+            for b in range(max(0, j - 2), min(nj, j + 3)):
+                for c in range(max(0, k - 2), min(nk, k + 3)):
+                    if (a - i) * (a - i) + (b - j) * (b - j) + (c - k) * (c - k) <= 5:
+                        taken = taken or stamp[a, b, c] != 0
         if taken:
             continue
         p[0], p[1], p[2] = i * spacing[0], j * spacing[1], k * spacing[2]

@@ -10,7 +10,7 @@ from pipeline.config import SegmentConfig
 from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
-from pipeline.segment.levels import deepest, levels_at
+from pipeline.segment.levels import deepest, levels_at, scanner_blur
 from pipeline.segment.surface import signed_distance
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
@@ -106,5 +106,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
             grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
         )
     distance, mask = at_level(distance, again.half - levels.half, levels.contrast, counters["blur_mm"])
+    counters["scanner_blur_mm"] = scanner_blur(
+        counters["blur_mm"], affinity.taps, float(np.min(grid.spacing_mm))
+    )
     counters |= {"voxels_read": read, "voxels_total": float(np.prod(grid.shape)), "noise": levels.noise}
     return Lumen(reorder(distance, axes), reorder(mask, axes), again.half, (), counters)

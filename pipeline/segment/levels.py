@@ -108,12 +108,16 @@ def plateau(distance_mm: NDArray[Any], grey: NDArray[Any], levels: Levels, blur_
     return Levels(levels.outside + peak, levels.outside, levels.noise)
 
 
-def deepest(grid: Grid, distance: Grid, levels: Levels, taps: NDArray[Any], blur_mm: float) -> Levels:
-    """:func:`plateau` of a segmented vessel; ``blur_mm`` is the whole blur, of which smoothing is taken off."""
-    h = float(np.min(grid.spacing_mm))
+def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
+    """The whole blur less the smoothing by ``taps`` and by the spline, mm; 0.3 voxel at least."""
     reach = np.arange(len(taps)) - len(taps) // 2
     smoothing = float(np.sum(reach**2 * taps)) + 1.0 / 3.0
-    own = np.sqrt(max(blur_mm**2 - smoothing * h**2, (0.3 * h) ** 2))
+    return float(np.sqrt(max(blur_mm**2 - smoothing * voxel**2, (0.3 * voxel) ** 2)))
+
+
+def deepest(grid: Grid, distance: Grid, levels: Levels, taps: NDArray[Any], blur_mm: float) -> Levels:
+    """:func:`plateau` of a segmented vessel; ``blur_mm`` is the whole blur, of which smoothing is taken off."""
+    own = scanner_blur(blur_mm, taps, float(np.min(grid.spacing_mm)))
     corner = np.rint(grid.to_index(distance.origin_mm)).astype(int)
     window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
     inside = distance.values < 0

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.ridges import smooth_voxels, tracklets
+from pipeline._kernels.ridges import above, smooth_voxels, tracklets
 from pipeline.model import Array, arc_length
 from pipeline.trace.scene import MAD, Scene
 
@@ -18,6 +18,8 @@ KEEP_SIGMAS = 3.0
 """and goes on down to this many."""
 TURN = 0.75
 """Least cosine between the directions of two steps of one voxel: a wire turning within 1.5 voxels is none."""
+PREFILTER = 1.5
+"""Only voxels this many noises up are smoothed to look for seeds: one in fifteen of the lumen, most of the wire."""
 LONGEST = 20000
 """Most points of a tracklet on either side of its seed."""
 
@@ -62,12 +64,13 @@ def find_crests(scene: Scene, sigma_voxel: float, seed_sigmas: float = SEED_SIGM
     """All tracklets in the region; ``sigma_voxel`` is the blur in which crests are looked for."""
     h = float(scene.spacing.min())
     taps = gaussian_taps(sigma_voxel)
-    smooth = smooth_voxels(scene.grey, taps, scene.region.within)
-    middle = float(np.median(smooth[::7]))
-    noise = MAD * float(np.median(np.abs(smooth[::7] - middle)))
+    sample = smooth_voxels(scene.grey, taps, scene.region.within[::4])
+    noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
+    bright = above(scene.grey, scene.region.allowed, scene.region.runs, PREFILTER * scene.noise)
+    smooth = smooth_voxels(scene.grey, taps, bright)
     strong = np.flatnonzero(smooth > seed_sigmas * noise)
     strong = strong[np.argsort(-smooth[strong], kind="stable")]
-    seeds = scene.region.within[strong]
+    seeds = bright[strong]
     high, low = seed_sigmas * noise, KEEP_SIGMAS * noise
     # a crest of height low in a blur of sigma_voxel bends by about low / sigma^2
     sharp = 0.15 * low / (sigma_voxel * h) ** 2

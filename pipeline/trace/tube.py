@@ -145,11 +145,12 @@ def _weights(data: TubeData, voxels: NDArray[np.int64]) -> Array:
     return np.where((index - point) @ direction > 0, 1.0, 0.0)
 
 
-def _step(data: TubeData, tube: Tube, samples: Samples, prior: Array) -> tuple[Array, Array, float, float]:
+def _step(
+    data: TubeData, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
+) -> tuple[Array, Array, float, float]:
     """One set of normal equations: matrix with prior, right-hand side, residual rms, and cost."""
     curve, velocity = _sampled(tube.controls, samples)
     radius = WINDOW * max(tube.sigma, 0.5 * float(data.spacing.min()))
-    slot = np.zeros(data.grey.shape, np.int32)
     voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
     weight = _weights(data, voxels)
     columns = prior.shape[0]
@@ -161,6 +162,7 @@ def _step(data: TubeData, tube: Tube, samples: Samples, prior: Array) -> tuple[A
         samples.measure, samples.tint_first, samples.tint_share, tube.tint, tube.sigma, tube.offset, radius, k,
         normal, right, residual,
     )  # fmt: skip
+    slot.reshape(-1)[voxels] = 0
     right[: 3 * k] -= prior[: 3 * k, : 3 * k] @ tube.controls.ravel()
     return normal + prior, right, float(np.sqrt(square / max(1.0, weight.sum()))), square
 
@@ -178,9 +180,9 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
     t /= np.linalg.norm(t, axis=1)[:, None] + 1e-12
     level = float(np.median(np.diag(normal)[: 3 * k]))
     out = normal.copy()
-    for m in range(1, k - 1):
-        window = slice(3 * m, 3 * m + 3)
-        out[window, window] += amount * level * np.outer(t[m], t[m])
+    m = np.arange(1, k - 1)
+    block = 3 * m[:, None] + np.arange(3)
+    out[block[:, :, None], block[:, None, :]] += amount * level * t[m][:, :, None] * t[m][:, None, :]
     diagonal = np.arange(3 * k)
     out[diagonal, diagonal] += 1e-4 * level
     return out
@@ -218,16 +220,17 @@ def fit_tube(
     columns = 3 * len(tube.controls) + len(tube.tint) + 2
     prior = _prior(len(tube.controls), columns, data.noise, voxel)
     held = [columns - 2] if not fit_sigma else []
+    slot = np.zeros(data.grey.shape, np.int32)
     done = 0
     for done in range(1, iterations + 1):
-        normal, right, _, _ = _step(data, tube, samples, prior)
+        normal, right, _, _ = _step(data, tube, samples, prior, slot)
         held_now = held if done > 2 else [columns - 2]
         normal = _frozen(_damped(normal, tube, 1e-2), held_now)
         right[held_now] = 0.0
         tube, size = _moved(tube, cho_solve(cho_factor(normal), right), voxel)
         if size < tolerance * voxel and done > 2:
             break
-    normal, _, rms, _ = _step(data, tube, samples, prior)
+    normal, _, rms, _ = _step(data, tube, samples, prior, slot)
     normal = _frozen(_damped(normal, tube, 1e-6), held)
     covariance = np.asarray(np.linalg.inv(normal) * data.noise**2, np.float64)
     return replace(tube, covariance=covariance, residual_rms=rms, iterations=done)
@@ -244,12 +247,9 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
     i, value, _ = weights_at(u, tube.intervals)
     _, velocity = evaluate(tube.controls, u)
     t = velocity / np.linalg.norm(velocity, axis=1)[:, None]
-    out = np.empty(len(u))
-    along = 0.0
-    for n in range(len(u)):
-        window = slice(3 * i[n], 3 * i[n] + 12)
-        basis = np.kron(value[n], np.eye(3))
-        block = basis @ tube.covariance[window, window] @ basis.T
-        along = float(t[n] @ block @ t[n])
-        out[n] = np.sqrt(max(0.0, 0.5 * (np.trace(block) - along)))
-    return out, float(np.sqrt(max(0.0, along)))
+    column = 3 * i[:, None] + np.arange(12)
+    blocks = tube.covariance[column[:, :, None], column[:, None, :]].reshape(-1, 4, 3, 4, 3)
+    spread = np.einsum("na,naibj,nb->nij", value, blocks, value)
+    along = np.einsum("ni,nij,nj->n", t, spread, t)
+    across = 0.5 * (np.trace(spread, axis1=1, axis2=2) - along)
+    return np.sqrt(np.maximum(across, 0.0)), float(np.sqrt(max(0.0, along[-1])))
