@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pipeline._kernels.ridges import above, smooth_voxels, tracklets
 from pipeline.model import Array, arc_length
-from pipeline.trace.scene import MAD, Scene
+from pipeline.trace.region import MAD
+from pipeline.trace.scene import Scene
 
 SEED_SIGMAS = 5.5
 """A tracklet starts at smoothed grey this many standard deviations up: noise gives none in 150 000 voxels."""

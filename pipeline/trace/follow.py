@@ -13,6 +13,7 @@ from pipeline.model import Array, Curve, Lumen, Volume, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.crests import find_crests
 from pipeline.trace.link import Path, link
+from pipeline.trace.noise import inflation
 from pipeline.trace.scene import Scene, build_scene
 from pipeline.trace.tip import cut_at_tip, resampled
 from pipeline.trace.tube import Tube, TubeData, evaluate, fit_tube, point_sigmas, spline_through, tint_nodes
@@ -161,6 +162,12 @@ def trace(
     data = TubeData(scene.grey, scene.spacing, scene.noise, plane)
     tube = fit_tube(data, first_tube(scene, line, 0.9 * h))
     fields = finish(scene, tube, points, bridged, entry, direction)
+    more = inflation(scene, scene.local(fields["points_mm"]), tube.sigma)
+    fields["sigma_mm"], fields["tip_sigma_mm"] = (
+        more.across * fields["sigma_mm"],
+        more.along * fields["tip_sigma_mm"],
+    )
+    counters |= {"inflation": more.across, "inflation_tip": more.along}
     counters |= {"pieces": float(len(crests.pieces)), "bridges": float(path.bridges), "leftover_mm": path.leftover_mm,
                  "iterations": float(tube.iterations), "residual_rms": tube.residual_rms, "blur_mm": tube.sigma,
                  "cnr": float(np.median(tube.tint)) / scene.noise}  # fmt: skip
