@@ -12,6 +12,7 @@ from reports.figures.by_depth import (
     tip_by_depth,
     truth_by_depth,
 )
+from reports.figures.every_frame import every_frame
 from reports.figures.overview import RunFiles, case_frame_map, cases_by_error
 from reports.figures.projections import failed_projections, projections
 from reports.figures.run_time import run_time
@@ -21,6 +22,7 @@ from reports.figures.sweep import sensitivity
 CASE_FIGURES: Mapping[str, Callable[[CaseFiles], Drawing | None]] = {
     "error_by_depth": error_by_depth,
     "projections": projections,
+    "every_frame": every_frame,
     "failed_projections": failed_projections,
     "simulated_wires": simulated_wires,
     "error_along_wire": error_along_wire,

@@ -71,7 +71,7 @@ def _draw(case: CaseFiles, scan: Scan, chosen: Sequence[tuple[int, str]]) -> Dra
         for axes in row[:3]:
             axes.set_xlabel("")
     _legend(figure, rows[0][0])
-    return Drawing(figure, pd.concat([_tidy(frame) for frame in frames]))
+    return Drawing(figure, pd.concat([_tidy(frame) for frame in frames]), compact=True)
 
 
 def _curves(frame: Frame) -> list[tuple[str, NDArray[np.float64]]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports import diff, tables
@@ -68,6 +68,7 @@ def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None
     assert "2 regressions" in found.sentence
 
 
+@settings(max_examples=30, deadline=None)
 @given(st.floats(0.01, 10), st.floats(0.01, 10), st.floats(0, 1))
 def test_a_change_one_way_is_undone_the_other_way(before: float, after: float, allowed: float) -> None:
     pair = ({"c": _table([_row(rms_mm=before)])}, {"c": _table([_row(rms_mm=after)])})

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import SimpleITK as sitk
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -21,6 +21,7 @@ CURVES = hnp.arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), eleme
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
+@settings(max_examples=30, deadline=None)
 @given(points=CURVES)
 def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray) -> None:
     folder = tmp_path_factory.mktemp("curve")

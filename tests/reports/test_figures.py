@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
+from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _planes
+from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _planes, _style
 from reports.figures._style import NULLS, STAGE_COLOURS, positive_axis
 from reports.frames_file import Frame, Scan, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS, SUMMARY_COLUMNS, SWEEP_COLUMNS
@@ -55,7 +56,8 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
-    assert set(CASE_FIGURES) - set(drawn) == {"failed_projections", "simulated_wires"}
+    absent = {"failed_projections", "simulated_wires"} | ({"every_frame"} if count == 1 else set())
+    assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles(
         {"c": case.errors}, tables.read_summary(out / "summary.csv"), tables.empty_table(SWEEP_COLUMNS)
     )
@@ -141,6 +143,17 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
 
 
+def test_the_sheet_of_frames_names_each_and_thins_long_insertions(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=41, failed=(0,)),))
+    drawing = CASE_FIGURES["every_frame"](read_case(out / "cases" / "c"))
+    assert drawing is not None
+    titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
+    assert len(titles) == 36
+    assert titles[0] == "0: no_wire"
+    assert titles[-1].startswith("40: 0.")
+    assert len(drawing.table) == 36
+
+
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=6, failed=(2,)),))
     drawing = CASE_FIGURES["error_by_depth"](read_case(out / "cases" / "c"))
@@ -206,3 +219,21 @@ def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float]
     axes = Figure().subplots()
     positive_axis(axes, [values])
     assert axes.get_yscale() == scale
+
+
+def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:
+    sizes = []
+    for compact in (False, True):
+        figure = _style.new_figure(2.0, 3.0, fitted=False)
+        axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
+        axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
+        axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
+        path = tmp_path / f"{compact}.png"
+        _style.save(_style.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
+        sizes.append(path.stat().st_size)
+    pixels = np.asarray(Image.open(path).convert("RGB"))
+    exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
+    assert pixels[0, 0].tolist() == [255, 255, 255]
+    assert np.any(np.all(pixels == (np.array(to_rgba(_style.ORANGE)[:3]) * 255).round(), axis=-1))
+    assert np.abs(pixels.astype(int) - exact).max() <= 24
+    assert sizes[1] < 0.6 * sizes[0]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports import schema, tables
@@ -109,6 +109,7 @@ def test_a_wrong_field_names_its_file(tmp_path: Path) -> None:
         tables.read_errors(path)
 
 
+@settings(max_examples=30, deadline=None)
 @given(
     error=st.lists(st.floats(0, 1e6), min_size=1, max_size=20),
     force=st.floats(-1e3, 1e3) | st.just(math.nan),
