@@ -54,7 +54,8 @@ def make_study(
     ratio = np.array(setup.spacing_ratio)
     nx, ny, nz = (max(2, round(size / r)) for r in ratio)
     grid = centred_grid(setup.centre_mm, (nx, ny, nz), voxel * ratio, setup.axes)
-    insertion = planned_insertion(setup, truth_step_mm)
+    # the shortest wire still gets a dozen nodes
+    insertion = planned_insertion(setup, min(truth_step_mm, min(setup.depths_mm) / 8.0))
     truth = cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
     machine = _Machine(setup, grid, scanner, seed)
     return Study(

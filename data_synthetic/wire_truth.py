@@ -99,7 +99,7 @@ def replay(
     rolls = (
         [float(roll_deg)] * len(depths) if isinstance(roll_deg, int | float) else [float(r) for r in roll_deg]
     )
-    depth, roll = (TIP_EDGES + 2) * insertion.step_mm, rolls[0]
+    depth, roll = min((TIP_EDGES + 2) * insertion.step_mm, depths[0]), rolls[0]
     rod = _rod(insertion, depth, roll)
     straight = np.concatenate([[0.0], np.cumsum(rod.lengths)])
     state = relax(

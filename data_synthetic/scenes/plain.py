@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from data_synthetic import shapes
@@ -11,8 +13,6 @@ from data_synthetic.wire import TrueWire
 
 ENTRY_ARC_MM = 4.0
 """The entry lies this far inside the vessel's beginning, clear of its rounded end."""
-
-STRAIGHT_WIRE = TrueWire(rest_curvature_per_mm=((0.0, 0.0),))
 
 
 def plain_setup(
@@ -46,12 +46,98 @@ def _bend(_rng: np.random.Generator, frames: int) -> Setup:
     return plain_setup(shapes.bend(), frames, 38.0)
 
 
-def _bifurcation(_rng: np.random.Generator, frames: int) -> Setup:
+def _s_curve(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.s_curve(), frames, 36.0)
+
+
+def _helix(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.helix(), frames, 50.0, roll_deg=90.0)
+
+
+def _fork_right(_rng: np.random.Generator, frames: int) -> Setup:
     return plain_setup(shapes.bifurcation(), frames, 30.0)
+
+
+def _fork_left(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.bifurcation(), frames, 30.0, roll_deg=180.0)
+
+
+def _rolled(_rng: np.random.Generator, frames: int) -> Setup:
+    setup = plain_setup(shapes.bend(angle_deg=60.0), frames, 30.0, first_mm=20.0)
+    return replace(setup, rolls_deg=spread(0.0, 150.0, frames))
+
+
+def _short(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.straight(length_mm=20.0), frames, 4.0, first_mm=1.6)
+
+
+def _stenosis(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.stenosed(), frames, 30.0)
+
+
+def _neck(_rng: np.random.Generator, frames: int) -> Setup:
+    # the hook points away from the neck: towards it, it would fall in
+    return plain_setup(shapes.side_aneurysm(), frames, 36.0)
+
+
+def _loop(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.end_aneurysm(), frames, 38.0, first_mm=14.0)
+
+
+def _kissing(_rng: np.random.Generator, frames: int) -> Setup:
+    return plain_setup(shapes.kissing(), frames, 36.0)
 
 
 PLAIN = (
     Scene("straight", "a curved tip in a straight vessel: contact without any turn", 57.6, 192, 6, _straight),
     Scene("bend", "one bend in one plane: bending and wall alone decide", 48.0, 160, 6, _bend),
-    Scene("bifurcation", "the tip takes the branch that it points at", 48.0, 160, 6, _bifurcation),
+    Scene("s-curve", "two opposite bends: the wire cuts both corners", 48.0, 160, 6, _s_curve),
+    Scene("helix", "a curve that no plane holds: roll and torsion of the path matter", 48.0, 160, 6, _helix),
+    Scene("bifurcation", "the tip takes the branch that it points at", 48.0, 160, 6, _fork_right),
+    Scene(
+        "bifurcation-left", "the same fork, rolled by half a turn: the other branch", 48.0, 160, 6, _fork_left
+    ),
+    Scene(
+        "rolled",
+        "rolled by 150 degrees while it is pushed: the path of the roll is part of the truth",
+        48.0,
+        160,
+        6,
+        _rolled,
+    ),
+    Scene(
+        "short-wire",
+        "a wire shorter than three segments: nothing may need more joints than there are",
+        36.0,
+        120,
+        4,
+        _short,
+    ),
+    Scene(
+        "stenosis", "a lumen hardly wider than the wire: the wall decides everything", 48.0, 160, 6, _stenosis
+    ),
+    Scene(
+        "aneurysm-neck",
+        "past the neck of a sidewall aneurysm: the wall gives way to one side",
+        48.0,
+        160,
+        6,
+        _neck,
+    ),
+    Scene(
+        "aneurysm-loop",
+        "pushed on into a wide sac: the wire curls and touches where it will",
+        48.0,
+        160,
+        6,
+        _loop,
+    ),
+    Scene(
+        "kissing-vessels",
+        "two vessels that share a wall in the image: the wire must stay in its own",
+        48.0,
+        160,
+        6,
+        _kissing,
+    ),
 )

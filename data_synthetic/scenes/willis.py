@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from data_synthetic.scene import Scene, Setup, enter, spread
@@ -51,6 +53,29 @@ def _terminus(rng: np.random.Generator, frames: int) -> Setup:
     return willis_setup(rng, frames, WillisPlan(), ROLL_DEG, 6.0)
 
 
+def _siphon(rng: np.random.Generator, frames: int) -> Setup:
+    setup = willis_setup(rng, frames, WillisPlan(aneurysm="none"), ROLL_DEG, -4.0)
+    alone = Anatomy((setup.anatomy.tube("right.ICA"),))
+    return replace(setup, anatomy=alone, centre_mm=np.array([-14.0, -8.0, -14.0]))
+
+
+def _incomplete(rng: np.random.Generator, frames: int) -> Setup:
+    plan = WillisPlan(aneurysm="sidewall", sac_mm=3.0, missing=("right.PCoA", "left.A1", "left.P1"))
+    return willis_setup(rng, frames, plan, ROLL_DEG, -6.0)
+
+
+def _acoa(rng: np.random.Generator, frames: int) -> Setup:
+    return willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 12.0)
+
+
+def _vertebral(rng: np.random.Generator, frames: int) -> Setup:
+    anatomy = circle_of_willis(rng, WillisPlan(aneurysm="none", tortuous_vertebrals=True))
+    entry, direction = enter(anatomy.tube("right.vertebral"), 14.0)
+    return Setup(
+        anatomy, entry, direction, spread(8.0, 42.0, frames), (0.0,) * frames, CENTRE_MM, bone=skull_base()
+    )
+
+
 WILLIS = (
     Scene(
         "circle-of-willis",
@@ -59,5 +84,37 @@ WILLIS = (
         256,
         30,
         _terminus,
+    ),
+    Scene(
+        "siphon",
+        "the carotid siphon alone: the tightest turns of the way, nothing else to go wrong",
+        52.8,
+        176,
+        6,
+        _siphon,
+    ),
+    Scene(
+        "incomplete-circle",
+        "a circle with missing vessels and a sidewall aneurysm in the siphon",
+        76.8,
+        192,
+        6,
+        _incomplete,
+    ),
+    Scene(
+        "acoa-aneurysm",
+        "around the sharp turn into A1: stored energy is let go in a snap",
+        76.8,
+        192,
+        6,
+        _acoa,
+    ),
+    Scene(
+        "tortuous-vertebral",
+        "up a winding vertebral artery into the basilar: another way in",
+        76.8,
+        192,
+        6,
+        _vertebral,
     ),
 )

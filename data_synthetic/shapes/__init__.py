@@ -2,7 +2,29 @@
 
 from __future__ import annotations
 
-from data_synthetic.shapes.simple import bend, bifurcation, helix, s_curve, straight
+from data_synthetic.shapes.simple import (
+    bend,
+    bifurcation,
+    end_aneurysm,
+    helix,
+    kissing,
+    s_curve,
+    side_aneurysm,
+    stenosed,
+    straight,
+)
 from data_synthetic.shapes.willis import WillisPlan, circle_of_willis
 
-__all__ = ["WillisPlan", "bend", "bifurcation", "circle_of_willis", "helix", "s_curve", "straight"]
+__all__ = [
+    "WillisPlan",
+    "bend",
+    "bifurcation",
+    "circle_of_willis",
+    "end_aneurysm",
+    "helix",
+    "kissing",
+    "s_curve",
+    "side_aneurysm",
+    "stenosed",
+    "straight",
+]

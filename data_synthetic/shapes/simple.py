@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from data_synthetic.tubes import Anatomy, sweep
+from data_synthetic.tubes import Anatomy, ball, sweep
 
 Array = NDArray[np.float64]
 
@@ -71,3 +71,50 @@ def bifurcation(
         points = np.concatenate([[[0.0, 0.0, -2.0]], np.column_stack([side * x, 0 * x, z])])
         tubes.append(sweep(name, points, np.r_[radius_mm * 0.9, np.full(len(x), branch_mm)]))
     return Anatomy(tuple(tubes))
+
+
+def stenosed(radius_mm: float = 2.0, left: float = 0.3, at_mm: float = 8.0) -> Anatomy:
+    """A gently bent tube whose radius falls to ``left`` of itself over a few mm."""
+    z = np.concatenate(
+        [
+            np.linspace(-INLET_MM, at_mm - 5.0, 10),
+            at_mm + np.array([-3.0, 0.0, 3.0]),
+            np.linspace(at_mm + 5.0, 34.0, 12),
+        ]
+    )
+    x = np.where(z > 0, 0.006 * np.maximum(z, 0.0) ** 2, 0.0)
+    radii = np.where(np.abs(z - at_mm) < 0.1, left * radius_mm, radius_mm)
+    return Anatomy((sweep("vessel", np.column_stack([x, 0 * x, z]), radii),))
+
+
+def side_aneurysm(radius_mm: float = 1.8, sac_mm: float = 3.5) -> Anatomy:
+    """A gently bent tube with a sac on its outer side."""
+    vessel = bend(angle_deg=50.0, turn_mm=25.0, radius_mm=radius_mm).tubes[0]
+    i = int(0.5 * len(vessel.points_mm))
+    inward = vessel.tangents[i + 6] - vessel.tangents[i - 6]
+    outward = -inward / np.linalg.norm(inward)
+    root = vessel.points_mm[i]
+    centre = root + (0.6 * radius_mm + sac_mm) * outward
+    neck = sweep("neck", np.array([root, 0.5 * (root + centre), centre]), 1.5)
+    return Anatomy((vessel, neck, ball("sac", centre, sac_mm)))
+
+
+def end_aneurysm(radius_mm: float = 2.0, sac_mm: float = 7.0) -> Anatomy:
+    """A straight tube that opens into a wide sac."""
+    inlet = straight(length_mm=6.0, radius_mm=radius_mm).tubes[0]
+    return Anatomy((inlet, ball("sac", [0.0, 0.0, 5.0 + sac_mm], sac_mm, blend_mm=1.0)))
+
+
+def kissing(radius_mm: float = 1.8, wall_mm: float = 0.15) -> Anatomy:
+    """Two bent vessels that come as near as ``wall_mm`` and part again; they are not joined."""
+    z = np.concatenate([np.linspace(-INLET_MM, -0.5, 9), np.linspace(1.0, 32.0, 20)])
+    away = 0.012 * (z - 10.0) ** 2
+    half = radius_mm + 0.5 * wall_mm
+    vessels = [np.column_stack([side * (half + away), 0 * z, z]) for side in (1.0, -1.0)]
+    # a blend width of next to nothing: a shared wall, not a junction
+    return Anatomy(
+        tuple(
+            sweep(n, v, radius_mm, blend_mm=1e-3)
+            for n, v in zip(("vessel", "neighbour"), vessels, strict=True)
+        )
+    )

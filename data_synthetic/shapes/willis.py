@@ -93,7 +93,9 @@ POSTERIOR_2 = np.array(
 BASILAR = np.array(
     [[0.0, 6.5, -26.0], [0.3, 4.0, -19.0], [0.2, 2.6, -11.0], [0.0, 2.2, -3.0], [0.0, 2.0, 3.0]]
 )
-VERTEBRAL = np.array([[-12.0, 17.0, -46.0], [-10.5, 15.0, -38.0], [-6.5, 11.0, -32.0], [0.0, 6.5, -26.0]])
+VERTEBRAL = np.array(
+    [[-12.0, 18.0, -50.0], [-10.0, 15.5, -42.0], [-6.0, 11.5, -35.0], [-2.2, 8.4, -29.5], [0.0, 6.5, -25.0]]
+)
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,7 @@ def _carotid_radii(radius: dict[str, float], stenosis: float) -> Array:
 
 def _loop(points: Array) -> Array:
     """A V4 segment that swings out and back."""
-    swing = np.array([[0.0, 0.0, 0.0], [-4.0, -3.0, 0.0], [3.0, 2.5, 1.5], [0.0, 0.0, 0.0]])
+    swing = np.array([[0.0, 0.0, 0.0], [-3.0, -2.0, 0.0], [1.5, 1.5, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     return np.asarray(points + swing)
 
 
