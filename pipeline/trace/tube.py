@@ -188,11 +188,20 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
     return out
 
 
-def _moved(tube: Tube, step: Array, voxel: float) -> tuple[Tube, float]:
-    """The tube after a step whose control points move by at most a voxel; and that largest move."""
+def _moved(tube: Tube, step: Array, voxel: float, samples: Samples) -> tuple[Tube, float]:
+    """The tube after a step that moves its curve by at most a voxel; and the largest move that counts.
+
+    The first and the last control point hang beyond the curve, and sliding along the wire changes nothing: what
+    counts is how far the curve moves sideways, and its tip at all.
+    """
     k, a = len(tube.controls), len(tube.tint)
     shift = step[: 3 * k].reshape(k, 3)
-    size = float(np.max(np.linalg.norm(shift, axis=1)))
+    drift = _sampled(shift, samples)[0]
+    size = float(np.max(np.linalg.norm(drift, axis=1)))
+    velocity = _sampled(tube.controls, samples)[1]
+    t = velocity / np.linalg.norm(velocity, axis=1)[:, None]
+    drift[:-1] -= np.sum(drift * t, axis=1)[:-1, None] * t[:-1]
+    moved_by = float(np.max(np.linalg.norm(drift, axis=1)))
     scale = min(1.0, voxel / max(size, 1e-12))
     sigma = tube.sigma + scale * float(np.clip(step[3 * k + a], -0.15 * tube.sigma, 0.15 * tube.sigma))
     moved = replace(
@@ -202,15 +211,15 @@ def _moved(tube: Tube, step: Array, voxel: float) -> tuple[Tube, float]:
         sigma=float(np.clip(sigma, 0.5 * voxel, 3.0 * voxel)),
         offset=tube.offset + scale * float(step[3 * k + a + 1]),
     )
-    return moved, scale * size
+    return moved, scale * moved_by
 
 
 def fit_tube(
-    data: TubeData, tube: Tube, iterations: int = 12, tolerance: float = 0.003, fit_sigma: bool = True
+    data: TubeData, tube: Tube, iterations: int = 12, tolerance: float = 0.02, fit_sigma: bool = True
 ) -> Tube:
     """Gauss-Newton on the voxels within WINDOW blurs of the curve.
 
-    Stops when no control point moves by more than ``tolerance`` voxel. The result carries the covariance of its
+    Stops when no point of the curve moves by more than ``tolerance`` voxel. The result carries the covariance of its
     columns (controls, amplitudes, blur, offset), for the noise of ``data``.
     """
     voxel = float(data.spacing.min())
@@ -225,9 +234,9 @@ def fit_tube(
     for done in range(1, iterations + 1):
         normal, right, _, _ = _step(data, tube, samples, prior, slot)
         held_now = held if done > 2 else [columns - 2]
-        normal = _frozen(_damped(normal, tube, 1e-2), held_now)
+        normal = _frozen(_damped(normal, tube, 3e-2), held_now)
         right[held_now] = 0.0
-        tube, size = _moved(tube, cho_solve(cho_factor(normal), right), voxel)
+        tube, size = _moved(tube, cho_solve(cho_factor(normal), right), voxel, samples)
         if size < tolerance * voxel and done > 2:
             break
     normal, _, rms, _ = _step(data, tube, samples, prior, slot)
