@@ -1,0 +1,100 @@
+"""Scenes in processes of their own: one that crashes or hangs costs itself alone."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from queue import SimpleQueue
+
+from pipeline.benchmark.stress.plan import draw
+from pipeline.benchmark.stress.scene_run import Outcome, run_scene
+
+LIMIT_S = 120.0
+"""A scene that takes longer hangs: the slowest sound one takes a few seconds."""
+START_S = 300.0
+"""Room for compiling the kernels in a new process."""
+
+
+def _serve(pipe: Connection, seed: int) -> None:
+    """Run scenes as their numbers come in; a warm-up first, so that compiling is on nobody's clock."""
+    run_scene(seed, 0)
+    pipe.send(None)
+    while True:
+        index = pipe.recv()
+        if index is None:
+            return
+        pipe.send(run_scene(seed, index))
+
+
+class Worker:
+    """One process, replaced when a scene kills it or runs over its time."""
+
+    def __init__(self, seed: int, limit_s: float = LIMIT_S) -> None:
+        self.seed, self.limit_s = seed, limit_s
+        self.process: BaseProcess | None = None
+        self.pipe: Connection | None = None
+
+    def _started(self) -> Connection:
+        if self.process is None or self.pipe is None:
+            context = multiprocessing.get_context("spawn")
+            self.pipe, theirs = context.Pipe()
+            self.process = context.Process(target=_serve, args=(theirs, self.seed), daemon=True)
+            self.process.start()
+            theirs.close()
+            if not self.pipe.poll(START_S):
+                msg = f"stress study: the first scene did not end within {START_S:g} s; try scene 0 alone"
+                raise RuntimeError(msg)
+            self.pipe.recv()
+        return self.pipe
+
+    def run(self, index: int) -> Outcome:
+        """Run one scene; a crash or a hang is its outcome."""
+        pipe = self._started()
+        pipe.send(index)
+        if not pipe.poll(self.limit_s):
+            self.stop()
+            return _lost(self.seed, index, "hang", f"no answer within {self.limit_s:g} s")
+        try:
+            return pipe.recv()  # type: ignore[no-any-return]
+        except EOFError:
+            code = self.process.exitcode if self.process else None
+            self.stop()
+            return _lost(self.seed, index, "crash", f"the process died, exit code {code}")
+
+    def stop(self) -> None:
+        """End the process."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+        self.process = self.pipe = None
+
+
+def _lost(seed: int, index: int, fault: str, detail: str) -> Outcome:
+    return Outcome(index, draw(seed, index).axes, fault, fault, detail)
+
+
+def run_isolated(
+    seed: int, indices: Iterable[int], jobs: int = 1, limit_s: float = LIMIT_S
+) -> Iterator[Outcome]:
+    """Outcomes in the order of the indices, from ``jobs`` processes."""
+    free: SimpleQueue[Worker] = SimpleQueue()
+    workers = [Worker(seed, limit_s) for _ in range(jobs)]
+    for worker in workers:
+        free.put(worker)
+
+    def one(index: int) -> Outcome:
+        worker = free.get()
+        try:
+            return worker.run(index)
+        finally:
+            free.put(worker)
+
+    try:
+        with ThreadPoolExecutor(jobs) as pool:
+            yield from pool.map(one, indices)
+    finally:
+        for worker in workers:
+            worker.stop()
