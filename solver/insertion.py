@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
 from solver._kernels.follow import follow
-from solver._kernels.passage import free_fraction
+from solver._kernels.passage import free_way
 from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
 from solver.errors import refuse
@@ -143,28 +143,14 @@ class Insertion:
             fraction = min(fraction, self.roll_step_deg / abs(turn))
         if ahead:
             step = min(self.step_mm, abs(ahead))
-            if ahead > 0:
-                step = self._free_way(step)
+            b = self.buffers
+            if ahead > 0 and b.stiffness:
+                tip, along = b.state.x[0, b.k], b.state.r[0, b.k, :, 2]
+                step = free_way(
+                    b.field, tip, along, step, b.spacing, self.wire.radius_mm, b.problem.scratch.weights
+                )
             fraction = min(fraction, step / abs(ahead))
         return fraction
-
-    def _free_way(self, step: float) -> float:
-        """How far the tip may go straight on: until it is half a radius deeper in the wall than it is now."""
-        b = self.buffers
-        if self.wall is None:
-            return step
-        tip, along = b.state.x[0, b.k], b.state.r[0, b.k, :, 2]
-        at = np.linspace(0.0, step, 2 + math.ceil(2 * step / b.spacing))
-        phi = self.wall.look_up(tip + at[:, None] * along)[0]
-        rise = max(0.5 * self.wire.radius_mm, 0.25 * b.spacing)
-        limit = max(0.0, float(phi[0]) + rise)
-        free = step
-        over = np.flatnonzero(phi > limit)
-        if over.size:
-            i = max(int(over[0]), 1)
-            free = float(np.interp(limit, phi[i - 1 : i + 1], at[i - 1 : i + 1]))
-        free *= free_fraction(b.field, tip, tip + free * along, free, b.spacing, b.problem.scratch)
-        return max(free, min(step, 0.5 * rise))
 
     def _try(self, ahead: float, turn: float, fraction: float) -> tuple[Status, int]:
         """Take a step; on failure put everything back. Returns its status and iterations."""

@@ -136,10 +136,12 @@ def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
 
 def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     """One run of the loop; the result is moved to state 0."""
-    run, limit = minimise, settings.max_iterations
     if settings.method == "closed_form":
-        run, limit = minimise_closed_form, limit * tol.SWEEPS_PER_ITERATION
-    outcome, iterations, which, energy = run(b.problem, b.k, settings.tolerance, limit, b.report)
+        sweeps = settings.max_iterations * tol.SWEEPS_PER_ITERATION
+        result = minimise_closed_form(b.problem, b.k, settings.tolerance, sweeps, b.report)
+    else:
+        result = minimise(b.problem, b.k, settings.tolerance, settings.max_iterations, b.report)
+    outcome, iterations, which, energy = result
     if which == 1:
         for array, size in zip(b.state, (b.k, b.k + 1, b.k + 1, b.points, b.points, 4), strict=True):
             array[0, :size] = array[1, :size]

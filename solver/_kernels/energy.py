@@ -5,6 +5,7 @@ U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ ½ k w_p max(0, φ(x_p) + ρ
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
-from solver._kernels.spline import basis, locate, spline, to_world, trilinear
+from solver._kernels.spline import in_grid, locate, set_basis, spline, to_world, trilinear, value
 
 
 @kernel
@@ -60,52 +61,60 @@ def point_at(problem: Problem, which: int, n: int, p: int, q: Any) -> None:
 def wall_energy(problem: Problem, which: int, k: int) -> float:
     """Eq. 6 and 7: look every point up and add its share, N mm."""
     total = 0.0
-    chain = problem.chain
-    depth = problem.state.depth[which]
-    q = problem.scratch.fraction[3:]
+    # bound once: inside the loop every member would be taken out of the tuple again, with its reference count
+    field, switch, chain, state = problem.field, problem.switch, problem.chain, problem.state
+    c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
+    first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
+    x, r, depth, anchor = state.x[which], state.r[which], state.depth[which], problem.scratch.anchor
+    jet, weights = state.jet[which], problem.scratch.weights
+    clear, cheap, full = 0, 0, 0
     for n in range(1, k + 1):
-        for p in range(chain.first[n], chain.first[n + 1]):
-            point_at(problem, which, n, p, q)
-            d = penetration(problem, which, p, q)
-            depth[p] = d
-            if d != 0.0:
-                total += 0.5 * problem.stiffness * chain.weight[p] * d * d
+        for p in range(first[n], first[n + 1]):
+            q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
+            o0, o1, o2 = offset[p, 0], offset[p, 1], offset[p, 2]
+            if o0 != 0.0 or o1 != 0.0 or o2 != 0.0:
+                q0 += r[n, 0, 0] * o0 + r[n, 0, 1] * o1 + r[n, 0, 2] * o2
+                q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
+                q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
+            depth[p] = 0.0
+            i, j, h, u, v, w = locate(c, m, o, q0, q1, q2)
+            inside = in_grid(u, v, w)
+            # a point that moved less than its clearance since its last look-up cannot touch
+            if switch.clearance and inside and anchor[p, 3] < 0.0:
+                d0, d1, d2 = q0 - anchor[p, 0], q1 - anchor[p, 1], q2 - anchor[p, 2]
+                if anchor[p, 3] + slope * math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) + reach <= 0.0:
+                    clear += 1
+                    continue
+            anchor[p, 0], anchor[p, 1], anchor[p, 2] = q0, q1, q2
+            if switch.cheap and inside:
+                phi = trilinear(c, i, j, h, u, v, w) + field.gap
+                if phi + reach <= 0.0:
+                    cheap += 1
+                    anchor[p, 3] = phi
+                    continue
+            full += 1
+            set_basis(u, v, w, weights)
+            d = penetration(c, m, i, j, h, weights, jet[p], reach)
+            # a point outside the grid is no anchor: the slope is bounded inside only
+            anchor[p, 3] = d - reach if inside else 1.0
+            if d > 0.0:
+                depth[p] = d
+                total += 0.5 * problem.stiffness * weight[p] * d * d
+    counter = problem.scratch.counter
+    counter[CLEAR] += clear
+    counter[CHEAP] += cheap
+    counter[FULL] += full
     return total
 
 
-@inlined
-def penetration(problem: Problem, which: int, p: int, q: Any) -> float:
-    """How far the wire's hull is beyond the lumen at q, mm; fills the point's jet where it is.
-
-    An anchor holds the place of the last look-up and an upper bound of the distance there: a point that has
-    moved less than its clearance since then cannot touch.
-    """
-    field, scratch, reach = problem.field, problem.scratch, problem.chain.reach
-    anchor = scratch.anchor[p]
-    i, j, k, inside = locate(field, q[0], q[1], q[2], scratch.fraction)
-    if problem.switch.clearance and inside and anchor[3] < 0.0:
-        d0, d1, d2 = q[0] - anchor[0], q[1] - anchor[1], q[2] - anchor[2]
-        if anchor[3] + field.slope * np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) + reach <= 0.0:
-            scratch.counter[CLEAR] += 1
-            return 0.0
-    anchor[0], anchor[1], anchor[2] = q[0], q[1], q[2]
-    if problem.switch.cheap and inside:
-        phi = trilinear(field, i, j, k, scratch.fraction) + field.gap
-        if phi + reach <= 0.0:
-            scratch.counter[CHEAP] += 1
-            anchor[3] = phi
-            return 0.0
-    scratch.counter[FULL] += 1
-    for a in range(3):
-        basis(scratch.fraction[a], scratch.weights[a])
-    jet = problem.state.jet[which, p]
-    spline(field, i, j, k, scratch.weights, jet)
-    # a point outside the grid is no anchor: the slope is bounded inside only
-    anchor[3] = jet[0] if inside else 1.0
-    if jet[0] + reach <= 0.0:
-        return 0.0
-    to_world(field, jet)
-    return float(jet[0] + reach)
+@kernel
+def penetration(c: Any, m: Any, i: int, j: int, k: int, weights: Any, jet: Any, reach: float) -> float:
+    """How far the wire's hull is beyond the lumen, mm (negative inside); fills the point's jet where it is."""
+    d = value(c, i, j, k, weights) + reach
+    if d > 0.0:
+        spline(c, i, j, k, weights, jet)
+        to_world(m, jet)
+    return float(d)
 
 
 @inlined

@@ -12,6 +12,9 @@ import numpy as np
 
 from solver._kernels.flags import inlined, kernel
 
+# Cells along an edge of the blocks over which bounds are taken: small enough to stay local, large enough to be cheap.
+BLOCK = 4
+
 
 class Field(NamedTuple):
     """An interpolated scalar field.
@@ -61,34 +64,33 @@ def prefilter(values: Any) -> None:
 
 
 @inlined
-def locate(field: Field, x: float, y: float, z: float, fraction: Any) -> tuple[int, int, int, bool]:
-    """Cell of a point and its place in it (into ``fraction``); the flag says that it lies in the grid."""
-    inside = True
-    cell = (0, 0, 0)
-    d0 = x - field.origin[0]
-    d1 = y - field.origin[1]
-    d2 = z - field.origin[2]
-    for a in range(3):
-        f = field.to_index[a, 0] * d0 + field.to_index[a, 1] * d1 + field.to_index[a, 2] * d2
-        last = field.coefficients.shape[a] - 4
-        i = min(max(int(np.floor(min(max(f, 0.0), 1e9))), 0), last)
-        fraction[a] = f - i
-        if not 0.0 <= fraction[a] <= 1.0:
-            inside = False
-        if a == 0:
-            cell = (i, cell[1], cell[2])
-        elif a == 1:
-            cell = (cell[0], i, cell[2])
-        else:
-            cell = (cell[0], cell[1], i)
-    return cell[0], cell[1], cell[2], inside
+def cell_of(f: float, last: int) -> tuple[int, float]:
+    """Cell and place in it of a continuous index; places outside 0 to 1 are outside the grid."""
+    # the clip also catches what does not fit an integer
+    i = int(min(max(f, 0.0), float(last)))
+    return i, f - i
 
 
 @inlined
-def trilinear(field: Field, i: int, j: int, k: int, fraction: Any) -> float:
+def locate(c: Any, m: Any, o: Any, x: float, y: float, z: float) -> tuple[int, int, int, float, float, float]:
+    """Cell of a point in mm and its place in it; c, m, o are a field's coefficients, to_index and origin."""
+    shape = c.shape
+    d0, d1, d2 = x - o[0], y - o[1], z - o[2]
+    i, r = cell_of(m[0, 0] * d0 + m[0, 1] * d1 + m[0, 2] * d2, shape[0] - 4)
+    j, s = cell_of(m[1, 0] * d0 + m[1, 1] * d1 + m[1, 2] * d2, shape[1] - 4)
+    k, t = cell_of(m[2, 0] * d0 + m[2, 1] * d1 + m[2, 2] * d2, shape[2] - 4)
+    return i, j, k, r, s, t
+
+
+@inlined
+def in_grid(r: float, s: float, t: float) -> bool:
+    """Whether a place in a cell is in it."""
+    return 0.0 <= r <= 1.0 and 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
+
+
+@inlined
+def trilinear(c: Any, i: int, j: int, k: int, r: float, s: float, t: float) -> float:
     """Trilinear look-up among the coefficients: within ``field.gap`` of the spline, at a tenth of its cost."""
-    c = field.coefficients
-    r, s, t = fraction[0], fraction[1], fraction[2]
     low = (c[i + 1, j + 1, k + 1] * (1 - t) + c[i + 1, j + 1, k + 2] * t) * (1 - s)
     low += (c[i + 1, j + 2, k + 1] * (1 - t) + c[i + 1, j + 2, k + 2] * t) * s
     high = (c[i + 2, j + 1, k + 1] * (1 - t) + c[i + 2, j + 1, k + 2] * t) * (1 - s)
@@ -120,9 +122,16 @@ def basis(t: float, weights: Any) -> None:
 
 
 @kernel
-def spline(field: Field, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
+def set_basis(r: float, s: float, t: float, weights: Any) -> None:
+    """Fill (3, 3, 4) weights for a place in a cell."""
+    basis(r, weights[0])
+    basis(s, weights[1])
+    basis(t, weights[2])
+
+
+@kernel
+def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
     """Fill jet (10,): value, gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
-    c = field.coefficients
     p, q, r = weights[0], weights[1], weights[2]
     v = gx = gy = gz = hxx = hyy = hzz = hxy = hxz = hyz = 0.0
     for a in range(4):
@@ -156,9 +165,8 @@ def spline(field: Field, i: int, j: int, k: int, weights: Any, jet: Any) -> None
 
 
 @kernel
-def value(field: Field, i: int, j: int, k: int, weights: Any) -> float:
+def value(c: Any, i: int, j: int, k: int, weights: Any) -> float:
     """The spline alone, without derivatives: a third of the cost."""
-    c = field.coefficients
     p, q, r = weights[0, 0], weights[1, 0], weights[2, 0]
     total = 0.0
     for a in range(4):
@@ -172,9 +180,8 @@ def value(field: Field, i: int, j: int, k: int, weights: Any) -> float:
 
 
 @inlined
-def to_world(field: Field, jet: Any) -> None:
+def to_world(m: Any, jet: Any) -> None:
     """Turn the derivatives of a jet from per index into per mm, in place: g <- Mᵀ g, H <- Mᵀ H M."""
-    m = field.to_index
     g0, g1, g2 = jet[1], jet[2], jet[3]
     xx, yy, zz, xy, xz, yz = jet[4], jet[5], jet[6], jet[7], jet[8], jet[9]
     for a in range(3):
@@ -191,41 +198,67 @@ def to_world(field: Field, jet: Any) -> None:
 @kernel
 def look_up(field: Field, points: Any, jets: Any) -> None:
     """Value, gradient and second derivatives (n, 10), per mm, at points (n, 3) in mm."""
-    fraction = np.empty(3)
     weights = np.empty((3, 3, 4))
+    c, m, o = field.coefficients, field.to_index, field.origin
     for n in range(points.shape[0]):
-        i, j, k, _ = locate(field, points[n, 0], points[n, 1], points[n, 2], fraction)
-        for a in range(3):
-            basis(fraction[a], weights[a])
-        spline(field, i, j, k, weights, jets[n])
-        to_world(field, jets[n])
+        i, j, k, r, s, t = locate(c, m, o, points[n, 0], points[n, 1], points[n, 2])
+        set_basis(r, s, t, weights)
+        spline(c, i, j, k, weights, jets[n])
+        to_world(m, jets[n])
 
 
 @kernel
-def bounds(coefficients: Any, to_index: Any) -> tuple[float, float]:
-    """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients.
+def bounds(c: Any, to_index: Any) -> tuple[float, float]:
+    """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients c.
 
     gap: along one axis the spline differs from the linear interpolant of its coefficients by at most
     max|second difference|/6, and both operators average, so the three axes add up.
     slope: each component of the gradient averages first differences along its axis.
+    Both are taken over blocks of cells that may hold a negative distance, the only ones where a point can be
+    clear of the wall: a point that starts clear meets such a cell's bound before it can touch.
     """
-    shape = coefficients.shape
-    first = np.zeros(3)
-    second = np.zeros(3)
-    for i in range(shape[0]):
-        for j in range(shape[1]):
-            for k in range(shape[2]):
-                c = float(coefficients[i, j, k])
+    gap, slope = 0.0, 0.0
+    first, second = np.empty(3), np.empty(3)
+    for i in range(0, c.shape[0] - 3, BLOCK):
+        for j in range(0, c.shape[1] - 3, BLOCK):
+            for k in range(0, c.shape[2] - 3, BLOCK):
+                if largest_differences(c, i, j, k, first, second) > 0.0:
+                    continue
+                square = 0.0
                 for a in range(3):
-                    p = (i + (a == 0), j + (a == 1), k + (a == 2))
-                    if p[a] == shape[a]:
-                        continue
-                    step = coefficients[p] - c
-                    first[a] = max(first[a], abs(step))
-                    if (i, j, k)[a] > 0:
-                        back = c - coefficients[i - (a == 0), j - (a == 1), k - (a == 2)]
-                        second[a] = max(second[a], abs(step - back))
-    slope = 0.0
-    for a in range(3):
-        slope += first[a] ** 2 * (to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2)
-    return (second[0] + second[1] + second[2]) / 6, np.sqrt(slope)
+                    scale = to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2
+                    square += first[a] ** 2 * scale
+                slope = max(slope, np.sqrt(square))
+                gap = max(gap, (second[0] + second[1] + second[2]) / 6)
+    return gap, slope
+
+
+@kernel
+def largest_differences(c: Any, i0: int, j0: int, k0: int, first: Any, second: Any) -> float:
+    """Largest first and second differences (3,) in the support of a block of cells; return its least value."""
+    n = BLOCK + 3
+    i1, j1, k1 = min(i0 + n, c.shape[0]), min(j0 + n, c.shape[1]), min(k0 + n, c.shape[2])
+    least = np.inf
+    first[:] = 0.0
+    second[:] = 0.0
+    for i in range(i0, i1):
+        for j in range(j0, j1):
+            for k in range(k0, k1):
+                here = float(c[i, j, k])
+                least = min(least, here)
+                if i > i0:
+                    step = here - c[i - 1, j, k]
+                    first[0] = max(first[0], abs(step))
+                    if i > i0 + 1:
+                        second[0] = max(second[0], abs(step - c[i - 1, j, k] + c[i - 2, j, k]))
+                if j > j0:
+                    step = here - c[i, j - 1, k]
+                    first[1] = max(first[1], abs(step))
+                    if j > j0 + 1:
+                        second[1] = max(second[1], abs(step - c[i, j - 1, k] + c[i, j - 2, k]))
+                if k > k0:
+                    step = here - c[i, j, k - 1]
+                    first[2] = max(first[2], abs(step))
+                    if k > k0 + 1:
+                        second[2] = max(second[2], abs(step - c[i, j, k - 1] + c[i, j, k - 2]))
+    return least
