@@ -59,6 +59,7 @@ def size(n_bytes: int) -> str:
 
 def _text(value: Any) -> str:
     if isinstance(value, (list, tuple)):
-        return " ".join(str(v) for v in value) if all(isinstance(v, str) for v in value) else str(list(value))
-    # counts arrive as floats: 16777216.0 voxels
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
+        parts = [_text(v) for v in value]
+        return " ".join(parts) if all(isinstance(v, str) for v in value) else f"[{', '.join(parts)}]"
+    # counts arrive as floats (16777216.0 voxels), directions with sixteen digits
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

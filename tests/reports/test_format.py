@@ -1,0 +1,50 @@
+"""Values as a reader sees them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from reports import _format
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (0.12345, "0.123"),
+        (12.345, "12.3"),
+        (123456.0, "123456"),
+        (1234567.0, "1.23e+06"),
+        (0.0001234, "0.000123"),
+        (0.00001, "1e-05"),
+        (-0.5, "-0.500"),
+        (7, "7"),
+        (math.inf, "inf"),
+        (math.nan, "–"),
+        (None, "–"),
+        (pd.NA, "–"),
+        (True, "yes"),
+        ("a word", "a word"),
+    ],
+)
+def test_numbers(value: Any, text: str) -> None:
+    assert _format.number(value) == text
+
+
+def test_intervals_need_both_ends() -> None:
+    assert _format.interval(0.1, 0.25) == "0.100 to 0.250"
+    assert _format.interval(None, 0.25) == ""
+
+
+def test_trees_become_rows_and_empty_leaves_go() -> None:
+    tree = {"a": {"b": 1.0, "c": None, "d": [0.16557399795383654, 2]}, "argv": ["wireval", "run"], "e": ""}
+    assert list(_format.flatten(tree)) == [("a.b", "1"), ("a.d", "[0.165573998, 2]"), ("argv", "wireval run")]
+
+
+def test_settings_keep_their_source() -> None:
+    config = {"solver": {"segment_mm": {"value": 0.5, "source": "command line"}}, "odd": {"key": 1}}
+    assert _format.settings(config) == [("solver.segment_mm", "0.5", "command line"), ("odd.key", "1", "")]
