@@ -15,6 +15,7 @@ from pipeline.cache import Store, file_hash, key_of
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
 from pipeline.config import Config
 from pipeline.curves import to_length
+from pipeline.entry import Entry, measured_entry
 from pipeline.frame import Frame
 from pipeline.load import Header, LoadError
 from pipeline.manifest import Case
@@ -44,6 +45,7 @@ class CaseRun:
     frames: list[Frame] = field(default_factory=list)
     headers: scans.Scans | None = None
     lumen: Lumen | None = None
+    entry: Entry | None = None
     hashes: dict[str, str] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     counters: dict[str, dict[str, float]] = field(default_factory=lambda: {stage: {} for stage in STAGES})
@@ -255,9 +257,22 @@ def _depth(run: CaseRun, frame: Frame) -> float:
     return traced
 
 
+def _clamp(run: CaseRun) -> Entry:
+    """The clamp of the simulation: measured in the scans, or the manifest's."""
+    given = Entry(np.array(run.case.entry_mm), np.array(run.case.entry_direction))
+    if run.config.simulate.entry == "manifest":
+        return given
+    good = [f.curve for f in run.frames if f.ok and f.curve is not None]
+    entry = measured_entry(good, given.entry_mm, given.direction)
+    run.assumptions += [entry.note] * bool(entry.note)
+    run.warnings += [entry.warning] * bool(entry.warning)
+    return entry
+
+
 def _simulate_frames(run: CaseRun) -> None:
     """Replay the whole insertion once; a frame without a known depth is passed over."""
     assert run.lumen is not None
+    run.entry = _clamp(run)
     for frame in run.frames:
         frame.depth_mm = _depth(run, frame)
         if np.isnan(frame.depth_mm):
@@ -269,7 +284,9 @@ def _simulate_frames(run: CaseRun) -> None:
         return
     depths, angles = [f.depth_mm for f in replay], [f.roll_deg for f in replay]
     try:
-        solutions = simulate(run.case, run.lumen, depths, angles, run.config.solver, run.config.simulate)
+        solutions = simulate(
+            run.case, run.entry, run.lumen, depths, angles, run.config.solver, run.config.simulate
+        )
         for frame, result in zip(replay, solutions, strict=True):
             frame.simulated = result
             frame.seconds["simulate"] = result.seconds
@@ -313,8 +330,10 @@ def _static_nulls(run: CaseRun, traced: list[Frame]) -> nulls.Nulls | None:
     assert run.lumen is not None
     deepest = max(traced, key=lambda f: f.curve.length_mm if f.curve else 0.0)
     assert deepest.curve is not None
-    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
-    return nulls.build(run.lumen, entry, direction, deepest.curve.points_mm, run.case.wire.radius_mm)
+    assert run.entry is not None
+    return nulls.build(
+        run.lumen, run.entry.entry_mm, run.entry.direction, deepest.curve.points_mm, run.case.wire.radius_mm
+    )
 
 
 def _score_nulls(run: CaseRun, frame: Frame, static: nulls.Nulls | None, previous: Any) -> None:

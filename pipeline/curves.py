@@ -16,9 +16,9 @@ def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
     curve = np.asarray(curve_mm, dtype=np.float64)
     wanted = np.asarray(arc_mm, dtype=np.float64)
     arc = arc_length(curve)
-    inside = np.stack([np.interp(wanted, arc, curve[:, a]) for a in range(3)], axis=-1)
-    beyond = np.maximum(wanted - arc[-1], 0.0)[..., None] * tip_tangent(curve)
-    return np.asarray(inside + beyond, dtype=np.float64)
+    inside: Array = np.stack([np.interp(wanted, arc, curve[:, a]) for a in range(3)], axis=-1)
+    beyond: Array = np.maximum(wanted - arc[-1], 0.0)[..., None] * tip_tangent(curve)
+    return inside + beyond
 
 
 def samples(length_mm: float, step_mm: float) -> Array:

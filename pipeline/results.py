@@ -194,7 +194,7 @@ def result_of(
         "warnings": run.warnings,
         "wire": asdict(run.case.wire),
         "wall": run.case.wall.model_dump(),
-        "entry": {"entry_mm": run.case.entry_mm, "entry_direction": run.case.entry_direction},
+        "entry": _clamps(run),
         "geometry": voxels(headers),
         "inputs": [
             {"path": path, "sha256": digest, "bytes": Path(path).stat().st_size}
@@ -204,6 +204,13 @@ def result_of(
         "config": settings,
         **extra,
     }
+
+
+def _clamps(run: CaseRun) -> dict[str, Any]:
+    """The clamp as the manifest has it and as it was used."""
+    given = {"entry_mm": run.case.entry_mm, "entry_direction": run.case.entry_direction}
+    used = {} if run.entry is None else {"used_mm": run.entry.entry_mm, "used_direction": run.entry.direction}
+    return given | used
 
 
 def _first_sentence(frames: list[Frame]) -> str:

@@ -9,8 +9,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from reports.html import render_case
-
 from pipeline import results
 from pipeline.cache import STAGE_VERSION, Store, file_hash
 from pipeline.case import CaseRun, Stage, run_stages
@@ -19,6 +17,7 @@ from pipeline.progress import CaseProgress
 from pipeline.provenance import collect, package_version, peak_memory_mib
 from pipeline.settings import Resolved
 from pipeline.summary import case_row
+from reports.html import render_case
 
 PATHS = ("reference", "frames", "lumen", "traces", "parameters", "truth")
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.config import SimulateConfig, SolverConfig
+from pipeline.entry import Entry
 from pipeline.manifest import Case, Wire
 from pipeline.manifest_schema import Profile
 from pipeline.model import Lumen, Simulated
@@ -61,21 +62,22 @@ def rolls(case: Case, count: int, simulate: SimulateConfig) -> list[float]:
 
 def simulate(
     case: Case,
+    entry: Entry,
     lumen: Lumen,
     depths_mm: Sequence[float],
     roll_deg: Sequence[float],
     solver: SolverConfig = SolverConfig(),
     config: SimulateConfig = SimulateConfig(),
 ) -> Iterator[Simulated]:
-    """Yield the simulated wire at each depth (mm from the entry to the tip), in the order given.
+    """Yield the simulated wire, clamped at ``entry``, at each depth (mm from there to the tip), in the order given.
 
     A depth that cannot be reached is a status, not an exception; the last good state goes on to the next depth.
     """
     insertion = Insertion(
         guide_wire(case.wire, solver, config),
         vessel_wall(case, lumen, solver, config),
-        case.entry_mm,
-        case.entry_direction,
+        entry.entry_mm,
+        entry.direction,
         method=solver.method,
         initial=solver.initial,
         material_axis=case.material_axis,
