@@ -64,6 +64,35 @@ def _window(x: float, radius: float, h: float, n: int) -> tuple[int, int]:
 
 
 @njit(cache=True)
+def render(
+    shape: tuple[int, int, int],
+    spacing: NDArray[Any],
+    slot: NDArray[Any],
+    count: int,
+    curve: NDArray[Any],
+    weight: NDArray[Any],
+    sigma: float,
+    radius: float,
+) -> NDArray[Any]:
+    """The model's grey (count,) at the voxels numbered in ``slot``; ``weight`` is amplitude times arc weight."""
+    out = np.zeros(count)
+    norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
+    for m in range(curve.shape[0]):
+        x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
+        i0, i1 = _window(x, radius, spacing[0], shape[0])
+        j0, j1 = _window(y, radius, spacing[1], shape[1])
+        k0, k1 = _window(z, radius, spacing[2], shape[2])
+        for i in range(i0, i1):
+            for j in range(j0, j1):
+                flat = (i * spacing[0] - x) ** 2 + (j * spacing[1] - y) ** 2
+                for k in range(k0, k1):
+                    square = flat + (k * spacing[2] - z) ** 2
+                    if slot[i, j, k] and square <= radius * radius:
+                        out[slot[i, j, k] - 1] += weight[m] * norm * np.exp(-0.5 * square / (sigma * sigma))
+    return out
+
+
+@njit(cache=True)
 def normal_equations(
     grey: NDArray[Any],
     spacing: NDArray[Any],

@@ -1,76 +1,54 @@
-"""The order of work in one frame: find pieces, join them, end them at the tip, fit the whole, cut at the entry."""
+"""The order of work in one frame: subtract the background, explain what is left in one way or several, judge."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline._kernels.jets import values_at
+from pipeline._kernels.ridges import smooth_voxels
 from pipeline.config import TraceConfig
 from pipeline.model import Array, Curve, Lumen, Volume, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.crests import find_crests
-from pipeline.trace.link import Path, link
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, Entry, cold, misfit, warm
+from pipeline.trace.crests import SEED_SIGMAS, gaussian_taps
+from pipeline.trace.judge import SURE_CNR, Verdict, judge
 from pipeline.trace.noise import inflation
+from pipeline.trace.region import MAD
 from pipeline.trace.scene import Scene, build_scene
-from pipeline.trace.tip import cut_at_tip, resampled
-from pipeline.trace.tube import Tube, TubeData, evaluate, fit_tube, point_sigmas, spline_through, tint_nodes
+from pipeline.trace.tube import Tube, evaluate, point_sigmas
 
-ENTRY_REACH_MM = 4.0
-"""How far from the manifest's entry the wire may pass."""
-PREFIX_MM = 3.0
-"""How much wire before the entry is fitted along: its end must not disturb the fit at the entry."""
 SAMPLE_VOXELS = 1.0
 """Spacing of the curve's points."""
+WIDE_VOXELS = 1.2
+"""Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
+WIDE_SIGMAS = 4.0
+"""and the height at which they start there: noise gives some, which are too short to matter."""
+BRIDGE_SIGMA_VOXELS = 0.5
+"""Standard deviation across the wire that a point on a bridged gap gets at least."""
+MODEL_SIGMA_VOXELS = 0.07
+"""What a modelled background adds (in quadrature) to the standard deviation: the wall drags the crest."""
 
 
-def _none(
-    status: FrameStatus, what: str, got: str, allowed: str, do: str, counters: dict[str, float]
-) -> Curve:
-    note = f"trace: {what}: got {got}; expected {allowed}; {do}"
-    return Curve(np.zeros((0, 3)), np.zeros(0), status=status, note=note, counters=counters)
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An attempt, the curve read off it (local points, their sigma, the tip's) and the verdict."""
+
+    attempt: Attempt
+    points: Array
+    sigma: Array
+    tip_sigma: float
+    length_mm: float
+    verdict: Verdict
 
 
-def _knot_voxels(cnr: float) -> float:
-    """Distance between the spline's knots: noise falls with it, a bend's bias rises (0.004 / 0.009 / 0.046 voxel
-    at 8 / 10 / 14 voxels for radii of 20 to 40)."""
-    return float(np.interp(cnr, [4.0, 8.0, 16.0], [12.0, 10.0, 8.0]))
-
-
-def first_tube(scene: Scene, points: Array, sigma_mm: float) -> Tube:
-    """Where the fit starts: a spline along the path, with the amplitude seen there."""
-    h = float(scene.spacing.min())
-    line = resampled(points, 0.5 * h)
-    crest = values_at(scene.grey, scene.spacing, 0.7 * h, np.ascontiguousarray(line[::4]))
-    gain = 1.0 + (0.7 * h / sigma_mm) ** 2
-    amplitude = max(float(np.median(crest)) * gain, scene.noise)
-    controls = spline_through(line, _knot_voxels(amplitude / scene.noise) * h)
-    nodes = tint_nodes(len(controls) - 3)
-    return Tube(controls, np.full(nodes, amplitude), sigma_mm, 0.0)
-
-
-def _prefixed(path: Path, entry: Array, direction: Array) -> tuple[Array, NDArray[np.bool_], bool]:
-    """The path from at most PREFIX_MM before the entry plane, and whether wire was cut off there."""
-    along = (path.points - entry) @ direction
-    near = np.linalg.norm(path.points - entry, axis=1) < ENTRY_REACH_MM + PREFIX_MM
-    before = np.flatnonzero((along < -PREFIX_MM) & near)
-    # only what comes before the point nearest the entry is prefix: the wire may come back past the plane
-    nearest = int(np.argmin(np.linalg.norm(path.points - entry, axis=1)))
-    before = before[before < nearest]
-    start = int(before[-1]) + 1 if len(before) else 0
-    far = np.flatnonzero(~near[:nearest])
-    start = max(start, int(far[-1]) + 1 if len(far) else 0)
-    return path.points[start:], path.bridged[start:], start > 0
-
-
-def _entry_parameter(tube: Tube, entry: Array, direction: Array) -> float:
+def _entry_parameter(tube: Tube, entry: Entry) -> float:
     """Parameter at which the curve crosses the entry plane nearest the entry; 0 when it starts beyond it."""
     u = np.linspace(0, tube.intervals, 40 * tube.intervals + 1)
     points, _ = evaluate(tube.controls, u)
-    along = (points - entry) @ direction
-    near = np.linalg.norm(points - entry, axis=1)
+    along = (points - entry.point) @ entry.direction
+    near = np.linalg.norm(points - entry.point, axis=1)
     crossing = np.flatnonzero((along[:-1] < 0) & (along[1:] >= 0) & (near[:-1] < ENTRY_REACH_MM))
     if len(crossing) == 0:
         return 0.0
@@ -87,41 +65,113 @@ def _even_parameters(tube: Tube, start: float, step: float) -> Array:
     return np.interp(s, arc, u)
 
 
-def _near_bridges(points: Array, path: Array, bridged: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:
+def _near_bridges(points: Array, attempt: Attempt, reach: float) -> NDArray[np.bool_]:
     """Points of the curve that lie on a bridge."""
-    gaps = path[bridged]
+    gaps = attempt.path[attempt.bridged]
     if len(gaps) == 0:
         return np.zeros(len(points), bool)
     square = np.min(np.sum((points[:, None] - gaps[None]) ** 2, axis=2), axis=1)
     return np.asarray(square < reach**2)
 
 
-def _too_long(length: float, expected: float | None, config: TraceConfig) -> bool:
-    return expected is not None and abs(length - expected) > config.length_tolerance_mm
-
-
-def finish(
-    scene: Scene, tube: Tube, path: Array, bridged: NDArray[np.bool_], entry: Array, direction: Array
-) -> dict[str, Any]:
-    """The fitted tube as the fields of a Curve: cut at the entry, evenly sampled, with its uncertainty."""
+def _read_off(scene: Scene, attempt: Attempt | None, entry: Entry, config: TraceConfig) -> list[Candidate]:
+    """The curve of an attempt with its verdict; nothing for no attempt."""
+    if attempt is None:
+        return []
     h = float(scene.spacing.min())
-    u = _even_parameters(tube, _entry_parameter(tube, entry, direction), SAMPLE_VOXELS * h)
-    points, _ = evaluate(tube.controls, u)
-    sigma, tip = point_sigmas(tube, u)
-    flagged = _near_bridges(points, path, bridged, h)
-    return {"points_mm": scene.world(points), "sigma_mm": sigma, "tip_sigma_mm": tip, "flagged": flagged}
+    u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * h)
+    points, _ = evaluate(attempt.tube.controls, u)
+    sigma, tip = point_sigmas(attempt.tube, u)
+    length = float(arc_length(points)[-1])
+    bridged = _near_bridges(points, attempt, h)
+    verdict = judge(scene, attempt, points, bridged, length)
+    return [Candidate(attempt, points, sigma, tip, length, verdict)]
 
 
-def _no_wire(scene: Scene, counters: dict[str, float], weak: bool) -> Curve:
-    got = f"nothing above {scene.noise:.0f} grey of noise that passes the entry"
-    if weak:
+def _doubtful(scene: Scene, found: list[Candidate], entry: Entry, config: TraceConfig) -> bool:
+    """Whether another explanation should be tried."""
+    if not found:
+        return True
+    best = found[0]
+    off = 0.0 if entry.expected_mm is None else abs(best.length_mm - entry.expected_mm)
+    weak = best.attempt.cnr(scene) < SURE_CNR
+    doubts = best.verdict.doubts > 1.5 or best.attempt.leftover_mm > 1.5 or best.attempt.bridges > 0
+    return weak or doubts or off > config.length_tolerance_mm or best.verdict.status is not FrameStatus.OK
+
+
+def _best(scene: Scene, found: list[Candidate], entry: Entry, config: TraceConfig) -> Candidate:
+    """The candidate that leaves least unexplained: misfit, with a length far from the expected one held against it.
+
+    A millimetre of length missing or too much costs what a millimetre of wire explains.
+    """
+    if len(found) == 1:
+        return found[0]
+    costs = np.array(misfit(scene, [c.attempt for c in found]))
+    if entry.expected_mm is not None:
+        h = float(scene.spacing.min())
+        for n, c in enumerate(found):
+            worth = c.attempt.cnr(scene) ** 2 * np.pi * (c.attempt.tube.sigma / h) ** 2 / h
+            costs[n] += (
+                0.5 * worth * max(0.0, abs(c.length_mm - entry.expected_mm) - config.length_tolerance_mm)
+            )
+    return found[int(np.argmin(costs))]
+
+
+def explain(scene: Scene, entry: Entry, previous: Curve | None, config: TraceConfig) -> Candidate | None:
+    """The curve of one scene: from the frame alone; where that leaves doubts also wider and from the frame before."""
+    gap = config.longest_gap_mm
+    found = _read_off(scene, cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry, config)
+    if _doubtful(scene, found, entry, config):
+        found += _read_off(scene, cold(scene, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry, config)
+        if previous is not None and len(previous.points_mm):
+            found += _read_off(scene, warm(scene, entry, previous, config.ridge_voxels, gap), entry, config)
+    return _best(scene, found, entry, config) if found else None
+
+
+def _none(status: FrameStatus, got: str, allowed: str, do: str, counters: dict[str, float]) -> Curve:
+    note = f"trace: wire: got {got}; expected {allowed}; {do}"
+    return Curve(np.zeros((0, 3)), np.zeros(0), status=status, note=note, counters=counters)
+
+
+def _traces_of_wire(scene: Scene) -> bool:
+    """Whether the lumen holds more bright voxels than noise makes: three times as many above 3.5 sigmas, and 15."""
+    sample = smooth_voxels(scene.grey, gaussian_taps(1.0), scene.region.within)
+    noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
+    up, down = (int(np.sum(s * (sample - np.median(sample)) > 3.5 * noise)) for s in (1, -1))
+    return up > 3 * max(down, 5)
+
+
+def _no_wire(scene: Scene) -> Curve:
+    got = f"nothing that stands out of {scene.noise:.0f} grey of noise and passes the entry"
+    if _traces_of_wire(scene):
         return _none(
-            FrameStatus.TRACE_LOW_CONTRAST, "wire", got, "a contrast of 2.5 noises",
-            "give the curve of the frame before, or scan with more dose", counters,
+            FrameStatus.TRACE_LOW_CONTRAST, got, "a contrast of 2.5 noises",
+            "give the curve of the frame before, check entry_mm, or scan with more dose", scene.counters,
         )  # fmt: skip
     return _none(
-        FrameStatus.NO_WIRE, "wire", got, f"a bright line within {ENTRY_REACH_MM} mm of entry_mm",
-        "check entry_mm and that the frame shows a wire", counters,
+        FrameStatus.NO_WIRE, got, f"a bright line within {ENTRY_REACH_MM} mm of entry_mm",
+        "check entry_mm and that the frame shows a wire", scene.counters,
+    )  # fmt: skip
+
+
+def _curve(scene: Scene, best: Candidate) -> Curve:
+    """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
+    h = float(scene.spacing.min())
+    more = inflation(scene, best.points, best.attempt.tube.sigma)
+    sigma = more.across * best.sigma
+    if scene.modelled:
+        sigma = np.hypot(sigma, MODEL_SIGMA_VOXELS * h)
+    sigma = np.where(best.verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * h), sigma)
+    a = best.attempt
+    counters = scene.counters | {
+        "pieces": float(a.pieces), "bridges": float(a.bridges), "leftover_mm": a.leftover_mm,
+        "iterations": float(a.tube.iterations), "residual_rms": a.tube.residual_rms, "blur_mm": a.tube.sigma,
+        "cnr": a.cnr(scene), "inflation": more.across, "inflation_tip": more.along,
+        "from_previous": float(a.from_previous), "faint_mm": best.verdict.faint_mm, "double_mm": best.verdict.double_mm,
+    }  # fmt: skip
+    return Curve(
+        scene.world(best.points), sigma, more.along * best.tip_sigma, best.verdict.flagged, best.verdict.status,
+        best.verdict.note, counters,
     )  # fmt: skip
 
 
@@ -139,36 +189,13 @@ def trace(
     """The wire of one frame from the plane of entry to the tip.
 
     frame, reference : scans of one geometry, with and without wire (without: the background is modelled from the
-    lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve of the frame before, if any.
-    expected_mm : insertion depth to be compared with.  Returns a Curve; what went wrong is its status and note.
+    lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve of the frame before, if any; it is
+    consulted only where the frame alone leaves doubts.  expected_mm : insertion depth, which helps to decide.
+    Returns a Curve; what went wrong is its status and note.
     """
     config = config or TraceConfig()
     scene = build_scene(frame, lumen, reference)
-    entry = scene.local(np.asarray(entry_mm, float)[None])[0]
-    direction = scene.turned(
-        np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
-    )
-    h = float(scene.spacing.min())
-    crests = find_crests(scene, config.ridge_voxels)
-    counters = dict(scene.counters)
-    path = link(crests.pieces, entry, direction, config.longest_gap_mm, ENTRY_REACH_MM)
-    if path is None:
-        return _no_wire(scene, counters, False)
-    points, bridged, cut = _prefixed(path, entry, direction)
-    if arc_length(points)[-1] < 3 * h:
-        return _no_wire(scene, counters, False)
-    line = cut_at_tip(scene, resampled(points, 0.5 * h), 0.7 * h, 0.9 * h)
-    plane = (line[0] + 2.0 * h * direction, direction) if cut else None
-    data = TubeData(scene.grey, scene.spacing, scene.noise, plane)
-    tube = fit_tube(data, first_tube(scene, line, 0.9 * h))
-    fields = finish(scene, tube, points, bridged, entry, direction)
-    more = inflation(scene, scene.local(fields["points_mm"]), tube.sigma)
-    fields["sigma_mm"], fields["tip_sigma_mm"] = (
-        more.across * fields["sigma_mm"],
-        more.along * fields["tip_sigma_mm"],
-    )
-    counters |= {"inflation": more.across, "inflation_tip": more.along}
-    counters |= {"pieces": float(len(crests.pieces)), "bridges": float(path.bridges), "leftover_mm": path.leftover_mm,
-                 "iterations": float(tube.iterations), "residual_rms": tube.residual_rms, "blur_mm": tube.sigma,
-                 "cnr": float(np.median(tube.tint)) / scene.noise}  # fmt: skip
-    return Curve(**fields, counters=counters)
+    heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
+    entry = Entry(scene.local(np.asarray(entry_mm, float)[None])[0], scene.turned(heading), expected_mm)
+    best = explain(scene, entry, previous, config)
+    return _no_wire(scene) if best is None else _curve(scene, best)

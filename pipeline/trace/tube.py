@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from pipeline._kernels.tube import active_voxels, normal_equations
+from pipeline._kernels.tube import active_voxels, normal_equations, render
 from pipeline.model import Array, arc_length
 
 WINDOW = 3.0
@@ -262,3 +262,18 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
     along = np.einsum("ni,nij,nj->n", t, spread, t)
     across = 0.5 * (np.trace(spread, axis1=1, axis2=2) - along)
     return np.sqrt(np.maximum(across, 0.0)), float(np.sqrt(max(0.0, along[-1])))
+
+
+def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
+    """Voxels (flat) that the tube lights up and the grey it gives them."""
+    voxel = float(data.spacing.min())
+    per = max(3, int(np.ceil(_mean_speed(tube.controls) / max(voxel, 0.8 * tube.sigma))))
+    samples = sampling(tube.intervals, per)
+    curve, velocity = _sampled(tube.controls, samples)
+    radius = WINDOW * max(tube.sigma, 0.5 * voxel)
+    slot = np.zeros(data.grey.shape, np.int32)
+    voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
+    amplitude = tube.tint[samples.tint_first] * (1 - samples.tint_share)
+    amplitude = amplitude + tube.tint[samples.tint_first + 1] * samples.tint_share
+    weight = amplitude * samples.measure * np.linalg.norm(velocity, axis=1)
+    return voxels, render(data.grey.shape, data.spacing, slot, len(voxels), curve, weight, tube.sigma, radius)
