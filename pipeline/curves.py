@@ -17,7 +17,7 @@ def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
     wanted = np.asarray(arc_mm, dtype=np.float64)
     arc = arc_length(curve)
     inside: Array = np.stack([np.interp(wanted, arc, curve[:, a]) for a in range(3)], axis=-1)
-    beyond: Array = np.maximum(wanted - arc[-1], 0.0)[..., None] * tip_tangent(curve)
+    beyond: Array = np.multiply.outer(np.maximum(wanted - arc[-1], 0.0), tip_tangent(curve))
     return inside + beyond
 
 
