@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study bench aneurism clean
+.PHONY: setup validate test lint study bench stress peers aneurism clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -25,6 +25,14 @@ lint: setup
 study: setup
 	$(BIN)/python -m pytest -q -m slow
 
+# the bars of the full study on seeds that nobody tuned on: one study of 30 frames each, then the table
+SEEDS ?= 100 101 102
+bars: setup
+	for seed in $(SEEDS); do \
+	  $(BIN)/wireval synth circle-of-willis -o $(OUT)/bars/$$seed --frames 30 --size 256 --seed $$seed && \
+	  $(BIN)/wireval run $(OUT)/bars/$$seed/manifest.toml -o $(OUT)/bars/out-$$seed --resume || exit 1; done
+	$(BIN)/python -m tests.studies.bars $(foreach seed,$(SEEDS),$(OUT)/bars/out-$(seed))
+
 # a real scan (needs WIREVAL_DATA): segmented, then a wire is simulated from the carotid past the aneurysm
 aneurism: setup
 	@if [ -z "$$WIREVAL_DATA" ]; then echo "skipped: set WIREVAL_DATA to the folder of real scans"; else \
@@ -40,6 +48,17 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	touch $@
+
+# run time against error with the promised figures; 5,000 random scenes; other simulators (needs the network once)
+bench: setup
+	$(BIN)/wireval bench -o $(OUT)/bench
+
+stress: setup
+	$(BIN)/wireval bench -o $(OUT)/bench --stress --seed $(SEED)
+
+peers: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(BIN)/wireval bench -o $(OUT)/bench --peers
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

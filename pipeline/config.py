@@ -73,7 +73,7 @@ class SimulateConfig:
     depth: str = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
     entry: str = "traced"
-    """traced (the clamp is measured in the first 5 mm of the traced wires) or manifest (taken as written)."""
+    """traced (the clamp is measured in the first 8 mm of the traced wires) or manifest (taken as written)."""
     bending_scale: float = 1.0
     """Factor on the wire's bending stiffness, for sensitivity runs."""
     wall_scale: float = 1.0

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.curves import at_arc
 from pipeline.model import Array, Curve
 
-REACH_MM = 5.0
+REACH_MM = 8.0
 """Length of wire behind the entry that is used: long against the trace's error, short against a vessel's bend."""
 SKIPPED_MM = 0.5  # the trace's own end lies here
 FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
