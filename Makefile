@@ -47,6 +47,7 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	$(BIN)/python -m pipeline.warm_up
 	touch $@
 
 # run time against error with the promised figures; 5,000 random scenes; other simulators (needs the network once)
@@ -57,8 +58,9 @@ stress: setup
 	$(BIN)/wireval bench -o $(OUT)/bench --stress --seed $(SEED)
 
 peers: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
-	$(BIN)/wireval bench -o $(OUT)/bench --peers
+	test -x $(OUT)/peers/bin/python || $(PYTHON) -m venv $(OUT)/peers
+	$(OUT)/peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(OUT)/peers/bin/wireval bench -o $(OUT)/bench --peers
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

@@ -107,12 +107,33 @@ def _cache_arguments(parser: argparse.ArgumentParser) -> None:
     action.add_argument("--prune", action="store_true", help="empty it")
 
 
+def _bench_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "manifest", nargs="?", type=Path, metavar="MANIFEST", help="time the solver on your own cases instead"
+    )
+    parser.add_argument("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
+    parser.add_argument(
+        "--peers", action="store_true", help="other simulators from PyPI on the same work (extra [peers])"
+    )
+    parser.add_argument(
+        "--stress", action="store_true", help="thousands of random scenes, each outcome judged"
+    )
+    parser.add_argument("--quick", action="store_true", help="few settings, one repeat, 200 stress scenes")
+    parser.add_argument(
+        "--seed", type=int, default=100, metavar="S", help="of the random scenes (default 100)"
+    )
+    parser.add_argument(
+        "--scenes", type=int, default=0, metavar="N", help="number of stress scenes (default 5000)"
+    )
+
+
 COMMANDS = {
     "check": ("list every problem of a manifest at once; reads headers only", _check_arguments),
     "run": ("the whole pipeline: scans in, errors and a report out", _run_arguments),
     "report": ("rebuild tables, figures and pages from result files", _report_arguments),
     "diff": ("paired differences of two outputs; exit 1 on a regression", _diff_arguments),
     "synth": ("write a synthetic study with truth, as real files", _synth_arguments),
+    "bench": ("run time against error; rivals; a stress study", _bench_arguments),
     "cache": ("the stage store", _cache_arguments),
 }
 

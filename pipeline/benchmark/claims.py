@@ -1,0 +1,188 @@
+"""The promises of the solver, measured: each a number, its aim, and whether it is met."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipeline.benchmark import scenes
+from pipeline.benchmark.clock import timed
+from pipeline.benchmark.errors import resampled, shape_error
+from pipeline.benchmark.insert import Run, Setting, insert
+from pipeline.benchmark.reference import Reference, reference
+from pipeline.benchmark.scenes import BenchScene
+from solver import Insertion
+
+PEERS_RMS_MM = 0.026
+"""Shape error in scene B at 60 joints that every published solver shares: the tip's contact, joint by joint."""
+SUB_STEPS = (1, 2, 3, 4, 8)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One measured promise. aim : in words; met : None where no aim is set."""
+
+    claim: str
+    value: float
+    unit: str
+    aim: str = ""
+    met: bool | None = None
+
+
+def claims(
+    studies: Sequence[Callable[[], Iterator[Claim]]] | None = None,
+    tick: Callable[[Claim], None] = lambda _: None,
+) -> pd.DataFrame:
+    """Measure everything: claim, value, unit, aim, met."""
+    rows = []
+    for measure in studies or STUDIES:
+        for claim in measure():
+            rows.append(vars(claim))
+            tick(claim)
+    return pd.DataFrame(rows)
+
+
+def _soft_bend(depth_mm: float = 100.0) -> BenchScene:
+    """The bend of the order plots: 100 mm of wire, wall 0.1 N/mm²."""
+    return scenes.bend(depth_mm, 0.1)
+
+
+def step_time() -> Iterator[Claim]:
+    """A 1 mm step at 200 joints in the bend, and what four times the joints cost."""
+    scene, seconds = _soft_bend(), {}
+    wall = scene.wall()
+    for joints in (200, 400, 800):
+        seconds[joints] = min(_last_steps(scene, wall, 100.0 / joints) for _ in range(3))
+    yield Claim(
+        "a 1 mm step at 200 joints, bend, voxel wall",
+        1e3 * seconds[200],
+        "ms",
+        "0.25 ms",
+        seconds[200] <= 2.5e-4,
+    )
+    ratio = seconds[800] / seconds[400]
+    yield Claim("time(800 joints) / time(400 joints)", ratio, "1", "at most 2.3", ratio <= 2.3)
+
+
+def _last_steps(scene: BenchScene, wall: Any, segment_mm: float, steps: int = 20) -> float:
+    """Median seconds of one of the last steps into the scene."""
+    insertion = Insertion(scene.wire(segment_mm), wall, scene.entry_mm, scene.direction)
+    depths = np.linspace(scene.depth_mm - steps, scene.depth_mm, steps + 1)
+    list(insertion.to_depths([*range(5, int(depths[0]), 5), float(depths[0])]))
+    each = [timed(lambda d=d: list(insertion.to_depths([float(d)])), 1)[0] for d in depths[1:]]  # type: ignore[misc]
+    return float(np.median(each))
+
+
+def against_closed_form() -> Iterator[Claim]:
+    """The seed's method against Newton's, both to the same energy."""
+    scene = _soft_bend(60.0)
+    wall = scene.wall()
+    common = {"segment_mm": 1.0, "quadrature": "joints"}
+    fast, newton = timed(lambda: insert(scene, Setting(**common), wall))  # type: ignore[arg-type]
+    seed = Setting(**common, method="closed_form", tolerance=1e-9, max_iterations=20_000)  # type: ignore[arg-type]
+    slow, closed = timed(lambda: insert(scene, seed, wall), 1)
+    apart = abs(closed.energy_N_mm / newton.energy_N_mm - 1.0)
+    reached = closed.reached and newton.reached
+    yield Claim("closed form and newton, energy apart", apart, "1", "at most 1e-6", reached and apart <= 1e-6)
+    yield Claim("newton faster than closed form, times", slow / fast, "1", "at least 25", slow / fast >= 25)
+
+
+def sub_steps() -> Iterator[Claim]:
+    """Scene B at 60 joints with other numbers of steps per mm: the same minimum, or a status."""
+    energies: dict[int, Run] = {}
+    for count in SUB_STEPS:
+        scene = scenes.bend(60.0).with_(step_mm=1.0 / count)
+        energies[count] = insert(scene, Setting(1.0))
+    one = energies[1].energy_N_mm
+    for count, run in energies.items():
+        apart = abs(run.energy_N_mm / one - 1.0)
+        name = f"{count} steps per mm ({run.status.identifier}): energy {1e3 * run.energy_N_mm:.6f} µJ, apart"
+        yield Claim(name, apart, "1", "at most 1e-6", run.reached and apart <= 1e-6)
+
+
+def scene_b() -> Iterator[Claim]:
+    """Shape error at 60 joints on a soft and on a hard wall."""
+    for stiffness in (1.0, 100.0):
+        scene = scenes.bend(60.0, stiffness)
+        rms, tip, _ = _error(scene, 1.0, reference(scene))
+        name = f"scene B, 60 joints, wall {stiffness:g} N/mm²: RMS shape error"
+        yield Claim(name, rms, "mm", f"at most {PEERS_RMS_MM / 3:.4f}", rms <= PEERS_RMS_MM / 3)
+        yield Claim(f"scene B, 60 joints, wall {stiffness:g} N/mm²: tip error", tip, "mm")
+
+
+def _error(
+    scene: BenchScene, segment_mm: float, limit: Reference, **setting: Any
+) -> tuple[float, float, float]:
+    """RMS and tip error, mm, and relative energy error (inf where the depth is not reached)."""
+    run = insert(scene, Setting(segment_mm, **setting))
+    if not run.reached:
+        return math.inf, math.inf, math.inf
+    points = resampled(run.joints_mm, run.arcs_mm, limit.arcs_mm)
+    return *shape_error(points, limit.points_mm), abs(run.energy_N_mm / limit.energy_N_mm - 1.0)
+
+
+def orders() -> Iterator[Claim]:
+    """Errors against segment length: free, in the soft bend, and with the tip in contact."""
+    free = scenes.cantilever()
+    yield from _order(
+        "free cantilever, tip", free, (10.0, 5.0, 2.5), 1, lambda p: abs(p - 2) <= 0.05, "2.00 ± 0.05"
+    )
+    soft = _soft_bend()
+    limit = reference(soft)
+    yield from _order(
+        "soft bend, energy", soft, (5.0, 2.5, 1.25), 2, lambda p: p >= 1.9, "at least 1.9", limit
+    )
+    tip = _error(soft, 2.5, limit)[1]
+    yield Claim("soft bend, tip error at 2.5 mm segments", tip, "mm", "at most 0.01", tip <= 0.01)
+    hard = scenes.bend(60.0)
+    yield from _order("scene B, shape", hard, (2.0, 1.0, 0.5), 0, lambda p: p >= 1.8, "at least 1.8")
+    yield from _order("scene B, energy", hard, (2.0, 1.0, 0.5), 2, lambda p: p >= 1.8, "at least 1.8")
+
+
+def _order(
+    name: str,
+    scene: BenchScene,
+    segments: tuple[float, ...],
+    which: int,
+    good: Callable[[float], bool],
+    aim: str,
+    limit: Reference | None = None,
+) -> Iterator[Claim]:
+    """Observed order over a range of segment lengths, by a straight line through the logarithms."""
+    limit = limit or reference(scene)
+    found = [_error(scene, s, limit)[which] for s in segments]
+    order = float(np.polyfit(np.log(segments), np.log(np.maximum(found, 1e-300)), 1)[0])
+    yield Claim(f"order of the {name} over {segments} mm", order, "1", aim, good(order))
+
+
+def skips() -> Iterator[Claim]:
+    """Every skip off in turn: the same wire, and what the skip saves."""
+    scene = scenes.bend(60.0)
+    wall = scene.wall()
+    setting = Setting(0.5)
+    insertion = Insertion(scene.wire(1.0), wall, scene.entry_mm, scene.direction)
+    switch = insertion.settings.switch
+    on_seconds, on = timed(lambda: insert(scene, setting, wall, switch))
+    for name in switch._fields:
+        off = switch._replace(**{name: False})
+        seconds, run = timed(lambda o=off: insert(scene, setting, wall, o))  # type: ignore[misc]
+        apart = float(np.abs(run.joints_mm - on.joints_mm).max())
+        yield Claim(
+            f"skip {name} off: wire apart", apart, "mm", "at most 1e-6 (algebraic skips 1e-12)", apart <= 1e-6
+        )
+        yield Claim(f"skip {name} off: time, times", seconds / on_seconds, "1")
+
+
+STUDIES: tuple[Callable[[], Iterator[Claim]], ...] = (
+    step_time,
+    against_closed_form,
+    sub_steps,
+    scene_b,
+    orders,
+    skips,
+)

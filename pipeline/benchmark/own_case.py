@@ -1,0 +1,54 @@
+"""A user's own study as a scene of the benchmark: its lumen, its wire, its depth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pipeline.benchmark.scenes import BenchScene
+from pipeline.cache import Store, default_root
+from pipeline.case import CaseRun, run_stages
+from pipeline.config import Config
+from pipeline.manifest import Case, read_manifest
+from pipeline.progress import CaseProgress
+from pipeline.simulate import rolls
+
+
+class NoScene(ValueError):
+    """A case that cannot be pushed through: the sentence says why."""
+
+
+def scenes_of(manifest: Path, config: Config) -> list[BenchScene]:
+    """One scene per case of the manifest; raises ManifestError or NoScene."""
+    return [scene_of(case, config) for case in read_manifest(manifest).cases]
+
+
+def scene_of(case: Case, config: Config) -> BenchScene:
+    """Segment the case's lumen (or read it) and push to its deepest insertion_mm."""
+    if not case.insertion_mm:
+        msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
+        raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")
+    with TemporaryDirectory() as folder:
+        progress = CaseProgress(case.id, Path(folder) / "log.txt", quiet=True)
+        run = CaseRun(case, config, Store(default_root()), progress, "segment")
+        run_stages(run)
+    if run.failure is not None or run.lumen is None:
+        msg = f"bench: case {case.id!r}: {run.failure}"
+        raise NoScene(msg)
+    return BenchScene(
+        case.id,
+        "the user's own case",
+        max(case.insertion_mm),
+        step_mm=config.solver.step_mm,
+        entry_mm=case.entry_mm,
+        direction=case.entry_direction,
+        material_axis=case.material_axis,
+        roll_deg=rolls(case, len(case.insertion_mm), config.simulate)[-1],
+        radius_mm=case.wire.radius_mm,
+        stiffness=case.wire.bending_stiffness_N_mm2,
+        rest=case.wire.rest_curvature_per_mm,
+        torsion=case.wire.torsional_stiffness_N_mm2,
+        wall_stiffness=case.wall.stiffness_N_mm2,
+        friction=case.wall.friction,
+        ready=run.lumen.distance,
+    )
