@@ -1,0 +1,28 @@
+"""Compile every kernel once by running a tiny study: ``python -m pipeline.warm_up``. Later runs load them from disk."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+from pipeline.cli import main
+
+
+def warm_up() -> float:
+    """Seconds that it took; the tiny study and its output are thrown away."""
+    clock = perf_counter()
+    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stderr(io.StringIO()):
+            main(["synth", "bend", "-o", f"{folder}/study", "--frames", "2", "--size", "48"])
+            main(["run", f"{folder}/study/manifest.toml", "-o", str(Path(folder) / "out"), "--no-cache"])
+    return perf_counter() - clock
+
+
+if __name__ == "__main__":
+    sys.stdout.write("compiling the kernels (once)...\n")
+    sys.stdout.flush()
+    sys.stdout.write(f"compiled in {warm_up():.0f} s\n")
