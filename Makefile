@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := reports/out
-SEED ?= 100
+SEED ?= 101
 export OMP_NUM_THREADS := 1
 
 validate: setup
@@ -26,7 +26,7 @@ study: setup
 	$(BIN)/python -m pytest -q -m slow
 
 # the bars of the full study on seeds that nobody tuned on: one study of 30 frames each, then the table
-SEEDS ?= 100 101 102
+SEEDS ?= 101 102 103
 bars: setup
 	for seed in $(SEEDS); do \
 	  $(BIN)/wireval synth circle-of-willis -o $(OUT)/bars/$$seed --frames 30 --size 256 --seed $$seed && \
