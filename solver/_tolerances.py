@@ -30,8 +30,14 @@ HOP_VOXELS = 0.02
 """Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
-WORST_LEVENBERG = 1e9
+FIRST_DAMPING = 1e-3
+"""Levenberg term tried first: holds a bend of 20 segments' length back by about its own stiffness."""
+LEAST_DAMPING = 1e-7
+"""Levenberg term below which it is dropped."""
+WORST_DAMPING = 1e9
 """Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
+SEARCHES = 6
+"""Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
 SLIP_MM = 1e-3
 """Tangential way in mm below which a point in contact still sticks: a thousandth of a usual step."""
 FRICTION_CHANGE = 1e-4

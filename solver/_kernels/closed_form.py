@@ -123,10 +123,10 @@ def minimise_closed_form(
             return BROKEN, count, which, energy
         if count == check or count == 0:
             check += check // 4
-            sweep(problem, which, k, 0, False, 0.0, report)
+            minimal = sweep(problem, which, k, 0.0, report)
             problem.scratch.counter[SWEEPS] += 1
             noise = ROUND_OFF * scale_of(problem, which, k)
-            if report[2] < 0.0 and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
+            if minimal and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
                 costate(problem, which, k, report)
                 return CONVERGED, count, which, energy
         gradients(problem, which, k)

@@ -21,7 +21,10 @@ SUFFICIENT = tol.SUFFICIENT
 FLOOR = tol.ENERGY_FLOOR_ANGLE**2
 FLOOR_ANGLE = tol.ENERGY_FLOOR_ANGLE
 MOMENT = tol.MOMENT
-WORST_LEVENBERG = tol.WORST_LEVENBERG
+FIRST_DAMPING = tol.FIRST_DAMPING
+LEAST_DAMPING = tol.LEAST_DAMPING
+WORST_DAMPING = tol.WORST_DAMPING
+SEARCHES = tol.SEARCHES
 
 
 @kernel
@@ -56,13 +59,11 @@ def admissible(problem: Problem, which: int, k: int) -> bool:
 
 
 @kernel
-def search(
-    problem: Problem, which: int, k: int, near: int, energy: float, decrement: float, noise: float
-) -> float:
+def search(problem: Problem, which: int, k: int, energy: float, decrement: float, noise: float) -> float:
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
-    for _ in range(12):
-        rollout(problem, which, k, near, fraction)
+    for _ in range(SEARCHES):
+        rollout(problem, which, k, 0, fraction)
         problem.scratch.counter[ROLLOUTS] += 1
         trial = total_energy(problem, 1 - which, k)
         enough = trial <= energy - SUFFICIENT * fraction * decrement
@@ -77,13 +78,14 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
     gain = problem.scratch.gain
-    for i in range(k):
+    gain[j, :, :] = 0.0
+    for i in range(j + 1, k):
         gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
     size = 0.3
     while size > 1e-6:
         for side in (1.0, -1.0):
             gain[j, 0, 0], gain[j, 1, 0] = side * size * report[3], side * size * report[4]
-            rollout(problem, which, k, 0, 1.0)
+            rollout(problem, which, k, j, 1.0)
             problem.scratch.counter[ROLLOUTS] += 1
             trial = total_energy(problem, 1 - which, k)
             if trial < energy - 0.1 * abs(report[5]) * size * size and admissible(problem, which, k):
@@ -128,6 +130,12 @@ def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> 
 
 
 @kernel
+def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
+    """Whether the residual moments that ``costate`` left are nothing beside the moments in the wire."""
+    return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
+
+
+@kernel
 def minimise(
     problem: Problem, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:
@@ -136,56 +144,47 @@ def minimise(
     Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
     ``costate``, at the result.
     """
-    which, levenberg, project = 0, 0.0, False
+    which, damping, last, patience = 0, 0.0, FIRST_DAMPING, 0
     energy = total_energy(problem, which, k)
     report[18] = energy
-    parts = problem.state.parts
-    counter = problem.scratch.counter
-    if (
-        problem.switch.idle
-        and parts[which, WALL] == 0.0
-        and unloaded(problem.chain, k)
-        and rest_shape(problem, which, k)
-    ):
+    state, counter = problem.state, problem.scratch.counter
+    free = problem.switch.idle and state.parts[which, WALL] == 0.0 and unloaded(problem.chain, k)
+    if free and rest_shape(problem, which, k):
         counter[IDLE] += 1
         costate(problem, 1 - which, k, report)
         return CONVERGED, 0, 1 - which, 0.0
     for iteration in range(max_iterations):
-        sweep(problem, which, k, 0, project, levenberg, report)
-        counter[SWEEPS] += 1
-        decrement = report[0]
-        if not (math.isfinite(decrement) and math.isfinite(energy)):
+        if not math.isfinite(energy):
             return BROKEN, iteration, which, energy
-        scale = scale_of(problem, which, k)
-        noise = ROUND_OFF * (scale + abs(parts[which, LOAD]))
-        if levenberg == 0.0 and not project and decrement <= max(tolerance * scale, noise):
-            if report[2] >= 0.0:
-                trial = leave_saddle(problem, which, k, energy, report)
-                if trial == math.inf:
-                    costate(problem, which, k, report)
-                    return STALLED, iteration, which, energy
-                which, energy = 1 - which, trial
-                continue
+        definite = sweep(problem, which, k, damping, report)
+        counter[SWEEPS] += 1
+        noise = ROUND_OFF * (scale_of(problem, which, k) + abs(state.parts[which, LOAD]))
+        if damping == 0.0 and definite and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
+            small = report[0] <= noise
             which, energy = finish(problem, which, k, energy, report)
-            if (
-                report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k)
-                or decrement <= noise
-            ):
+            if small or at_rest(problem, which, k, report):
                 return CONVERGED, iteration, which, energy
             continue
-        trial = search(problem, which, k, 0, energy, decrement, noise)
+        trial = math.inf
+        if definite:
+            trial = search(problem, which, k, energy, report[0], noise)
+        elif damping == 0.0:
+            costate(problem, which, k, report)
+            if at_rest(problem, which, k, report):
+                trial = leave_saddle(problem, which, k, energy, report)
+                if trial == math.inf:
+                    return STALLED, iteration, which, energy
         if trial <= energy:
             which, energy = 1 - which, trial
-            levenberg = 0.0 if levenberg < 1e-3 else levenberg * 0.1
-            project = False
-            continue
-        # a failed step: first without the wall's negative curvature, then shorter and shorter
-        project = not project and levenberg == 0.0
-        if not project:
+            last, patience = max(damping, LEAST_DAMPING), patience - 1
+            if patience <= 0:
+                damping = 0.2 * damping if damping > LEAST_DAMPING else 0.0
+        else:
             counter[LEVENBERG] += 1
-            levenberg = max(10 * levenberg, 1e-2)
-        if levenberg > WORST_LEVENBERG:
-            costate(problem, which, k, report)
-            return STALLED, iteration, which, energy
+            patience = 2
+            damping = 0.5 * last if damping == 0.0 else 6 * damping
+            if damping > WORST_DAMPING:
+                costate(problem, which, k, report)
+                return STALLED, iteration, which, energy
     costate(problem, which, k, report)
     return EXHAUSTED, max_iterations, which, energy

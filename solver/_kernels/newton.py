@@ -62,7 +62,7 @@ def point_force(frame: Nine, jet: Any, force: float) -> Three:
 def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, project: bool) -> Six:
     """The wall's energy Hessian at a point in contact, k w (∇φ ∇φᵀ + d ∇²φ), in the frame of its node.
 
-    ``project`` leaves out ∇²φ, the part that can be negative.
+    ``project`` leaves out the directions in which ∇²φ is negative: a wire pressed on a convex wall.
     """
     n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
     own = (
@@ -73,13 +73,43 @@ def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, proje
         curvature * n[0] * n[2],
         curvature * n[1] * n[2],
     )
-    if project:
-        return own
-    bend = conjugate(
-        transpose(frame),
-        (force * jet[4], force * jet[5], force * jet[6], force * jet[7], force * jet[8], force * jet[9]),
+    bend = (force * jet[4], force * jet[5], force * jet[6], force * jet[7], force * jet[8], force * jet[9])
+    bend = conjugate(transpose(frame), bend)
+    return add6(own, without_negative(bend, n) if project else bend)
+
+
+@inlined
+def without_negative(m: Six, n: Three) -> Six:
+    """The positive part of a symmetric matrix in the plane across n; nothing along n."""
+    size = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    if size < 1e-6:
+        return ZERO6
+    n = (n[0] / size, n[1] / size, n[2] / size)
+    # an orthonormal pair across n (Duff et al. 2017), without a branch at the poles
+    sign = math.copysign(1.0, n[2])
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    s = (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0])
+    t = (b, sign + n[1] * n[1] * a, -n[1])
+    ms, mt = apply(full(m), s), apply(full(m), t)
+    ss = s[0] * ms[0] + s[1] * ms[1] + s[2] * ms[2]
+    tt = t[0] * mt[0] + t[1] * mt[1] + t[2] * mt[2]
+    st = s[0] * mt[0] + s[1] * mt[1] + s[2] * mt[2]
+    # principal directions of the 2x2 block
+    angle = 0.5 * math.atan2(2 * st, ss - tt)
+    c, d = math.cos(angle), math.sin(angle)
+    mean, radius = 0.5 * (ss + tt), math.sqrt(0.25 * (ss - tt) * (ss - tt) + st * st)
+    one, two = max(mean + radius, 0.0), max(mean - radius, 0.0)
+    v = (c * s[0] + d * t[0], c * s[1] + d * t[1], c * s[2] + d * t[2])
+    w = (c * t[0] - d * s[0], c * t[1] - d * s[1], c * t[2] - d * s[2])
+    return (
+        one * v[0] * v[0] + two * w[0] * w[0],
+        one * v[1] * v[1] + two * w[1] * w[1],
+        one * v[2] * v[2] + two * w[2] * w[2],
+        one * v[0] * v[1] + two * w[0] * w[1],
+        one * v[0] * v[2] + two * w[0] * w[2],
+        one * v[1] * v[2] + two * w[1] * w[2],
     )
-    return add6(own, bend)
 
 
 @inlined
@@ -170,13 +200,15 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
 
 
 @inlined
-def smallest_shift(a: float, b: float, d: float, floor: float) -> float:
-    """What to add to the diagonal of [[a, b], [b, d]] so that it is safely positive; 0 where it is already."""
-    mean = 0.5 * (a + d)
-    least = mean - math.sqrt(0.25 * (a - d) * (a - d) + b * b)
-    if least > floor:
-        return 0.0
-    return max(-least, floor) - least
+def positive(q: Six, floor: float, twisting: bool) -> bool:
+    """Whether Q_uu is safely positive definite."""
+    mean, half = 0.5 * (q[0] + q[1]), 0.5 * (q[0] - q[1])
+    if mean - math.sqrt(half * half + q[3] * q[3]) <= floor:
+        return False
+    if not twisting:
+        return True
+    det = q[0] * q[1] - q[3] * q[3]
+    return q[2] * det > q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]
 
 
 @inlined
@@ -270,63 +302,64 @@ def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[
 
 
 @inlined
-def joint_blocks(
-    chain: Chain, j: int, u: Three, jac: Nine, h: Six, g: Three, twisting: bool, levenberg: float, report: Any
-) -> tuple[Three, Nine]:
-    """Q_u of a joint and minus the inverse of its Q_uu, made positive where it is not (and that noted)."""
-    bend = chain.bend[j]
-    twist = chain.twist[j] if twisting else 0.0
-    q_u = add3(apply_transposed(jac, g), (bend * u[0], bend * u[1], twist * u[2]))
+def joint_hessian(
+    chain: Chain, j: int, u: Three, jac: Nine, h: Six, g: Three, twisting: bool, damping: float
+) -> Six:
+    """Q_uu of a joint; damping adds that share of the joint's own stiffness."""
     q = add6(conjugate(transpose(jac), h), jacobian_curvature(g, u))
-    extra = 1.0 + levenberg
-    q = (q[0] + bend * extra, q[1] + bend * extra, q[2] + twist * extra, q[3], q[4], q[5])
-    shift = smallest_shift(q[0], q[3], q[1], CURVATURE_FLOOR * bend)
-    if shift > 0.0:
-        if report[2] < 0.0:
-            note_direction(q, j, report)
-        q = (q[0] + shift, q[1] + shift, q[2] + shift, q[3], q[4], q[5])
-    if twisting:
-        q = lift_twist(q, twist)
-    return q_u, solve_block(q, twisting)
+    bend = chain.bend[j] * (1.0 + damping)
+    twist = chain.twist[j] * (1.0 + damping) if twisting else 0.0
+    return q[0] + bend, q[1] + bend, q[2] + twist, q[3], q[4], q[5]
 
 
 @kernel
-def sweep(
-    problem: Problem, which: int, k: int, near: int, project: bool, levenberg: float, report: Any
-) -> None:
-    """One backward Riccati recursion, from the tip to joint ``near``; gains go to scratch.gain, see ``rollout``.
+def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> bool:
+    """One backward Riccati recursion from the tip to the base; gains go to scratch.gain, see ``rollout``.
 
-    report: [0] Newton decrement (predicted fall of the energy), [2] joint of the first indefinite block from
-    the tip or -1, [3:5] its direction of negative curvature, [5] that curvature.
+    damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
+    leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
+    Returns False and stops at the first block that is not positive definite.
+    report: [0] Newton decrement (predicted fall of the energy), [2] joint of that block or -1, [3:5] its
+    direction of negative curvature, [5] that curvature.
     """
-    chain, state = problem.chain, problem.state
+    chain, state, gain = problem.chain, problem.state, problem.scratch.gain
+    bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
     p, c, h, f, g = ZERO6, ZERO9, ZERO6, ZERO3, ZERO3
     decrement = 0.0
     report[2] = -1.0
-    for n in range(k, near, -1):
+    for n in range(k, 0, -1):
         j = n - 1
         frame = load9(state.r[which, n])
         df, dg = node_gradient(problem, which, n, frame)
-        dp, dc, dh = node_hessian(problem, which, n, frame, project)
+        dp, dc, dh = node_hessian(problem, which, n, frame, damping > 0.0)
         p, c, h, f, g = add6(p, dp), add9(c, dc), add6(h, dh), add3(f, df), add3(g, dg)
-        c, h, g = cross_segment(chain.length[j], p, c, h, f, g)
+        held = damping * bend[j] / (length[j] * length[j])
+        p = (p[0] + held, p[1] + held, p[2] + held, p[3], p[4], p[5])
+        c, h, g = cross_segment(length[j], p, c, h, f, g)
         u = load3(state.u[which, j])
         jac = jacobian(u[0], u[1], u[2])
-        if not problem.twisting:
+        if not twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
-        q_u, inverse = joint_blocks(chain, j, u, jac, h, g, problem.twisting, levenberg, report)
+        q_uu = joint_hessian(chain, j, u, jac, h, g, twisting, 0.01 * damping)
+        if not positive(q_uu, CURVATURE_FLOOR * bend[j], twisting):
+            note_direction(q_uu, j, report)
+            return False
+        inverse = solve_block(q_uu, twisting)
+        twist = chain.twist[j] * u[2] if twisting else 0.0
+        q_u = add3(apply_transposed(jac, g), (bend[j] * u[0], bend[j] * u[1], twist))
         jac_t = transpose(jac)
         q_up = times_transposed(jac_t, c)
         q_ur = times(jac_t, add9(full(h), cross_matrix((0.5 * g[0], 0.5 * g[1], 0.5 * g[2]))))
         feed, gain_p, gain_r = apply(inverse, q_u), times(inverse, q_up), times(inverse, q_ur)
-        store_gain(problem.scratch.gain[j], feed, gain_p, gain_r)
+        store_gain(gain, j, feed, gain_p, gain_r)
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
-        e = turn(chain.rest[j], u[0], u[1], u[2])
+        e = turn(rest[j], u[0], u[1], u[2])
         p, h = conjugate(e, add6(p, gram(q_up, gain_p))), conjugate(e, add6(h, gram(q_ur, gain_r)))
         c = times_transposed(times(e, add9(c, times(transpose(q_up), gain_r))), e)
         f = apply(e, add3(f, apply_transposed(q_up, feed)))
         g = apply(e, add3(g, apply_transposed(q_ur, feed)))
     report[0] = decrement
+    return True
 
 
 @kernel
@@ -341,21 +374,15 @@ def note_direction(q: Six, j: int, report: Any) -> None:
 
 
 @inlined
-def lift_twist(q: Six, twist: float) -> Six:
-    """Raise the twist entry of Q_uu until the 3x3 block is positive (its bending block already is)."""
-    det = q[0] * q[1] - q[3] * q[3]
-    least = (q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]) / det
-    return q[0], q[1], max(q[2], least + CURVATURE_FLOOR * twist), q[3], q[4], q[5]
-
-
-@inlined
-def store_gain(gain: Any, feed: Three, gain_p: Nine, gain_r: Nine) -> None:
-    """Write one joint's gains: column 0 the step, 1-3 the answer to δp, 4-6 to δr."""
-    for a in range(3):
-        gain[a, 0] = feed[a]
-        for b in range(3):
-            gain[a, 1 + b] = gain_p[3 * a + b]
-            gain[a, 4 + b] = gain_r[3 * a + b]
+def store_gain(gain: Any, j: int, feed: Three, gain_p: Nine, gain_r: Nine) -> None:
+    """Write joint j's gains: column 0 the step, 1-3 the answer to δp, 4-6 to δr."""
+    gain[j, 0, 0], gain[j, 1, 0], gain[j, 2, 0] = feed
+    gain[j, 0, 1], gain[j, 0, 2], gain[j, 0, 3] = gain_p[0], gain_p[1], gain_p[2]
+    gain[j, 1, 1], gain[j, 1, 2], gain[j, 1, 3] = gain_p[3], gain_p[4], gain_p[5]
+    gain[j, 2, 1], gain[j, 2, 2], gain[j, 2, 3] = gain_p[6], gain_p[7], gain_p[8]
+    gain[j, 0, 4], gain[j, 0, 5], gain[j, 0, 6] = gain_r[0], gain_r[1], gain_r[2]
+    gain[j, 1, 4], gain[j, 1, 5], gain[j, 1, 6] = gain_r[3], gain_r[4], gain_r[5]
+    gain[j, 2, 4], gain[j, 2, 5], gain[j, 2, 6] = gain_r[6], gain_r[7], gain_r[8]
 
 
 @kernel
