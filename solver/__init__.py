@@ -8,6 +8,7 @@ from solver.relax import relax
 from solver.solution import Solution
 from solver.status import Status
 from solver.wall import VesselWall
+from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Grid", "GuideWire", "Insertion", "Solution", "Status", "VesselWall", "relax"]
+__all__ = ["Grid", "GuideWire", "Insertion", "Solution", "Status", "VesselWall", "relax", "warm_up"]

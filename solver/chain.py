@@ -43,11 +43,16 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
             "not along entry_direction",
             "leave it out for the default",
         )
-    one = unit(across, "material_axis")
-    two = np.cross(direction, one)
+    one = across / float(np.linalg.norm(across))
+    two = _cross(direction, one)
     roll = np.deg2rad(roll_deg)
     first = np.cos(roll) * one + np.sin(roll) * two
-    return np.column_stack([first, np.cross(direction, first), direction])
+    return np.column_stack([first, _cross(direction, first), direction])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """A x b: numpy's own costs 30 µs for three numbers."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def no_field() -> Field:
@@ -56,14 +61,14 @@ def no_field() -> Field:
 
 
 def empty_state(k: int, points: int) -> State:
-    """Two states with room for k segments."""
+    """Three states with room for k segments."""
     return State(
-        u=np.zeros((2, k, 3)),
-        x=np.zeros((2, k + 1, 3)),
-        r=np.zeros((2, k + 1, 3, 3)),
-        depth=np.zeros((2, points)),
-        jet=np.zeros((2, points, 10)),
-        parts=np.zeros((2, 4)),
+        u=np.zeros((3, k, 3)),
+        x=np.zeros((3, k + 1, 3)),
+        r=np.zeros((3, k + 1, 3, 3)),
+        depth=np.zeros((3, points)),
+        jet=np.zeros((3, points, 10)),
+        parts=np.zeros((3, 4)),
     )
 
 
@@ -95,7 +100,7 @@ class Buffers:
             gain=np.zeros((capacity, 3, 7)),
             anchor=np.ones((points, 4)),
             counter=self.counter,
-            fraction=np.zeros(6),
+            slide=np.zeros(3),
             weights=np.zeros((3, 3, 4)),
         )
         rubbing = points if self.friction else 0

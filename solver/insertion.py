@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
 from solver._kernels.follow import follow
+from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.passage import free_way
 from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
@@ -25,6 +26,8 @@ from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
 
+LAST_GOOD = 2
+"""Where the state before a step is kept."""
 FINAL = (Status.LEFT_GRID, Status.NON_FINITE)
 """Outcomes that a shorter step cannot help."""
 
@@ -80,7 +83,9 @@ class Insertion:
         self.depth_mm, self.roll_deg = 0.0, 0.0
         self._shrink, self._energy, self._started = 1.0, 0.0, False
         self.buffers.state.x[:, 0] = self.entry
-        self.buffers.state.r[:, 0] = base_frame(self.direction, material_axis, 0.0)
+        self._base_roll, self._base_frame = 0.0, base_frame(self.direction, material_axis, 0.0)
+        self.buffers.state.r[:, 0] = self._base_frame
+        self._outside = wall is not None and self._entry_is_outside(wall)
 
     def to_depths(
         self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0
@@ -130,11 +135,12 @@ class Insertion:
         """A status for depths that need not be tried."""
         if self.wire.segments_at(depth)[0] > self.max_joints:
             return Status.TOO_LONG
-        if self.wall is not None:
-            diagonal = float(np.linalg.norm(self.wall.distance.spacing_mm))
-            if self.wall.look_up(self.entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal:
-                return Status.ENTRY_OUTSIDE
-        return Status.CONVERGED
+        return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
+
+    def _entry_is_outside(self, wall: VesselWall) -> bool:
+        """Whether the entry point lies more than a voxel outside the lumen."""
+        diagonal = float(np.linalg.norm(wall.distance.spacing_mm))
+        return bool(wall.look_up(self.entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)
 
     def _allowed(self, ahead: float, turn: float) -> float:
         """Fraction of the way that one step may take: step_mm, roll_step_deg, and what the tip can see."""
@@ -155,21 +161,20 @@ class Insertion:
     def _try(self, ahead: float, turn: float, fraction: float) -> tuple[Status, int]:
         """Take a step; on failure put everything back. Returns its status and iterations."""
         b = self.buffers
-        sizes = (b.k, b.k + 1, b.k + 1, b.points, b.points, 4)
-        kept = [a[0, :size].copy() for a, size in zip(b.state, sizes, strict=True)]
-        report = b.report.copy()
+        copy_state(b.problem, 0, LAST_GOOD, b.k)
+        report, kept = b.report.copy(), b.k
         depth, roll = self.depth_mm + fraction * ahead, self.roll_deg + fraction * turn
         if fraction == 1.0:
             depth, roll = self.depth_mm + ahead, self.roll_deg + turn
         status, iterations, energy = self._relax_at(depth, roll)
-        if status is Status.CONVERGED and self._left_grid():
-            status = Status.LEFT_GRID
+        if status is Status.CONVERGED and b.stiffness:
+            beyond = furthest_outside(b.field, b.state.x[0], b.k)
+            status = Status.LEFT_GRID if beyond > self.wire.radius_mm else status
         if status is Status.CONVERGED:
             self.depth_mm, self.roll_deg, self._energy = depth, roll, energy
         else:
             b.lay_out(self.depth_mm)
-            for a, was in zip(b.state, kept, strict=True):
-                a[0, : len(was)] = was
+            copy_state(b.problem, LAST_GOOD, 0, kept)
             b.report[:] = report
         return status, iterations
 
@@ -179,7 +184,7 @@ class Insertion:
         before = b.state.x[0, : b.k + 1].copy()
         curve, was = self._curve(before, depth - self.depth_mm), b.k
         b.lay_out(depth)
-        b.state.r[:, 0] = base_frame(self.direction, self.material_axis, roll)
+        b.state.r[:, 0] = self._base(roll)
         b.state.x[:, 0] = self.entry
         if b.k == 0:
             b.report[:], b.state.parts[:] = 0.0, 0.0
@@ -191,6 +196,12 @@ class Insertion:
         follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
         anchor_friction(b, before, depth - self.depth_mm)
         return relax_buffers(b, self.settings)
+
+    def _base(self, roll: float) -> Array:
+        """The base frame at a roll, computed once as long as the roll stays."""
+        if roll != self._base_roll:
+            self._base_roll, self._base_frame = roll, base_frame(self.direction, self.material_axis, roll)
+        return self._base_frame
 
     def _keep_twist(self, was: int) -> None:
         """Twist stays with the material, which is counted from the tip."""
@@ -214,14 +225,6 @@ class Insertion:
             if len(kept)
             else np.array([self.entry, self.entry + self.direction])
         )
-
-    def _left_grid(self) -> bool:
-        """Whether a joint is further outside the grid than the wire's radius."""
-        if self.wall is None:
-            return False
-        b = self.buffers
-        beyond = self.wall.beyond_grid(b.state.x[0, 1 : b.k + 1])
-        return bool(beyond.max(initial=0.0) > self.wire.radius_mm)
 
 
 def _vector(name: str, value: ArrayLike) -> Array:

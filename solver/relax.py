@@ -12,6 +12,7 @@ from solver import _tolerances as tol
 from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.energy import lag_friction, point_at, total_energy
 from solver._kernels.follow import follow
+from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Rule
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED, minimise
 from solver._kernels.problem import (
@@ -28,7 +29,6 @@ from solver._kernels.problem import (
 )
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
-from solver.forces import contact_forces, node_of, push_force
 from solver.grid import read_only
 from solver.solution import Solution
 from solver.status import Status
@@ -129,7 +129,7 @@ def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
                 break
         else:
             status = Status.FRICTION
-    if status is Status.CONVERGED and folded(b):
+    if status is Status.CONVERGED and least_turn_cosine(b.state.r[0], b.k) < tol.FOLD_COSINE:
         status = Status.FOLDED
     return status, iterations, energy
 
@@ -143,15 +143,8 @@ def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
         result = minimise(b.problem, b.k, settings.tolerance, settings.max_iterations, b.report)
     outcome, iterations, which, energy = result
     if which == 1:
-        for array, size in zip(b.state, (b.k, b.k + 1, b.k + 1, b.points, b.points, 4), strict=True):
-            array[0, :size] = array[1, :size]
+        copy_state(b.problem, 1, 0, b.k)
     return OUTCOMES[outcome], iterations, energy
-
-
-def folded(b: Buffers) -> bool:
-    """Whether two consecutive segments turn by more than a right angle."""
-    along = b.state.r[0, : b.k + 1, :, 2]
-    return bool(np.einsum("na,na->n", along[1:], along[:-1]).min(initial=1.0) < tol.FOLD_COSINE)
 
 
 def anchor_friction(b: Buffers, curve: Array, ahead: float) -> None:
@@ -193,7 +186,9 @@ def solution_of(
 ) -> Solution:
     """Dress the current state of a work space."""
     n = b.k + 1
-    force, deepest = contact_forces(b)
+    force = np.zeros((n, 3))
+    deepest = contact_forces(b.problem, b.k, force) if b.stiffness and b.k else 0.0
+    push = push_force(b.problem, b.wire.profile, b.k, max(len(b.rule.hull), 1), b.report) if b.k else 0.0
     parts = b.state.parts[0]
     return Solution(
         joints_mm=read_only(b.state.x[0, :n].copy()),
@@ -207,7 +202,7 @@ def solution_of(
         contact_force_N=read_only(force),
         reaction_force_N=read_only(b.report[6:9].copy()),
         reaction_torque_N_mm=float(b.report[11]),
-        push_force_N=push_force(b),
+        push_force_N=push,
         max_penetration_mm=deepest,
         depth_mm=depth,
         roll_deg=roll,
@@ -266,9 +261,9 @@ def hold_friction(b: Buffers) -> None:
     """Friction holds every look-up point where it is now."""
     if not b.friction or not b.k:
         return
-    points = np.arange(b.points)
-    for point, node in zip(points, node_of(b, points), strict=True):
-        point_at(b.problem, 0, int(node), int(point), b.problem.friction.start[point])
+    for node in range(1, b.k + 1):
+        for point in range(b.chain.first[node], b.chain.first[node + 1]):
+            point_at(b.problem, 0, node, point, b.problem.friction.start[point])
 
 
 def set_loads(b: Buffers, load_N: ArrayLike | None) -> None:

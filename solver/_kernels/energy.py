@@ -138,7 +138,7 @@ def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
 def friction_energy(problem: Problem, which: int, k: int) -> float:
     """Incremental potential of Coulomb's law, N mm: load times coefficient times the way slid in this step."""
     friction, chain = problem.friction, problem.chain
-    slide = problem.scratch.fraction[3:]
+    slide = problem.scratch.slide
     total = 0.0
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):

@@ -284,7 +284,7 @@ def node_hessian(problem: Problem, which: int, n: int, frame: Nine, project: boo
 @inlined
 def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[Three, Six]:
     """Gradient and Hessian of a point's friction, in the frame of its node."""
-    way = problem.scratch.fraction[3:]
+    way = problem.scratch.slide
     size = slide_of(problem, which, n, i, way)
     s = apply_transposed(frame, load3(way))
     m = apply_transposed(frame, load3(problem.friction.normal[i]))

@@ -15,10 +15,10 @@ BENDING, WALL, LOAD, RUBBING = range(4)
 
 
 class State(NamedTuple):
-    """Two states of a chain side by side (axis 0), the current one and the trial.
+    """Three states of a chain side by side (axis 0): the current one, the trial, and the last good one.
 
-    u : (2, k, 3) rad.   x : (2, k + 1, 3) mm.   r : (2, k + 1, 3, 3), columns are material axes 1, 2 and e3.
-    depth : (2, p) penetration mm.   jet : (2, p, 10), see ``spline``, per mm.   parts : (2, 4) energies, N mm.
+    u : (3, k, 3) rad.   x : (3, k + 1, 3) mm.   r : (3, k + 1, 3, 3), columns are material axes 1, 2 and e3.
+    depth : (3, p) penetration mm.   jet : (3, p, 10), see ``spline``, per mm.   parts : (3, 4) energies, N mm.
     """
 
     u: Any
@@ -30,12 +30,12 @@ class State(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights."""
+    """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights, a 3-vector."""
 
     gain: Any
     anchor: Any
     counter: Any
-    fraction: Any
+    slide: Any
     weights: Any
 
 

@@ -1,0 +1,130 @@
+"""Forces of a wire at rest: they fall out of the minimum, as derivatives of the total energy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from solver._kernels.energy import slide_of
+from solver._kernels.flags import kernel
+from solver._kernels.layout import Profile
+from solver._kernels.problem import Problem
+from solver._kernels.rotation import turn
+from solver._kernels.spline import Field
+
+
+@kernel
+def contact_forces(problem: Problem, k: int, force: Any) -> float:
+    """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
+
+    A point inside a segment belongs to its two ends in proportion. Friction acts against the way slid.
+    """
+    chain, state, friction = problem.chain, problem.state, problem.friction
+    deepest = 0.0
+    slide = problem.scratch.slide
+    for n in range(1, k + 1):
+        for p in range(chain.first[n], chain.first[n + 1]):
+            share = -chain.offset[p, 2] / chain.length[n - 1]
+            d = state.depth[0, p]
+            deepest = max(deepest, d)
+            if d != 0.0:
+                size = -problem.stiffness * chain.weight[p] * d
+                for a in range(3):
+                    force[n, a] += (1 - share) * size * state.jet[0, p, 1 + a]
+                    force[n - 1, a] += share * size * state.jet[0, p, 1 + a]
+            if friction.coefficient > 0.0 and friction.load[p] > 0.0:
+                size = -friction.coefficient * friction.load[p] / slide_of(problem, 0, n, p, slide)
+                for a in range(3):
+                    force[n, a] += (1 - share) * size * slide[a]
+                    force[n - 1, a] += share * size * slide[a]
+    return deepest
+
+
+@kernel
+def profile_at(at: Any, value: Any, s: float) -> float:
+    """A piecewise linear function of the distance from the tip; at a jump the value further out."""
+    n = at.size
+    if s < at[0]:
+        return float(value[0])
+    for i in range(n - 1):
+        if s < at[i + 1]:
+            return float(value[i] + (value[i + 1] - value[i]) * (s - at[i]) / (at[i + 1] - at[i]))
+    return float(value[n - 1])
+
+
+@kernel
+def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: Any) -> float:
+    """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
+
+    The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
+    share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
+    """
+    chain, u = problem.chain, problem.state.u
+    depth = 0.0
+    for j in range(k):
+        depth += chain.length[j]
+    ahead = problem.state.r[0, 1]
+    force = report[6] * ahead[0, 2] + report[7] * ahead[1, 2] + report[8] * ahead[2, 2]
+    inner = depth - 0.5 * chain.length[0]
+    flexible = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, inner)
+    rest = profile_at(profile.rest_at, profile.rest, inner)
+    for j in range(min(k, 2)):
+        compliance, bend = 0.5 * flexible, 0.5 * rest
+        if j == 0:
+            compliance = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, depth) - compliance
+            bend = profile_at(profile.rest_at, profile.rest, depth) - bend
+        moment = chain.bend[j] ** 2 * (u[0, j, 0] ** 2 + u[0, j, 1] ** 2)
+        force -= 0.5 * moment * compliance
+        if problem.twisting:
+            force -= 0.25 * (chain.twist[j] * u[0, j, 2]) ** 2 / profile.twist
+        e = turn(0.0, u[0, j, 0], u[0, j, 1], u[0, j, 2])
+        at = 12 + 3 * j
+        force += bend * (report[at] * e[3] + report[at + 1] * e[4] + report[at + 2] * e[5])
+    if k > 1:
+        # half of node 1's cell lies on the first segment
+        for p in range(chain.first[1], chain.first[2]):
+            if chain.offset[p, 2] == 0.0:
+                force += 0.25 * problem.stiffness * problem.state.depth[0, p] ** 2 / hulls
+    return float(force)
+
+
+@kernel
+def furthest_outside(field: Field, x: Any, k: int) -> float:
+    """How far joints 1 to k are outside the grid's voxels (half a voxel beyond their centres) at most, mm."""
+    m, o, shape = field.to_index, field.origin, field.coefficients.shape
+    furthest = 0.0
+    for n in range(1, k + 1):
+        d0, d1, d2 = x[n, 0] - o[0], x[n, 1] - o[1], x[n, 2] - o[2]
+        square = 0.0
+        for a in range(3):
+            f = m[a, 0] * d0 + m[a, 1] * d1 + m[a, 2] * d2
+            per_mm = m[a, 0] * m[a, 0] + m[a, 1] * m[a, 1] + m[a, 2] * m[a, 2]
+            beyond = max(-0.5 - f, f - (shape[a] - 2.5), 0.0)
+            square += beyond * beyond / per_mm
+        furthest = max(furthest, square)
+    return math.sqrt(furthest)
+
+
+@kernel
+def least_turn_cosine(r: Any, k: int) -> float:
+    """Cosine of the sharpest turn between consecutive segments."""
+    least = 1.0
+    for n in range(1, k + 1):
+        cosine = r[n, 0, 2] * r[n - 1, 0, 2] + r[n, 1, 2] * r[n - 1, 1, 2] + r[n, 2, 2] * r[n - 1, 2, 2]
+        least = min(least, cosine)
+    return least
+
+
+@kernel
+def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
+    """Copy one of the states over another."""
+    s = problem.state
+    points = problem.chain.first[k + 1]
+    s.u[target, :k] = s.u[source, :k]
+    s.x[target, : k + 1] = s.x[source, : k + 1]
+    s.r[target, : k + 1] = s.r[source, : k + 1]
+    s.depth[target, :points] = s.depth[source, :points]
+    s.parts[target] = s.parts[source]
+    for p in range(points):
+        if s.depth[source, p] != 0.0:
+            s.jet[target, p] = s.jet[source, p]
