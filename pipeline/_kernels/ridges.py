@@ -110,6 +110,20 @@ def to_ridge(
     return middle
 
 
+@njit(cache=True, inline="always")
+def _along(p: NDArray[Any], t: NDArray[Any], q: NDArray[Any], u: NDArray[Any], reach: float) -> bool:
+    """Whether point p with tangent t lies on the track through q with tangent u."""
+    gap = (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
+    return bool(gap < reach * reach and abs(t[0] * u[0] + t[1] * u[1] + t[2] * u[2]) > 0.7)
+
+
+LAG = 12
+"""Steps over which the run of a walk is compared with the local tangent: a swing from one strand to another that it
+crosses at 50 degrees takes 4 to 6 voxels, in two bends of half the angle."""
+UNTURNED = 0.97
+"""Cosine with the direction LAG steps ago from which a point is taken not to have turned yet."""
+
+
 @njit(cache=True)
 def _walk(
     grey: NDArray[Any],
@@ -123,6 +137,7 @@ def _walk(
     low: float,
     sharp: float,
     turn: float,
+    bend: float,
     points: NDArray[Any],
     tangents: NDArray[Any],
     values: NDArray[Any],
@@ -132,7 +147,8 @@ def _walk(
     """Follow the crest from ``start``; fills the arrays (m, 3), (m, 3), (m,) and returns how many points were set.
 
     Stops where the crest is weaker than ``low``, blunter than ``sharp``, turns by more than ``turn`` (cosine) in a
-    step, leaves ``allowed``, or runs along a crest that was walked before (``stamp`` = its point + 1).
+    step or by more than ``bend`` (cosine) against the last LAG steps, leaves ``allowed``, or runs
+    along a crest that was walked before (``stamp`` = its point + 1; own points are stamped negative meanwhile).
     """
     w = np.empty((3, 3, 64))
     out = np.empty(10)
@@ -140,6 +156,7 @@ def _walk(
     p = start.copy()
     t = heading.copy()
     count = 0
+    swung = 0
     size = min(spacing[0], spacing[1], spacing[2])
     while count < points.shape[0]:
         qx, qy, qz = p[0] + length * t[0], p[1] + length * t[1], p[2] + length * t[2]
@@ -156,17 +173,45 @@ def _walk(
             break
         if not allowed[i, j, k]:
             break
+        own = -stamp[i, j, k] - 1
+        if 0 <= own < count - LAG and _along(p, t, points[own], tangents[own], 0.8 * size):
+            break  # round a ring and back on its own track
         known = stamp[i, j, k] - 1
         if known >= 0:
-            e, f = earlier[known], earlier_tangents[known]
-            gap = (p[0] - e[0]) ** 2 + (p[1] - e[1]) ** 2 + (p[2] - e[2]) ** 2
-            if gap < (0.8 * size) ** 2 and abs(t[0] * f[0] + t[1] * f[1] + t[2] * f[2]) > 0.7:
+            if _along(p, t, earlier[known], earlier_tangents[known], 0.8 * size):
+                break
+        else:
+            stamp[i, j, k] = -count - 1
+        if count >= LAG:
+            # where two crests merge the local tangent swings over to the other one: compare it with the run so far
+            hx = p[0] - points[count - LAG, 0]
+            hy = p[1] - points[count - LAG, 1]
+            hz = p[2] - points[count - LAG, 2]
+            if hx * t[0] + hy * t[1] + hz * t[2] < bend * np.sqrt(hx * hx + hy * hy + hz * hz):
+                # give up the points from where the crest began to turn
+                hx, hy, hz = tangents[count - LAG, 0], tangents[count - LAG, 1], tangents[count - LAG, 2]
+                swung = 1
+                while swung < LAG - 1:
+                    m = count - 1 - swung
+                    if hx * tangents[m, 0] + hy * tangents[m, 1] + hz * tangents[m, 2] > UNTURNED:
+                        break
+                    swung += 1
                 break
         points[count, 0], points[count, 1], points[count, 2] = p[0], p[1], p[2]
         tangents[count, 0], tangents[count, 1], tangents[count, 2] = t[0], t[1], t[2]
         values[count] = out[0]
         count += 1
-    return count
+    for m in range(count):
+        i, j, k = (
+            round(points[m, 0] / spacing[0]),
+            round(points[m, 1] / spacing[1]),
+            round(points[m, 2] / spacing[2]),
+        )
+        stamp[i, j, k] = max(0, stamp[i, j, k])
+    i, j, k = round(p[0] / spacing[0]), round(p[1] / spacing[1]), round(p[2] / spacing[2])
+    if 0 <= i < stamp.shape[0] and 0 <= j < stamp.shape[1] and 0 <= k < stamp.shape[2]:
+        stamp[i, j, k] = max(0, stamp[i, j, k])
+    return count - swung
 
 
 @njit(cache=True)
@@ -180,6 +225,7 @@ def tracklets(
     low: float,
     sharp: float,
     turn: float,
+    bend: float,
     length: float,
     longest: int,
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
@@ -236,6 +282,7 @@ def tracklets(
             low,
             sharp,
             turn,
+            bend,
             ahead,
             ahead_t,
             ahead_v,
@@ -254,6 +301,7 @@ def tracklets(
             low,
             sharp,
             turn,
+            bend,
             back,
             back_t,
             back_v,

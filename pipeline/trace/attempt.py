@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pipeline._kernels.jets import values_at
 from pipeline._kernels.tube import active_voxels
 from pipeline.model import Array, Curve, arc_length
-from pipeline.trace.crests import Crests, Tracklet, find_crests
-from pipeline.trace.link import Path, link
+from pipeline.trace.crests import BEND, Crests, Tracklet, find_crests
+from pipeline.trace.link import Path, link, with_doubles
 from pipeline.trace.scene import Scene
 from pipeline.trace.tip import cut_at_tip, resampled
 from pipeline.trace.tube import Tube, TubeData, evaluate, fit_tube, predicted, spline_through, tint_nodes
@@ -93,6 +93,14 @@ def fit_path(scene: Scene, points: Array, cut: bool, direction: Array, find_tip:
     return fit_tube(data, first_tube(scene, line))
 
 
+def _fitted(scene: Scene, points: Array, cut: bool, direction: Array) -> Tube | None:
+    """:func:`fit_path`, or None where the path is so wrong that its equations have no solution."""
+    try:
+        return fit_path(scene, points, cut, direction)
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+
+
 def dense(tube: Tube, step: float) -> Array:
     """Points of the tube's curve about ``step`` mm apart."""
     length = float(
@@ -112,19 +120,24 @@ def unexplained_mm(pieces: list[Tracklet], curve: Array, near: float) -> float:
     return total
 
 
-def cold(scene: Scene, entry: Entry, sigma_voxel: float, seed_sigmas: float, gap_mm: float) -> Attempt | None:
+def cold(
+    scene: Scene, entry: Entry, sigma_voxel: float, seed_sigmas: float, gap_mm: float, bend: float = BEND
+) -> Attempt | None:
     """From the frame alone: crests, linked from the entry, ended at the tip, fitted."""
     h = float(scene.spacing.min())
-    crests = find_crests(scene, sigma_voxel, seed_sigmas)
+    crests = find_crests(scene, sigma_voxel, seed_sigmas, bend)
     shortest = 3.0 * sigma_voxel * h
     pieces = [p for p in crests.pieces if p.length > shortest] or crests.pieces
+    pieces = with_doubles(pieces)
     path = link(pieces, entry.point, entry.direction, gap_mm, ENTRY_REACH_MM)
     if path is None:
         return None
     points, bridged, cut = prefixed(path, entry)
     if arc_length(points)[-1] < 3 * h:
         return None
-    tube = fit_path(scene, points, cut, entry.direction)
+    tube = _fitted(scene, points, cut, entry.direction)
+    if tube is None:
+        return None
     left = unexplained_mm(pieces, np.concatenate([path.points, dense(tube, h)]), NEAR_VOXELS * h)
     return Attempt(tube, points, bridged, path.bridges, left, len(pieces))
 
@@ -158,7 +171,9 @@ def warm(scene: Scene, entry: Entry, previous: Curve, crests_voxel: float, gap_m
         points = np.concatenate([points, onward.points[first:]])
         bridged = np.concatenate([bridged, onward.bridged[first:]])
         bridges = onward.bridges
-    final = fit_path(scene, points, False, entry.direction)
+    final = _fitted(scene, points, False, entry.direction)
+    if final is None:
+        return None
     left = unexplained_mm(rest.pieces, dense(final, h), NEAR_VOXELS * h)
     return Attempt(final, points, bridged, bridges, left, len(rest.pieces), True)
 

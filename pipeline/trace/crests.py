@@ -21,7 +21,11 @@ TURN = 0.75
 """Least cosine between the directions of two steps of one voxel: a wire turning within 1.5 voxels is none."""
 PREFILTER = 1.5
 """Only voxels this many noises up are smoothed to look for seeds: one in fifteen of the lumen, most of the wire."""
-LONGEST = 20000
+BEND = 0.82
+"""Least cosine between a crest's tangent and its run over the last 8 voxels: 35 degrees, a radius of 7 voxels."""
+STRICT_BEND = 0.92
+"""The same where a crossing is suspected: 23 degrees; tracklets get shorter, but none turns off at a crossing."""
+LONGEST = 6000
 """Most points of a tracklet on either side of its seed."""
 
 
@@ -61,7 +65,9 @@ class Crests:
     strong: NDArray[np.int64]
 
 
-def find_crests(scene: Scene, sigma_voxel: float, seed_sigmas: float = SEED_SIGMAS) -> Crests:
+def find_crests(
+    scene: Scene, sigma_voxel: float, seed_sigmas: float = SEED_SIGMAS, bend: float = BEND
+) -> Crests:
     """All tracklets in the region; ``sigma_voxel`` is the blur in which crests are looked for."""
     h = float(scene.spacing.min())
     taps = gaussian_taps(sigma_voxel)
@@ -77,7 +83,7 @@ def find_crests(scene: Scene, sigma_voxel: float, seed_sigmas: float = SEED_SIGM
     sharp = 0.15 * low / (sigma_voxel * h) ** 2
     points, tangents, values, first = tracklets(
         scene.grey, scene.region.allowed, scene.spacing, sigma_voxel * h, seeds,
-        high, low, sharp, TURN, 0.7 * h, LONGEST,
+        high, low, sharp, TURN, bend, 0.7 * h, LONGEST,
     )  # fmt: skip
     pieces = [Tracklet(points[a:b], tangents[a:b], values[a:b]) for a, b in pairwise(first)]
     return Crests(pieces, noise, sigma_voxel * h, seeds)

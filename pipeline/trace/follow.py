@@ -12,7 +12,7 @@ from pipeline.config import TraceConfig
 from pipeline.model import Array, Curve, Lumen, Volume, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, Entry, cold, misfit, warm
-from pipeline.trace.crests import SEED_SIGMAS, gaussian_taps
+from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
 from pipeline.trace.judge import SURE_CNR, Verdict, judge
 from pipeline.trace.noise import inflation
 from pipeline.trace.region import MAD
@@ -122,6 +122,8 @@ def explain(scene: Scene, entry: Entry, previous: Curve | None, config: TraceCon
     gap = config.longest_gap_mm
     found = _read_off(scene, cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry, config)
     if _doubtful(scene, found, entry, config):
+        strict = cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap, STRICT_BEND)
+        found += _read_off(scene, strict, entry, config)
         found += _read_off(scene, cold(scene, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry, config)
         if previous is not None and len(previous.points_mm):
             found += _read_off(scene, warm(scene, entry, previous, config.ridge_voxels, gap), entry, config)

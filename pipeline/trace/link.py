@@ -16,6 +16,10 @@ from pipeline.trace.crests import Tracklet
 
 WIDEST_ANGLE = 1.2
 """Largest angle (rad) between an end's tangent and the chord of the bridge."""
+DOUBLED = 1.25
+"""Crest grey over the usual from which a piece is offered twice."""
+LONGEST_DOUBLE = 0.2
+"""Share of all crests above which a bright piece is just a brighter wire."""
 END_SPAN = 6
 """Crest points over which an end's tangent is averaged."""
 
@@ -132,6 +136,20 @@ def _split_at_entry(
         if far[n] < reach and abs(run) > 0.5 and (best is None or far[n] < best[0]):
             best = (float(far[n]), m, n, run > 0)
     return None if best is None else best[1:]
+
+
+def with_doubles(pieces: list[Tracklet]) -> list[Tracklet]:
+    """The pieces, and once more those so bright that two strands in contact must have merged in them."""
+    if len(pieces) < 2:
+        return pieces
+    lengths = np.array([p.length for p in pieces])
+    usual = float(np.median(np.concatenate([p.values for p in pieces])))
+    again = [
+        p
+        for p, n in zip(pieces, lengths, strict=True)
+        if float(np.median(p.values)) > DOUBLED * usual and n < LONGEST_DOUBLE * lengths.sum()
+    ]
+    return pieces + again
 
 
 def link(pieces: list[Tracklet], entry: Array, direction: Array, longest: float, reach: float) -> Path | None:

@@ -37,22 +37,14 @@ def gapped(rng):
     return Tangle("gap", points, tuple((s, s + VOXEL * rng.uniform(3, 12)) for s in starts))
 
 
-def crossing(rng):
-    """One loop whose strands cross at a distance of 1.3 to 3 voxels: in contact at the least."""
-    radius, clear = rng.uniform(3.5, 6.0), VOXEL * rng.uniform(1.33, 3.0)
-    lead = rng.uniform(6, 10)
-    turn = 2 * np.pi + rng.uniform(0.9, 1.6)
-    a = np.linspace(0, turn, 2000)
-    loop = np.stack([radius * np.sin(a), radius * (1 - np.cos(a)), np.zeros_like(a)], axis=1)
-    tail_t = loop[-1] - loop[-2]
-    tail = loop[-1] + np.linspace(0, rng.uniform(8, 12), 300)[1:, None] * tail_t / np.linalg.norm(tail_t)
-    head = np.stack([np.linspace(-lead, 0, 300)[:-1], np.zeros(299), np.zeros(299)], axis=1)
-    points = phantoms.resample(np.concatenate([head, loop, tail]), 0.05)
-    arc = _arc(points)
-    # lift the wire steadily over the loop, so that the strands pass each other at the wanted distance
-    begin, end = lead + 0.2 * radius, lead + radius * 2 * np.pi * 0.95
-    s = np.clip((arc - begin) / (end - begin), 0, 1)
-    points[:, 2] += clear * (3 * s**2 - 2 * s**3)
+def crossing(rng, clear=None):
+    """A loop whose strands cross at 50 to 90 degrees, 1.3 to 3 voxels apart: in contact at the least."""
+    clear = VOXEL * rng.uniform(1.33, 3.0) if clear is None else clear
+    scale, slope = rng.uniform(1.1, 1.8), rng.uniform(0.85, 1.7)
+    t = np.linspace(-2.5, 2.5, 6000)
+    # the cubic (t^3 - 3 t, slope t^2) crosses itself at t = +-sqrt 3
+    points = scale * np.stack([t**3 - 3 * t, slope * t**2, np.zeros_like(t)], axis=1)
+    points[:, 2] = clear * np.clip(t / (2 * np.sqrt(3)) + 0.5, -0.2, 1.2)
     return Tangle("crossing", phantoms.resample(points, 0.05))
 
 
@@ -104,7 +96,7 @@ def clean_frame(wire: Tangle, origin, shape):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One traced tangle: errors in voxels; right = it is the wire, flagged = the curve itself says that it may not be."""
+    """One traced tangle: errors in voxels; flagged = the curve says that it may be wrong."""
 
     kind: str
     mean: float
