@@ -26,6 +26,12 @@ class SegmentConfig:
     """Spread of the homogeneity affinity, grey values; estimated at the seeds when not given."""
     feature_sigma: float | None = None
     """Spread of the object-feature affinity, grey values; estimated at the seeds when not given."""
+    adjacency: int = 6
+    """Neighbours of a voxel: 6 (faces) or 26."""
+    scale: int | None = None
+    """Voxels on either side over which grey is averaged before affinities are taken; from the noise when not given."""
+    other_seeds_mm: tuple[tuple[float, float, float], ...] = ()
+    """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: the lumen is cut off at the weakest link."""
     margin_mm: float = 5.0
     """Room around the vessel in the box that holds its signed distance."""
     outer_mm: float = 3.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline._kernels.connect import FULL, flood
 from pipeline.config import SegmentConfig
 from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
+from pipeline.segment.affinity import Levels, estimate_affinity
+from pipeline.segment.connect import connect, connect_relative, neighbours
 from pipeline.segment.levels import deepest, levels_at, scanner_blur
 from pipeline.segment.surface import signed_distance
 from pipeline.status import FrameStatus, StageError
@@ -25,7 +25,6 @@ THIN_TOLERANCE = 0.004
 """The same where no vessel is thick: there level, curvature and blur hang together."""
 SURFACE_ROUNDS = 3
 """Surfaces at most beyond the first: only a vessel as thin as its blur, whose plateau is not seen, needs them."""
-FACES = np.array([(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1)], np.int64)
 
 
 def _failed(got: str, allowed: str, do: str) -> StageError:
@@ -56,20 +55,6 @@ def _start(grid: Grid, seeds: NDArray[np.int64]) -> tuple[Levels, NDArray[np.int
     return levels, np.array([f[1] for f in found], np.int64)
 
 
-def connect(
-    grid: Grid, seeds: NDArray[np.int64], affinity: Affinity, threshold: float
-) -> tuple[NDArray[np.int64], float]:
-    """Flat indices of the voxels connected to the seeds at ``threshold``, and the number of voxels read."""
-    levels = np.zeros(grid.shape, np.uint16)
-    reached = np.zeros(grid.shape, np.uint8)
-    cut = round(threshold * FULL)
-    a = affinity
-    order = flood(
-        grid.values, levels, reached, seeds, FACES, a.taps, a.low, a.scale, a.homogeneity, a.feature, cut
-    )
-    return order, float(len(order))
-
-
 def at_level(distance: Grid, change: float, contrast: float, blur_mm: float) -> tuple[Grid, Grid]:
     """The distance and its mask for a wall's level changed by a little: the wall moves by change over steepness."""
     moved = distance.values + np.float32(change * np.sqrt(2 * np.pi) * blur_mm / contrast)
@@ -87,8 +72,13 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     config = config or SegmentConfig()
     grid, axes = in_memory_order(volume)
     levels, seeds = _start(grid, _seed_voxels(grid, seeds_mm))
-    affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma)
-    order, read = connect(grid, seeds, affinity, config.threshold)
+    affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma, config.scale)
+    offsets = neighbours(config.adjacency)
+    if len(config.other_seeds_mm):
+        others = _seed_voxels(grid, np.array(config.other_seeds_mm))
+        order, read = connect_relative(grid, seeds, others, affinity, config.threshold, offsets)
+    else:
+        order, read = connect(grid, seeds, affinity, config.threshold, offsets)
     if len(order) < config.least_voxels:
         allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
         got = f"connected voxels: got {len(order)}"

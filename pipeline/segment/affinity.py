@@ -52,11 +52,17 @@ class Affinity:
     taps: NDArray[np.float32]
 
 
+def binomial_taps(scale: int) -> NDArray[np.float32]:
+    """The binomial kernel of 2 scale + 1 taps: the scale in voxels over which a voxel's grey is taken."""
+    taps = np.ones(1)
+    for _ in range(2 * scale):
+        taps = np.convolve(taps, [0.5, 0.5])
+    return np.asarray(taps, np.float32)
+
+
 def smoothing_taps(levels: Levels) -> NDArray[np.float32]:
     """A binomial kernel: sigma 0.7 voxel where contrast is above 5 noises, 1.0 below."""
-    ratio = levels.noise / levels.contrast
-    taps = [1.0, 2.0, 1.0] if ratio < 0.2 else [1.0, 4.0, 6.0, 4.0, 1.0]
-    return np.asarray(np.array(taps) / sum(taps), np.float32)
+    return binomial_taps(1 if levels.noise / levels.contrast < 0.2 else 2)
 
 
 def noise_after(taps: NDArray[Any]) -> float:
@@ -65,10 +71,13 @@ def noise_after(taps: NDArray[Any]) -> float:
 
 
 def estimate_affinity(
-    levels: Levels, homogeneity_sigma: float | None, feature_sigma: float | None
+    levels: Levels,
+    homogeneity_sigma: float | None = None,
+    feature_sigma: float | None = None,
+    scale: int | None = None,
 ) -> Affinity:
     """The tables for an object with these levels; a sigma that is given (grey values) replaces the estimate."""
-    taps = smoothing_taps(levels)
+    taps = smoothing_taps(levels) if scale is None else binomial_taps(scale)
     spread = NOISE_SPREAD * levels.noise * noise_after(taps)
     s_h = homogeneity_sigma or max(HOMOGENEITY_SPREAD * levels.contrast, spread)
     s_o = feature_sigma or HALF_HEIGHT_SPREAD * levels.contrast
