@@ -31,7 +31,7 @@ class SegmentConfig:
     scale: int | None = None
     """Voxels on either side over which grey is averaged before affinities are taken; from the noise when not given."""
     other_seeds_mm: tuple[tuple[float, float, float], ...] = ()
-    """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: the lumen is cut off at the weakest link."""
+    """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: cut off at the weakest link."""
     margin_mm: float = 5.0
     """Room around the vessel in the box that holds its signed distance."""
     outer_mm: float = 3.0
