@@ -92,7 +92,7 @@ HARD = (
         160,
         5,
         _two,
-        "ok|trace_ambiguous",
+        "ok|trace_ambiguous|length_mismatch",
     ),
     Scene(
         "introducer",
