@@ -81,6 +81,7 @@ class Insertion:
         self.step_mm, self.roll_step_deg, self.max_joints = step_mm, roll_step_deg, max_joints
         self.buffers = buffers_for(wire, wall, self.settings)
         self.depth_mm, self.roll_deg = 0.0, 0.0
+        self._rise = max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing)
         self._shrink, self._energy, self._started = 1.0, 0.0, False
         self.buffers.state.x[:, 0] = self.entry
         self._base_roll, self._base_frame = 0.0, base_frame(self.direction, material_axis, 0.0)
@@ -116,13 +117,16 @@ class Insertion:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
             self.roll_deg, self._started = roll, True
         status, iterations, shrink = self._refusal(depth), 0, self._shrink
+        budget = self._budget(depth - self.depth_mm, roll - self.roll_deg)
         while status is Status.CONVERGED:
             ahead, turn = depth - self.depth_mm, roll - self.roll_deg
             if abs(ahead) < tol.MATCH_DEPTH_MM and turn == 0.0:
                 break
             outcome, used = self._try(ahead, turn, min(1.0, shrink * self._allowed(ahead, turn)))
             iterations += used
-            if outcome is Status.CONVERGED:
+            if iterations > budget:
+                status = Status.MAX_ITERATIONS
+            elif outcome is Status.CONVERGED:
                 shrink = min(1.0, 2 * shrink)
             elif shrink > tol.SMALLEST_STEP and outcome not in FINAL:
                 shrink *= 0.5
@@ -130,6 +134,14 @@ class Insertion:
                 status = outcome
         self._shrink = max(shrink, 8 * tol.SMALLEST_STEP)
         return solution_of(self.buffers, status, iterations, self._energy, self.depth_mm, self.roll_deg)
+
+    def _budget(self, ahead: float, turn: float) -> float:
+        """Iterations that one depth may spend: a cap on the time that a hopeless scene can take."""
+        steps = abs(ahead) / self.step_mm + abs(turn) / self.roll_step_deg
+        each = self.settings.max_iterations
+        if self.settings.method == "closed_form":
+            each *= tol.SWEEPS_PER_ITERATION
+        return each * (tol.BUDGET_STEPS + 4 * steps)
 
     def _refusal(self, depth: float) -> Status:
         """A status for depths that need not be tried."""
@@ -152,9 +164,7 @@ class Insertion:
             b = self.buffers
             if ahead > 0 and b.stiffness:
                 tip, along = b.state.x[0, b.k], b.state.r[0, b.k, :, 2]
-                step = free_way(
-                    b.field, tip, along, step, b.spacing, self.wire.radius_mm, b.problem.scratch.weights
-                )
+                step = free_way(b.field, tip, along, step, b.spacing, self._rise, b.problem.scratch.weights)
             fraction = min(fraction, step / abs(ahead))
         return fraction
 

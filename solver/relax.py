@@ -56,7 +56,7 @@ class Settings:
     """How to relax.
 
     tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation; the closed form
-    may use a thousand sweeps for each.
+    may use five hundred sweeps for each.
     quadrature : of the wall's energy. "tip" integrates it under the last segments and sums joints elsewhere,
     "joints" is the seed's sum over joints (half a weight at the tip), "segments" integrates under all of them.
     """

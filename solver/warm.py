@@ -15,7 +15,9 @@ def warm_up() -> None:
     """Compile every kernel (about half a minute, once per installation; later calls read the cache)."""
     axis = np.arange(-2.0, 2.5, 0.5)
     x, y, _ = np.meshgrid(axis, axis, np.arange(-1.0, 4.0, 0.5), indexing="ij")
-    grid = Grid((np.hypot(x - 0.1, y) - 0.5).astype(np.float32), np.full(3, 0.5), np.array([-2.0, -2.0, -1.0]))
+    grid = Grid(
+        (np.hypot(x - 0.1, y) - 0.5).astype(np.float32), np.full(3, 0.5), np.array([-2.0, -2.0, -1.0])
+    )
     wire = GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
     for method in METHODS:
         wall = VesselWall(grid, 1.0, friction=0.1)

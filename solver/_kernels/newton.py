@@ -203,7 +203,8 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
 def positive(q: Six, floor: float, twisting: bool) -> bool:
     """Whether Q_uu is safely positive definite."""
     mean, half = 0.5 * (q[0] + q[1]), 0.5 * (q[0] - q[1])
-    if mean - math.sqrt(half * half + q[3] * q[3]) <= floor:
+    # written so that NaN, from an overflow in a long compressed chain, is not positive
+    if not mean - math.sqrt(half * half + q[3] * q[3]) > floor:
         return False
     if not twisting:
         return True
@@ -359,7 +360,7 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
         f = apply(e, add3(f, apply_transposed(q_up, feed)))
         g = apply(e, add3(g, apply_transposed(q_ur, feed)))
     report[0] = decrement
-    return True
+    return math.isfinite(decrement)
 
 
 @kernel

@@ -13,7 +13,6 @@ from solver._kernels.problem import Problem
 from solver._kernels.spline import Field, locate, set_basis, value
 
 HOP = tol.HOP_VOXELS
-RISE_RADII = tol.RISE_RADII
 
 
 @kernel
@@ -62,13 +61,12 @@ def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
 
 @kernel
 def free_way(
-    field: Field, tip: Any, along: Any, step: float, spacing: float, radius: float, weights: Any
+    field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float, weights: Any
 ) -> float:
-    """How far the tip may go straight on, mm: until it is RISE_RADII radii deeper in the wall than it is now.
+    """How far the tip may go straight on, mm: until it is ``rise`` mm deeper in the wall than it is now.
 
-    Never less than a quarter of that (or of a voxel), so that a jammed tip still presses on.
+    Never less than a quarter of that, so that a jammed tip still presses on.
     """
-    rise = max(RISE_RADII * radius, 0.25 * spacing)
     end = np.empty(3)
     for a in range(3):
         end[a] = tip[a] + step * along[a]
