@@ -3,5 +3,6 @@
 from __future__ import annotations
 
 from pipeline.trace.follow import trace
+from pipeline.trace.in_region import trace_region
 
-__all__ = ["trace"]
+__all__ = ["trace", "trace_region"]

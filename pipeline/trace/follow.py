@@ -82,7 +82,7 @@ def _read_off(scene: Scene, attempt: Attempt | None, entry: Entry, config: Trace
     u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * h)
     points, _ = evaluate(attempt.tube.controls, u)
     sigma, tip = point_sigmas(attempt.tube, u)
-    length = float(arc_length(points)[-1])
+    length = float(arc_length(scene.world(points))[-1])
     bridged = _near_bridges(points, attempt, h)
     verdict = judge(scene, attempt, points, bridged, length)
     return [Candidate(attempt, points, sigma, tip, length, verdict)]

@@ -15,6 +15,9 @@ from pipeline.trace.background import modelled, smoothed
 from pipeline.trace.region import MAD, Region, region_of
 from solver.grid import Array
 
+BLUR_VOXELS = 0.8
+"""The scanner's blur over the smallest voxel, from which the shape of the blur in thick slices is taken."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -31,8 +34,14 @@ class Scene:
 
     @property
     def spacing(self) -> Array:
-        """Voxel size along the box's axes, mm."""
-        return np.asarray(self.region.box.spacing_mm)
+        """Voxel size along the box's axes in the coordinates of the kernels, mm.
+
+        Slices thicker than the pixels are drawn together until the wire's blur is as wide along every axis (scanner
+        0.8 of the smallest voxel, and the slice's own box): the kernels know one blur. Equal voxels are left alone.
+        """
+        size = np.asarray(self.region.box.spacing_mm)
+        blur = np.hypot(BLUR_VOXELS * size.min(), size / np.sqrt(12))
+        return np.asarray(size * blur.min() / blur)
 
     def local(self, points_mm: Any) -> Array:
         """LPS mm -> mm along the box's axes from its first voxel (the coordinates of the kernels)."""
@@ -44,7 +53,9 @@ class Scene:
 
     def turned(self, direction: Any) -> Array:
         """A direction in LPS -> kernel coordinates."""
-        return np.asarray(np.asarray(direction, float) @ self.region.box.direction)
+        along = np.asarray(direction, float) @ self.region.box.direction
+        along = along * self.spacing / self.region.box.spacing_mm
+        return np.asarray(along / np.linalg.norm(along))
 
 
 def build_scene(frame: Volume, lumen: Lumen, reference: Volume | None) -> Scene:
