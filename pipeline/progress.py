@@ -41,6 +41,13 @@ class CaseProgress:
             self.stream.write(line + "\n")
             self.stream.flush()
 
+    def say(self, text: str) -> None:
+        """A line for the reader and the log that belongs to no step."""
+        self.write(text)
+        if not self.quiet:
+            self.stream.write(f"[{self.case}] {text}\n")
+            self.stream.flush()
+
     def write(self, line: str) -> None:
         """A line for the log alone."""
         with self.log.open("a", encoding="utf-8") as handle:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
+import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import solver
 from pipeline import results
 from pipeline.cache import STAGE_VERSION, Store, file_hash
 from pipeline.case import CaseRun, Stage, run_stages
@@ -18,6 +21,7 @@ from pipeline.provenance import collect, package_version, peak_memory_mib
 from pipeline.settings import Resolved
 from pipeline.summary import case_row
 from reports.html import render_case
+from solver import warm_up
 
 PATHS = ("reference", "frames", "lumen", "traces", "parameters", "truth")
 
@@ -72,6 +76,21 @@ def finished(job: Job, key: str) -> dict[str, Any] | None:
     return result if result.get("key") == key and result.get("status") == "ok" else None
 
 
+@functools.cache
+def _kernels_loaded() -> float:
+    clock = perf_counter()
+    warm_up()
+    return perf_counter() - clock
+
+
+def load_kernels(progress: CaseProgress) -> None:
+    """Compile or load the solver's kernels before anything is timed; says so where it is the first run."""
+    cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
+    if not cached:
+        progress.say("compiling the solver, once per installation: about half a minute")
+    progress.write(f"kernels ready in {_kernels_loaded():.2f} s")
+
+
 def run_case(job: Job) -> str:
     """Run one case; returns its id. Whatever happens to it is in its folder, never an exception (but bugs)."""
     key = job_key(job)
@@ -80,6 +99,7 @@ def run_case(job: Job) -> str:
         progress("compare", 1, 1, "unchanged since the last run, kept")
         return job.case.id
     (job.folder / "result.json").unlink(missing_ok=True)
+    load_kernels(progress)
     clock = perf_counter()
     run = CaseRun(job.case, job.settings.config, Store(job.cache), progress, job.until)
     run_stages(run)
