@@ -15,7 +15,7 @@ from solver import _tolerances as tol
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.passage import free_way
-from solver._kernels.problem import Switch
+from solver._kernels.problem import ROLLS, Switch
 from solver.chain import base_frame, unit
 from solver.errors import refuse
 from solver.relax import Settings, anchor_friction, buffers_for, relax_buffers, solution_of
@@ -119,6 +119,9 @@ class Insertion:
         status, iterations, shrink = self._refusal(depth), 0, self._shrink
         budget = self._budget(depth - self.depth_mm, roll - self.roll_deg)
         while status is Status.CONVERGED:
+            if self._roll_is_idle and self.roll_deg != roll:
+                self.roll_deg = roll
+                self.buffers.counter[ROLLS] += 1
             ahead, turn = depth - self.depth_mm, roll - self.roll_deg
             if abs(ahead) < tol.MATCH_DEPTH_MM and turn == 0.0:
                 break
@@ -149,6 +152,12 @@ class Insertion:
             return Status.TOO_LONG
         return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
 
+    @property
+    def _roll_is_idle(self) -> bool:
+        """Rolling a straight wire with one bending stiffness and a round hull changes nothing."""
+        round_hull = self.wall is None or self.wall.samples == 0
+        return self.wire.straight and round_hull and self.settings.switch.roll
+
     def _entry_is_outside(self, wall: VesselWall) -> bool:
         """Whether the entry point lies more than a voxel outside the lumen."""
         diagonal = float(np.linalg.norm(wall.distance.spacing_mm))
@@ -157,7 +166,7 @@ class Insertion:
     def _allowed(self, ahead: float, turn: float) -> float:
         """Fraction of the way that one step may take: step_mm, roll_step_deg, and what the tip can see."""
         fraction = 1.0
-        if turn and not self.wire.straight:
+        if turn:
             fraction = min(fraction, self.roll_step_deg / abs(turn))
         if ahead:
             step = min(self.step_mm, abs(ahead))

@@ -22,9 +22,8 @@ from solver._kernels.problem import (
     IDLE,
     LEVENBERG,
     ROLLOUTS,
-    SAVED,
+    ROLLS,
     SWEEPS,
-    WINDOW,
     Switch,
 )
 from solver.chain import Buffers, base_frame, unit
@@ -175,8 +174,7 @@ def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, flo
         "rollouts": float(counter[ROLLOUTS]),
         "levenberg": float(counter[LEVENBERG]),
         "rest_shapes": float(counter[IDLE]),
-        "window_sweeps": float(counter[WINDOW]),
-        "joint_sweeps_saved": float(counter[SAVED]),
+        "rolls_proven_idle": float(counter[ROLLS]),
         "start_energy_N_mm": start_energy,
     }
 

@@ -8,8 +8,8 @@ from solver._kernels.layout import Chain
 from solver._kernels.spline import Field
 
 # places in the work counters
-FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, WINDOW, SAVED = range(9)
-COUNTERS = 9
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS = range(8)
+COUNTERS = 8
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 
@@ -40,12 +40,16 @@ class Scratch(NamedTuple):
 
 
 class Switch(NamedTuple):
-    """Skips, all on except in tests."""
+    """Skips, all on except in tests.
+
+    clearance : no look-up for a point that moved less than its clearance.     cheap : trilinear look-up first.
+    idle : the rest shape is the answer where it touches nothing.     roll : of a straight round wire is no step.
+    """
 
     clearance: bool = True
     cheap: bool = True
     idle: bool = True
-    window: bool = True
+    roll: bool = True
 
 
 class Friction(NamedTuple):
