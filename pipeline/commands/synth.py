@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 from time import perf_counter
+from typing import Any
 
 from pipeline.commands.common import complain, say
 from pipeline.suggest import did_you_mean
@@ -17,6 +18,36 @@ def _progress(done: int, total: int) -> None:
     sys.stderr.flush()
 
 
+def _problem(args: Namespace, names: tuple[str, ...]) -> str:
+    """What is wrong with the command line; empty where nothing is."""
+    sources = [s for s in (args.name, args.anatomy, args.background) if s is not None]
+    if len(sources) != 1:
+        return "give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"
+    if args.name is not None and args.name not in names:
+        return f"no scene {args.name!r}; {did_you_mean(args.name, names)}"
+    for path in (args.anatomy, args.background):
+        if path is not None and not path.exists():
+            return f"{path}: no such file"
+    return "" if args.out is not None else "-o DIR is missing: where shall the study be written?"
+
+
+def _study(args: Namespace) -> Any:
+    """The study in memory; its truth is computed here."""
+    from data_synthetic import catalogue
+    from data_synthetic.background import background_study
+    from data_synthetic.scenes.from_file import scene_from_file
+    from data_synthetic.study import make_study
+
+    wanted = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
+    given = {k: v for k, v in wanted.items() if v is not None}
+    if args.background is not None:
+        given.pop("size", None)  # a real scan has its own
+        return background_study(args.background, **given)
+    if args.anatomy is not None:
+        return make_study(scene_from_file(args.anatomy), **given)
+    return catalogue.build(args.name, scanner=args.scanner, **given)
+
+
 def main(args: Namespace) -> int:
     """Exit 0 when the study is written, 2 on wrong input."""
     from data_synthetic import catalogue
@@ -26,14 +57,19 @@ def main(args: Namespace) -> int:
         for name in catalogue.names():
             say(f"{name:24s} {catalogue.describe(name).why}")
         return 0
-    if args.name not in catalogue.names():
-        problem = f"no scene {args.name!r}; {did_you_mean(str(args.name), catalogue.names())}"
+    problem = _problem(args, tuple(catalogue.names()))
+    if problem:
         return complain([problem], "the command line")
-    if args.out is None:
-        return complain(["-o DIR is missing: where shall the study be written?"], "the command line")
     clock = perf_counter()
-    wanted = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
-    study = catalogue.build(args.name, **{k: v for k, v in wanted.items() if v is not None})
+    try:
+        study = _study(args)
+    except ValueError as error:
+        return complain([str(error)], "the command line")
+    quality = study.quality
+    say(
+        f"truth: largest force residual {quality['largest_residual_N']:.1e} N; halving its resolution moves it by "
+        f"{quality['halving_moves_mm']:.4f} mm"
+    )
     manifest = write_study(study, args.out, format=args.format, progress=_progress)
-    say(f"{args.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
+    say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
