@@ -12,7 +12,7 @@ from solver.grid import Grid
 
 
 def box_lumen(volume: Volume, low_mm: ArrayLike, high_mm: ArrayLike) -> Lumen:
-    """A lumen that is a box along the volume's axes, spanned by two opposite corners (LPS mm), clipped to the volume."""
+    """A lumen that is a box along the volume's axes between two opposite corners (LPS mm), clipped to the volume."""
     corners = volume.to_index(np.array([low_mm, high_mm], dtype=float))
     low = np.clip(np.floor(corners.min(axis=0)), 0, np.array(volume.shape) - 1).astype(int)
     high = np.clip(np.ceil(corners.max(axis=0)) + 1, low + 1, volume.shape).astype(int)

@@ -1,0 +1,1 @@
+"""Studies of segment and trace: each module prints one table; tests/bench/bench_imaging.py runs them all."""
