@@ -11,7 +11,7 @@ ENERGY_FLOOR_ANGLE = 1e-7
 MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
-"""A 2x2 block of the Hessian below this fraction of its joint's stiffness counts as indefinite."""
+"""A block of the Hessian within this fraction of its joint's stiffness around zero is neutral, below it indefinite."""
 SUFFICIENT = 1e-4
 """Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
 STEP_ANGLE = 0.7

@@ -200,16 +200,15 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
 
 
 @inlined
-def positive(q: Six, floor: float, twisting: bool) -> bool:
-    """Whether Q_uu is safely positive definite."""
-    mean, half = 0.5 * (q[0] + q[1]), 0.5 * (q[0] - q[1])
-    # written so that NaN, from an overflow in a long compressed chain, is not positive
-    if not mean - math.sqrt(half * half + q[3] * q[3]) > floor:
-        return False
-    if not twisting:
-        return True
-    det = q[0] * q[1] - q[3] * q[3]
-    return q[2] * det > q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]
+def least_curvature(q: Six, twisting: bool) -> float:
+    """Least eigenvalue of the bending block of Q_uu; -inf where the twist entry makes the whole indefinite."""
+    half = 0.5 * (q[0] - q[1])
+    least = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
+    if twisting and least > 0.0:
+        det = q[0] * q[1] - q[3] * q[3]
+        if not q[2] * det > q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]:
+            return -math.inf
+    return least
 
 
 @inlined
@@ -319,7 +318,7 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
 
     damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
     leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
-    Returns False and stops at the first block that is not positive definite.
+    Returns False and stops at the first block that is not positive (semi-)definite.
     report: [0] Newton decrement (predicted fall of the energy), [2] joint of that block or -1, [3:5] its
     direction of negative curvature, [5] that curvature.
     """
@@ -342,9 +341,14 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
         if not twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
         q_uu = joint_hessian(chain, j, u, jac, h, g, twisting, 0.01 * damping)
-        if not positive(q_uu, CURVATURE_FLOOR * bend[j], twisting):
+        floor, least = CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
+        # written so that NaN, from an overflow in a long compressed chain, fails too
+        if not least > -floor:
             note_direction(q_uu, j, report)
             return False
+        if least < floor:
+            # neutral, e.g. turning a buckled wire about its axis: no force there, so any stiffness will do
+            q_uu = (q_uu[0] + 2 * floor, q_uu[1] + 2 * floor, q_uu[2], q_uu[3], q_uu[4], q_uu[5])
         inverse = solve_block(q_uu, twisting)
         twist = chain.twist[j] * u[2] if twisting else 0.0
         q_u = add3(apply_transposed(jac, g), (bend[j] * u[0], bend[j] * u[1], twist))
