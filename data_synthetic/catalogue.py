@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
+from data_synthetic.background import background_study
 from data_synthetic.scene import Scene, Study
 from data_synthetic.scenes import SCENES
-from data_synthetic.study import make_study, psf_scanner
+from data_synthetic.scenes.from_file import scene_from_file
+from data_synthetic.study import ScannerFactory, make_study, psf_scanner
+
+SCANNERS: dict[str, ScannerFactory] = {"psf": psf_scanner}
+"""What turns a phantom into grey values."""
 
 _BY_NAME = {scene.name: scene for scene in SCENES}
 
@@ -22,8 +30,18 @@ def describe(name: str) -> Scene:
     return _BY_NAME[name]
 
 
+def from_anatomy(path: str | Path) -> Scene:
+    """A scene through the vessels of an .swc tree or a Slicer .mrk.json curve with radii; ``build`` takes it."""
+    return scene_from_file(path)
+
+
+def from_background(path: str | Path, **wanted: Any) -> Study:
+    """A study in the real voxels of a scan; ``wanted``: frames, voxel_mm, seed, truth_step_mm."""
+    return background_study(path, **wanted)
+
+
 def build(
-    name: str,
+    name: str | Scene,
     *,
     frames: int | None = None,
     size: int | None = None,
@@ -34,18 +52,19 @@ def build(
 ) -> Study:
     """A study in memory.
 
-    frames, size : default to the scene's own.     voxel_mm : defaults to the scene's field of view over ``size``.
+    name : of a scene, or a scene.     frames, size : default to the scene's own.
+    voxel_mm : defaults to the scene's field of view over ``size``.     scanner : one of SCANNERS.
     truth_step_mm : node spacing of the true wire; tests take 0.4.
     """
-    if scanner != "psf":
-        msg = f"synthetic scene {name}: scanner: got {scanner!r}; allowed: psf"
+    if scanner not in SCANNERS:
+        msg = f"synthetic scene {name}: scanner: got {scanner!r}; allowed: {', '.join(SCANNERS)}; choose one"
         raise ValueError(msg)
     return make_study(
-        describe(name),
+        describe(name) if isinstance(name, str) else name,
         frames=frames,
         size=size,
         voxel_mm=voxel_mm,
         seed=seed,
         truth_step_mm=truth_step_mm,
-        scanner=psf_scanner,
+        scanner=SCANNERS[scanner],
     )

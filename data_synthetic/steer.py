@@ -11,7 +11,7 @@ from data_synthetic.wire_truth import Insertion, TrueFrame, replay
 
 Array = NDArray[np.float64]
 
-ROLLS_DEG = (0.0, 90.0, 180.0, 270.0, 45.0, 135.0, 225.0, 315.0)
+ROLLS_DEG = (0.0, 90.0, 180.0, 270.0, 30.0, 120.0, 210.0, 300.0, 60.0, 150.0, 240.0, 330.0)
 COARSE_MM = 0.8
 """Node spacing of the trials."""
 
@@ -45,13 +45,13 @@ def steer(
 
 
 def _on_the_way(insertion: Insertion, frame: TrueFrame, way_mm: Array, corridor_mm: float) -> bool:
-    """Near the way, as far along it as the wire is long (bar a tenth for cut corners), not stuck, no wild snap."""
+    """Near the way, about as far along it as the wire is long (it may bulge, so 0.7), not stuck, no wild snap."""
     away = np.linalg.norm(way_mm - frame.points_mm[-1], axis=1)
     foot = int(np.argmin(away))
     along = float(np.linalg.norm(np.diff(way_mm[: foot + 1], axis=0), axis=1).sum())
     if (
         away[foot] > corridor_mm
-        or along < 0.9 * frame.depth_mm - corridor_mm
+        or along < 0.7 * frame.depth_mm - corridor_mm
         or frame.jump_mm > LARGEST_JUMP_MM
     ):
         return False

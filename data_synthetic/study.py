@@ -65,7 +65,7 @@ def make_study(
         reference=machine.at(np.zeros(3)).scan((), (seed, 2)),
         truth=tuple(_shifted(f, setup.motion_mm, i) for i, f in enumerate(truth)),
         expected=scene.expected_statuses(frames),
-        manifest=_manifest(scene.name, setup, grid, np.random.default_rng([seed, 4])),
+        manifest=describe_case(scene.name, setup, grid, np.random.default_rng([seed, 4])),
         quality=truth_quality(insertion, truth),
         setup=setup,
         make_frame=lambda i: machine.frame(i, truth[i]),
@@ -122,7 +122,7 @@ def _shifted(frame: TrueFrame, motion_mm: Array | None, number: int) -> TrueFram
     return frame if motion_mm is None else replace(frame, points_mm=frame.points_mm + motion_mm[number])
 
 
-def _manifest(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:
+def describe_case(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:
     """The case as its user would write it down: entry, direction and depths not quite right."""
     offset = rng.normal(size=3)
     offset *= ENTRY_ERROR_VOXELS * grid.voxel_mm / np.linalg.norm(offset)

@@ -17,7 +17,7 @@ from data_synthetic.tubes import Tube
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-BEFORE_MM, AFTER_MM = 45.0, 25.0
+BEFORE_MM, AFTER_MM = 75.0, 20.0
 """The way begins this far before the widest place (an aneurysm, where there is one) and ends this far after it."""
 
 
@@ -101,4 +101,5 @@ def _cut(path: Index, neck: int, inside: Array, grid: ScanGrid) -> Tube:
     last = int(np.searchsorted(arc, min(arc[neck] + AFTER_MM, arc[-1] - 2.0)))
     narrow = np.flatnonzero(radius[neck:last] < 0.6)
     last = neck + int(narrow[0]) if len(narrow) else last
-    return smooth_tube("way", points[first:last], radius[first:last])
+    # an aneurysm's own radius says nothing about the way past it
+    return smooth_tube("way", points[first:last], np.minimum(radius[first:last], 1.2), smoothing_mm=1.0)

@@ -12,6 +12,10 @@ from data_synthetic.tubes import Anatomy, ball, sweep
 
 CENTRE_MM = np.array([0.0, -2.0, -2.0])
 
+SIPHON_MM = np.array([-14.0, -8.0, -14.0])
+CLOSE_MM = 52.8
+"""A field of view about one carotid, for scenes that are run small."""
+
 ENTRY_ARC_MM = 17.0
 """Into the carotid, at the foot of the petrous bend: an entry tilted by 2 degrees has a short lever there."""
 
@@ -56,23 +60,30 @@ def _terminus(rng: np.random.Generator, frames: int) -> Setup:
 def _siphon(rng: np.random.Generator, frames: int) -> Setup:
     setup = willis_setup(rng, frames, WillisPlan(aneurysm="none"), ROLL_DEG, -4.0)
     alone = Anatomy((setup.anatomy.tube("right.ICA"),))
-    return replace(setup, anatomy=alone, centre_mm=np.array([-14.0, -8.0, -14.0]))
+    return replace(setup, anatomy=alone, centre_mm=SIPHON_MM)
 
 
 def _incomplete(rng: np.random.Generator, frames: int) -> Setup:
     plan = WillisPlan(aneurysm="sidewall", sac_mm=3.0, missing=("right.PCoA", "left.A1", "left.P1"))
-    return willis_setup(rng, frames, plan, ROLL_DEG, -6.0)
+    return replace(willis_setup(rng, frames, plan, ROLL_DEG, -6.0), centre_mm=SIPHON_MM)
 
 
 def _acoa(rng: np.random.Generator, frames: int) -> Setup:
-    return willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 12.0)
+    setup = willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 12.0)
+    return replace(setup, centre_mm=np.array([-12.0, -9.0, -9.0]))
 
 
 def _vertebral(rng: np.random.Generator, frames: int) -> Setup:
     anatomy = circle_of_willis(rng, WillisPlan(aneurysm="none", tortuous_vertebrals=True))
     entry, direction = enter(anatomy.tube("right.vertebral"), 14.0)
     return Setup(
-        anatomy, entry, direction, spread(8.0, 42.0, frames), (0.0,) * frames, CENTRE_MM, bone=skull_base()
+        anatomy,
+        entry,
+        direction,
+        spread(8.0, 36.0, frames),
+        (0.0,) * frames,
+        np.array([-2.0, 6.0, -18.0]),
+        bone=skull_base(),
     )
 
 
@@ -88,7 +99,7 @@ WILLIS = (
     Scene(
         "siphon",
         "the carotid siphon alone: the tightest turns of the way, nothing else to go wrong",
-        52.8,
+        CLOSE_MM,
         176,
         6,
         _siphon,
@@ -96,24 +107,24 @@ WILLIS = (
     Scene(
         "incomplete-circle",
         "a circle with missing vessels and a sidewall aneurysm in the siphon",
-        76.8,
-        192,
+        CLOSE_MM,
+        176,
         6,
         _incomplete,
     ),
     Scene(
         "acoa-aneurysm",
         "around the sharp turn into A1: stored energy is let go in a snap",
-        76.8,
-        192,
+        CLOSE_MM,
+        176,
         6,
         _acoa,
     ),
     Scene(
         "tortuous-vertebral",
         "up a winding vertebral artery into the basilar: another way in",
-        76.8,
-        192,
+        CLOSE_MM,
+        176,
         6,
         _vertebral,
     ),

@@ -54,13 +54,13 @@ def way_through(tree: Tree) -> Way:
     return Way(Anatomy((tube, *others)), tube.length_mm)
 
 
-def smooth_tube(name: str, points: Array, radii: Array) -> Tube:
+def smooth_tube(name: str, points: Array, radii: Array, smoothing_mm: float = SMOOTHING_MM) -> Tube:
     """Resample and smooth a jagged centreline, ends kept, as far as needed for a tube that does not fold."""
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     places = np.linspace(0.0, arc[-1], max(4, round(arc[-1] / STEP_MM) + 1))
     jagged = np.column_stack([np.interp(places, arc, points[:, a]) for a in range(3)])
     radius = np.maximum(gaussian_filter1d(np.interp(places, arc, radii), 3.0 / STEP_MM, mode="nearest"), 0.45)
-    for sigma in SMOOTHING_MM * 1.4 ** np.arange(6):
+    for sigma in smoothing_mm * 1.4 ** np.arange(6):
         curve = _smooth(jagged, sigma / STEP_MM)
         tube = sweep(name, curve, radius)
         bend = np.linalg.norm(np.gradient(tube.tangents, tube.step_mm, axis=0), axis=1)
