@@ -1,0 +1,83 @@
+"""Trivial predictors in lumens whose centreline, shortest way and straightest way are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline import nulls
+from pipeline.compare import point_to_curve, rms
+from pipeline.model import Curve, Lumen, arc_length
+from solver.grid import Grid
+
+VOXEL, RADIUS, BEND = 0.4, 2.0, 15.0
+
+
+def lumen_of(distance: np.ndarray, origin: np.ndarray) -> Lumen:
+    grid = Grid(distance.astype(np.float32), np.full(3, VOXEL), origin)
+    return Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+
+
+@pytest.fixture(scope="module")
+def quarter_torus() -> tuple[Lumen, np.ndarray]:
+    """A quarter of a torus in the x-z plane around the origin, tube radius 2 mm, and its axis."""
+    x, y, z = np.meshgrid(*[np.arange(-4, n, VOXEL) for n in (20.0, 4.0, 20.0)], indexing="ij")
+    distance = np.hypot(np.hypot(x, z) - BEND, y) - RADIUS
+    angle = np.linspace(0, np.pi / 2, 200)
+    axis = BEND * np.column_stack([np.cos(angle), 0 * angle, np.sin(angle)])
+    return lumen_of(distance, np.full(3, -4.0)), axis
+
+
+def built(lumen: Lumen, axis: np.ndarray) -> nulls.Nulls:
+    return nulls.build(lumen, axis[0], np.array([0.0, 0.0, 1.0]), axis, 0.2)
+
+
+def test_the_centreline_is_the_axis_to_half_a_voxel(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    lumen, axis = quarter_torus
+    path = built(lumen, axis).centreline
+    assert path is not None
+    assert rms(point_to_curve(path, axis)[0]) < 0.5 * VOXEL
+
+
+def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    lumen, axis = quarter_torus
+    path = built(lumen, axis).shortest
+    assert path is not None
+    middle = path[len(path) // 2]
+    assert np.hypot(middle[0], middle[2]) < BEND - 0.6 * RADIUS
+    assert arc_length(path)[-1] < arc_length(axis)[-1]
+
+
+def test_the_least_bent_curve_stays_inside_and_bends_less(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    lumen, axis = quarter_torus
+    depth = 0.9 * float(arc_length(axis)[-1])
+    path = built(lumen, axis).min_bending(depth)
+    assert path is not None
+    assert arc_length(path)[-1] == pytest.approx(depth, abs=1e-6)
+    assert np.hypot(np.hypot(path[:, 0], path[:, 2]) - BEND, path[:, 1]).max() < RADIUS - 0.2 + 0.1
+    assert bending(path) < bending(nulls.to_length(axis, depth, 1.0))
+
+
+def bending(path: np.ndarray) -> float:
+    chord = np.diff(path, axis=0)
+    unit = chord / np.linalg.norm(chord, axis=1)[:, None]
+    return float(np.sum(np.linalg.norm(np.diff(unit, axis=0), axis=1) ** 2))
+
+
+def test_two_vessels_that_do_not_meet_have_no_path() -> None:
+    x, y, _ = np.meshgrid(*[np.arange(-6, 6, VOXEL)] * 3, indexing="ij")
+    distance = np.minimum(np.hypot(x - 3, y), np.hypot(x + 3, y)) - 1.5
+    lumen = lumen_of(distance, np.full(3, -6.0))
+    ends = np.array([[-3.0, 0.0, -5.0], [3.0, 0.0, 5.0]])
+    found = nulls.build(lumen, ends[0], np.array([0.0, 0.0, 1.0]), ends, 0.2)
+    assert found.centreline is None
+    assert found.at_depth("centreline", 5.0) is None
+    assert found.min_bending(5.0) is None
+
+
+def test_the_previous_wire_is_pushed_on() -> None:
+    first = Curve(np.array([[0.0, 0, 0], [0.0, 0, 10.0]]), np.ones(2))
+    guess = nulls.previous([first, None], 1, 12.0)
+    assert guess is not None
+    np.testing.assert_allclose(guess[-1], [0, 0, 12.0])
+    assert nulls.previous([first], 0, 12.0) is None
