@@ -1,0 +1,94 @@
+"""The stage between manifest and solver: scales, rolls, conventions of section 4 of the manifest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config import SimulateConfig, SolverConfig
+from pipeline.entry import Entry
+from pipeline.manifest import Case, Wire, read_manifest
+from pipeline.model import Lumen, Simulated
+from pipeline.simulate import guide_wire, rolls, simulate
+from solver.grid import Grid
+
+MANIFEST = """
+schema = 1
+[wires.w]
+radius_mm = 0.18
+bending_stiffness_N_mm2 = [[0.0, 1.0], [10.0, 3.0]]
+rest_curvature_per_mm = [[0.0, 0.1], [8.0, 0.1], [8.0, 0.0]]
+[[case]]
+id = "tube"
+lumen = "none.stl"
+entry_mm = [0.0, 0.0, 0.0]
+entry_direction = [0.0, 0.0, 1.0]
+material_axis = [1.0, 0.0, 0.0]
+wire = "w"
+insertion_mm = [6.0, 12.0]
+"""
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Case:
+    path = tmp_path / "manifest.toml"
+    path.write_text(MANIFEST)
+    return read_manifest(path).cases[0]
+
+
+def wide_open() -> Lumen:
+    """Space without a wall nearby: the rest shape shows."""
+    grid = Grid(np.full((20, 20, 20), -30.0, np.float32), np.full(3, 2.0), np.full(3, -19.0))
+    return Lumen(grid, grid.with_values(np.ones((20, 20, 20), np.uint8)))
+
+
+def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Simulated]:
+    entry = Entry(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    config = SolverConfig(segment_mm=0.5)
+    return list(simulate(case, entry, wide_open(), depths, [roll] * len(depths), config))
+
+
+def test_positive_rest_curvature_bends_towards_the_material_axis(case: Case) -> None:
+    last = run(case, 0.0)[-1]
+    assert last.converged
+    assert last.joints_mm[-1, 0] > 1.0
+    assert abs(last.joints_mm[-1, 1]) < 1e-9
+
+
+def test_positive_roll_turns_right_handed_about_the_entry_direction(case: Case) -> None:
+    plain, turned = run(case, 0.0)[-1].joints_mm, run(case, 90.0)[-1].joints_mm
+    np.testing.assert_allclose(turned, plain @ np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1.0]]), atol=1e-6)
+
+
+def test_profiles_travel_with_the_tip(case: Case) -> None:
+    """The free tip has its rest shape at any depth: a circle of 10 mm radius over 8 mm."""
+    for wire in run(case, 0.0, (9.0, 12.0)):
+        tip = wire.joints_mm[-13:]
+        turn = np.diff(tip, axis=0) / 0.5
+        angle = np.arccos(np.clip(turn[0] @ turn[-1], -1, 1))
+        assert angle == pytest.approx(0.1 * 0.5 * 11, rel=1e-3)
+
+
+def test_depth_is_the_length_of_the_wire(case: Case) -> None:
+    for wire, depth in zip(run(case, 0.0, (6.3, 11.9)), (6.3, 11.9), strict=True):
+        assert np.linalg.norm(np.diff(wire.joints_mm, axis=0), axis=1).sum() == pytest.approx(depth, abs=1e-9)
+
+
+def test_scales_reach_the_wire(case: Case) -> None:
+    plain = guide_wire(case.wire, SolverConfig(), SimulateConfig())
+    stiff = guide_wire(case.wire, SolverConfig(), SimulateConfig(bending_scale=1.2))
+    np.testing.assert_allclose(
+        np.array(stiff.bending_stiffness_N_mm2)[:, 1], 1.2 * np.array(plain.bending_stiffness_N_mm2)[:, 1]
+    )
+    number: Wire = replace(case.wire, bending_stiffness_N_mm2=2.0)
+    assert (
+        guide_wire(number, SolverConfig(), SimulateConfig(bending_scale=0.5)).bending_stiffness_N_mm2 == 1.0
+    )
+
+
+def test_rolls_per_frame_and_their_offset(case: Case) -> None:
+    assert rolls(case, 2, SimulateConfig(roll_offset_deg=15.0)) == [15.0, 15.0]
+    assert rolls(replace(case, roll_deg=(10.0, 20.0)), 2, SimulateConfig(roll_offset_deg=-5.0)) == [5.0, 15.0]
