@@ -72,6 +72,13 @@ def _grown(array: NDArray[Any]) -> NDArray[Any]:
     return larger
 
 
+@njit(cache=True, inline="always")
+def _plain_level(volume: NDArray[Any], low: float, scale: float, i: int, j: int, k: int) -> int:
+    """Quantised grey of one voxel as it is."""
+    value = float(volume[i, j, k])
+    return min(int((value - low) * scale + 0.5) if value > low else 0, LEVELS - 1)
+
+
 @njit(cache=True)
 def flood(
     volume: NDArray[Any],
@@ -93,38 +100,45 @@ def flood(
     the voxels are returned in the order in which they were reached.
     """
     ni, nj, nk = volume.shape
-    order = np.empty(4096, np.int64)
-    stack = np.empty(4096, np.int64)
+    plain = taps.shape[0] == 1
+    cut = np.float32(threshold - 0.5)
+    order = np.empty(65536, np.int64)
+    stack = np.empty(65536, np.int64)
     count = 0
     top = 0
     for s in range(seeds.shape[0]):
         i, j, k = seeds[s, 0], seeds[s, 1], seeds[s, 2]
         if not reached[i, j, k]:
             reached[i, j, k] = 1
-            order[count] = stack[top] = (i * nj + j) * nk + k
+            order[count] = (i * nj + j) * nk + k
+            stack[top] = (i << 42) | (j << 21) | k
             count += 1
             top += 1
     while top:
         top -= 1
-        flat = stack[top]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
-        here = _level(volume, levels, taps, low, scale, i, j, k)
+        packed = stack[top]
+        i, j, k = packed >> 42, (packed >> 21) & 0x1FFFFF, packed & 0x1FFFFF
+        if plain:
+            here = _plain_level(volume, low, scale, i, j, k)
+        else:
+            here = _level(volume, levels, taps, low, scale, i, j, k)
+        if count + offsets.shape[0] >= order.shape[0]:
+            order = _grown(order)
+        if top + offsets.shape[0] >= stack.shape[0]:
+            stack = _grown(stack)
         for m in range(offsets.shape[0]):
             a, b, c = i + offsets[m, 0], j + offsets[m, 1], k + offsets[m, 2]
             if a < 0 or b < 0 or c < 0 or a >= ni or b >= nj or c >= nk or reached[a, b, c]:
                 continue
-            there = _level(volume, levels, taps, low, scale, a, b, c)
-            if int(homogeneity[abs(here - there)] * feature[here + there] + 0.5) < threshold:
+            if plain:
+                there = _plain_level(volume, low, scale, a, b, c)
+            else:
+                there = _level(volume, levels, taps, low, scale, a, b, c)
+            if homogeneity[abs(here - there)] * feature[here + there] < cut:
                 continue
             reached[a, b, c] = 1
-            if top + 1 >= stack.shape[0]:
-                stack = _grown(stack)
-            if count + 1 >= order.shape[0]:
-                order = _grown(order)
-            order[count] = stack[top] = (a * nj + b) * nk + c
+            order[count] = (a * nj + b) * nk + c
+            stack[top] = (a << 42) | (b << 21) | c
             count += 1
             top += 1
     return order[:count]

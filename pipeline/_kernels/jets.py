@@ -95,6 +95,19 @@ def values_at(grey: NDArray[Any], spacing: NDArray[Any], sigma: float, points: N
 
 
 @njit(cache=True)
+def jets_at(grey: NDArray[Any], spacing: NDArray[Any], sigma: float, points: NDArray[Any]) -> NDArray[Any]:
+    """Value and gradient (n, 4) of the blurred lattice at points (n, 3)."""
+    w = np.empty((3, 3, 64))
+    out = np.empty(10)
+    result = np.empty((points.shape[0], 4))
+    for n in range(points.shape[0]):
+        jet(grey, spacing, sigma, points[n], w, out)
+        for m in range(4):
+            result[n, m] = out[m]
+    return result
+
+
+@njit(cache=True)
 def ridge_frame(out: NDArray[Any], t: NDArray[Any]) -> tuple[float, float]:
     """Tangent (into ``t``, sign kept towards its old value) of a bright ridge from a jet, and the two curvatures
     across it, ascending: eigenvalues of the Hessian, the tangent belonging to the largest.

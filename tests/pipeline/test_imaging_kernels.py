@@ -1,0 +1,117 @@
+"""The kernels of segment and trace against finite differences and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from scipy.stats import ncx2
+
+from pipeline._kernels.jets import jet
+from pipeline._kernels.spline import hessian, value_gradient
+from pipeline._kernels.tube import active_voxels, normal_equations
+from pipeline.segment.blur import blur_of_wall, half_level_offset
+from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampling, tint_nodes
+from pipeline.trace.tube import evaluate as spline_points
+
+
+def test_spline_derivatives_are_those_of_its_value():
+    rng = np.random.default_rng(0)
+    lattice = rng.normal(size=(9, 9, 9))
+    p, h = np.array([4.3, 4.6, 4.2]), 1e-4
+    f, *g = value_gradient(lattice, *p)
+    second = hessian(lattice, *p)
+    for axis in range(3):
+        e = h * np.eye(3)[axis]
+        up, down = value_gradient(lattice, *(p + e)), value_gradient(lattice, *(p - e))
+        assert g[axis] == pytest.approx((up[0] - down[0]) / (2 * h), abs=1e-6)
+        assert second[axis] == pytest.approx((up[axis + 1] - down[axis + 1]) / (2 * h), abs=1e-6)
+    assert np.isfinite(f)
+
+
+def test_jets_at_nodes_are_gaussian_derivatives():
+    grey = np.random.default_rng(1).normal(size=(15, 16, 17)).astype(np.float32)
+    spacing, out, w = np.array([0.5, 0.5, 0.5]), np.empty(10), np.empty((3, 3, 64))
+    jet(grey, spacing, 0.6, np.array([7, 8, 8]) * 0.5, w, out)
+    orders = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    for n, order in enumerate(orders):
+        expected = ndimage.gaussian_filter(grey.astype(float), 1.2, order=order, truncate=2.9)[7, 8, 8]
+        assert out[n] == pytest.approx(expected / 0.5 ** sum(order), rel=0.02, abs=5e-3)
+
+
+def _equations(grey, spacing, controls, tint, sigma, per=6):
+    s = sampling(len(controls) - 3, per)
+    window = controls[s.first[:, None] + np.arange(4)]
+    curve = np.ascontiguousarray(np.einsum("nk,nkd->nd", s.value, window))
+    velocity = np.ascontiguousarray(np.einsum("nk,nkd->nd", s.slope, window))
+    slot = np.zeros(grey.shape, np.int32)
+    radius = 6 * sigma
+    voxels = active_voxels(grey.shape, spacing, curve, radius, slot)
+    columns = 3 * len(controls) + len(tint) + 2
+    normal, right, residual = np.zeros((columns, columns)), np.zeros(columns), np.zeros(len(voxels))
+    cost = normal_equations(
+        grey, spacing, slot, np.ones(len(voxels)), voxels, curve, velocity, s.first, s.value, s.slope, s.measure,
+        s.tint_first, s.tint_share, tint, sigma, 3.0, radius, len(controls), normal, right, residual,
+    )  # fmt: skip
+    return cost, right, normal
+
+
+def test_tube_gradient_is_that_of_its_cost():
+    """J^T r against central differences of half the sum of squares, in controls, amplitudes and blur."""
+    rng = np.random.default_rng(2)
+    grey = rng.normal(0, 5, (24, 24, 30)).astype(np.float32)
+    spacing = np.full(3, 0.3)
+    controls = np.stack([np.full(7, 3.5), 3.6 + 0.3 * np.sin(np.arange(7)), 0.5 + 1.2 * np.arange(7)], axis=1)
+    tint = np.array([50.0, 60.0])
+    _, right, normal = _equations(grey, spacing, controls, tint, 0.3)
+    np.testing.assert_allclose(normal, normal.T, atol=1e-6 * np.abs(normal).max())
+    h = 1e-5
+    for k, axis in ((0, 0), (3, 1), (5, 2), (6, 2)):
+        ends = []
+        for sign in (1, -1):
+            moved = controls.copy()
+            moved[k, axis] += sign * h
+            ends.append(_equations(grey, spacing, moved, tint, 0.3)[0])
+        assert right[3 * k + axis] == pytest.approx(-0.5 * (ends[0] - ends[1]) / (2 * h), rel=2e-3, abs=1.0)
+    ends = [_equations(grey, spacing, controls, tint + np.array([d, 0]), 0.3)[0] for d in (1e-3, -1e-3)]
+    assert right[21] == pytest.approx(-0.5 * (ends[0] - ends[1]) / 2e-3, rel=1e-3, abs=1e-2)
+
+
+def test_tube_fit_finds_a_noise_free_tube_again():
+    spacing = np.full(3, 0.3)
+    controls = np.stack(
+        [4 + np.cos(0.4 * np.arange(9)), 4 + np.sin(0.4 * np.arange(9)), -1 + 1.5 * np.arange(9)], axis=1
+    )
+    truth = Tube(controls, np.full(tint_nodes(6), 700.0), 0.27, 0.0)
+    shape = (30, 30, 40)
+    grey = np.zeros(shape, np.float32)
+    voxels, model = predicted(TubeData(grey, spacing, 1.0), truth)
+    grey.reshape(-1)[voxels] = model
+    start = Tube(controls + 0.2 * np.sin(np.arange(27)).reshape(9, 3), truth.tint * 0.8, 0.3, 0.0)
+    fit = fit_tube(TubeData(grey, spacing, 1.0), start, iterations=30, tolerance=1e-4)
+    u = np.linspace(0, 6, 60)
+    dense = spline_points(truth.controls, np.linspace(0, 6, 6000))[0]
+    found = spline_points(fit.controls, u)[0]
+    off = np.min(np.linalg.norm(found[:, None] - dense[None], axis=2), axis=1)
+    assert off[3:-3].max() < 0.01 * 0.3
+    assert off.max() < 0.05 * 0.3
+    assert fit.sigma == pytest.approx(0.27, rel=0.02)
+
+
+def test_half_level_offset_is_exact_for_cylinders_and_second_order_for_flat_walls():
+    sigma, radius = 0.35, 0.8
+    r = np.linspace(0.3, 0.8, 2001)
+    share = ncx2.cdf((radius / sigma) ** 2, 2, (r / sigma) ** 2)
+    half = float(np.interp(0.5, share[::-1], r[::-1]))
+    assert half + half_level_offset(np.array([1 / half]), sigma)[0] == pytest.approx(radius, abs=2e-3)
+    gentle = half_level_offset(np.array([0.05, -0.05]), sigma)
+    np.testing.assert_allclose(gentle, [0.5 * sigma**2 * 0.05, -0.5 * sigma**2 * 0.05], rtol=0.05)
+
+
+def test_blur_is_read_off_a_curved_wall():
+    sigma, radius, contrast = 0.3, 0.7, 900.0
+    r = np.linspace(0.2, 1.2, 4001)
+    grey = contrast * ncx2.cdf((radius / sigma) ** 2, 2, (r / sigma) ** 2)
+    half = float(np.interp(-0.5 * contrast, -grey, r))
+    steep = -float(np.interp(half, r, np.gradient(grey, r)))
+    assert blur_of_wall(np.array([steep]), np.array([1 / half]), contrast) == pytest.approx(sigma, rel=0.02)
