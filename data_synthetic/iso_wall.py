@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 BAND_MM = 1.5
 """Distances are exact up to here and cut beyond: a wire touches at less than its radius."""
 
-SMOOTHING_VOXELS = 0.6
+SMOOTHING_VOXELS = 0.4
 """sd before the threshold: takes the staircase of an 8-bit scan away."""
 
 NEAREST_TRIANGLES = 8

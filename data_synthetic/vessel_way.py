@@ -21,6 +21,10 @@ BEFORE_MM, AFTER_MM = 75.0, 20.0
 """The way begins this far before the widest place (an aneurysm, where there is one) and ends this far after it."""
 
 
+WIDE_ENOUGH = 0.8
+"""Share of the widest end's radius from which an end may be the inlet."""
+
+
 @dataclass(frozen=True, eq=False)
 class VesselWay:
     """The vessel's voxels (dilated by two), the way as a tube, and the index of its widest place."""
@@ -46,7 +50,9 @@ def find_way(values: NDArray[np.float32], grid: ScanGrid, threshold: float) -> V
     ends = _ends(vessel)
     widest = np.array(np.unravel_index(int(np.argmax(inside)), inside.shape))
     away = np.linalg.norm((ends - widest) * grid.spacing_mm, axis=1)
-    inlet = ends[int(np.argmax(_width_near(ends, inside) * (away > 2 * inside.max())))]
+    width = _width_near(ends, inside) * (away > 2 * inside.max())
+    # skeletons have spurs: of the widest ends the furthest is the inlet
+    inlet = ends[int(np.argmax(away * (width > WIDE_ENOUGH * width.max())))]
     cost = np.where(vessel, 1.0 / (0.05 + inside / inside.max()) ** 3, -1.0)
     search = MCP_Geometric(cost, sampling=tuple(grid.spacing_mm.tolist()))
     search.find_costs([tuple(inlet.tolist())])
@@ -87,7 +93,7 @@ def _past(
         wide = inside[tuple(beyond.T)] > 0.7
         usable = float(np.argmin(wide)) if not wide.all() else float(len(beyond))
         score = shared + min(usable * float(grid.spacing_mm.min()), AFTER_MM) * 4.0
-        if score > best[0] and usable > 5:
+        if score > best[0]:
             best = (score, np.array(path), shared)
     return best[1], best[2]
 

@@ -1,0 +1,150 @@
+"""Anatomies and backgrounds from files: small ones written here, real ones where the data is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import SimpleITK as sitk
+
+from data_synthetic import shapes
+from data_synthetic.background import background_study
+from data_synthetic.catalogue import build, from_anatomy
+from data_synthetic.iso_wall import iso_wall
+from data_synthetic.scan_grid import centred_grid
+from data_synthetic.scanner.coverage import lumen_coverage
+from data_synthetic.shapes.centrelines import read_tree
+from data_synthetic.shapes.from_tree import smooth_tube, way_through
+from data_synthetic.tubes import Anatomy, ball
+from data_synthetic.volume_files import to_image
+
+Z = np.linspace(0.0, 45.0, 25)
+TRUNK = np.column_stack([3 * np.sin(Z / 15), 0.02 * Z**2, Z])
+
+
+def write_swc(path: Path, jitter: float = 0.0) -> None:
+    """A trunk with one branch, its points jittered as tracings are; one edge too long to be real."""
+    rng = np.random.default_rng(0)
+    points = TRUNK + rng.normal(0, jitter, TRUNK.shape)
+    branch = TRUNK[12] + np.linspace(1.5, 15, 10)[:, None] * [1.0, 0.0, 0.3]
+    lines = ["# made here"]
+    lines += [f"{i + 1} 3 {p[0]} {p[1]} {p[2]} 1.6 {i or -1}" for i, p in enumerate(points)]
+    lines += [f"{i + 26} 3 {p[0]} {p[1]} {p[2]} 0.9 {13 if i == 0 else i + 25}" for i, p in enumerate(branch)]
+    lines.append("36 3 80 0 0 1.0 25")
+    path.write_text("\n".join(lines))
+
+
+def write_curve(path: Path, system: str = "LPS", radii: bool = True) -> None:
+    sign = [-1, -1, 1] if system == "RAS" else [1, 1, 1]
+    points = [{"position": (p * sign).tolist()} for p in TRUNK]
+    measured = [{"name": "Radius", "controlPointValues": [1.5] * len(TRUNK)}] if radii else []
+    markup = {"coordinateSystem": system, "controlPoints": points, "measurements": measured}
+    path.write_text(json.dumps({"markups": [markup]}))
+
+
+def test_swc_becomes_a_smooth_way_with_its_branch(tmp_path: Path) -> None:
+    write_swc(tmp_path / "tree.swc", jitter=0.15)
+    way = way_through(read_tree(tmp_path / "tree.swc"))
+    tube = way.anatomy.tubes[0]
+    away = [np.min(np.linalg.norm(TRUNK - p, axis=1)) for p in tube.points_mm[20:-20:10]]
+    assert np.median(away) < 1.0  # TRUNK's own points are 1.9 mm apart
+    assert len(way.anatomy.tubes) == 2
+    assert 55 < way.length_mm < 70  # the long edge was cut
+    assert way.anatomy.distance([TRUNK[12] + [8.0, 0.0, 2.4]])[0] < 0  # within the branch
+
+
+@pytest.mark.parametrize("system", ["LPS", "RAS"])
+def test_slicer_curves_are_read_in_lps(tmp_path: Path, system: str) -> None:
+    write_curve(tmp_path / "a.mrk.json", system)
+    tree = read_tree(tmp_path / "a.mrk.json")
+    np.testing.assert_allclose(tree.points_mm, TRUNK, atol=1e-9)
+
+
+def test_bad_anatomies_are_refused_by_name(tmp_path: Path) -> None:
+    write_curve(tmp_path / "a.mrk.json", radii=False)
+    with pytest.raises(ValueError, match="no Radius measurement"):
+        read_tree(tmp_path / "a.mrk.json")
+    with pytest.raises(ValueError, match=r"allowed: \.swc"):
+        read_tree(tmp_path / "a.stl")
+    (tmp_path / "b.swc").write_text("1 2 3\n")
+    with pytest.raises(ValueError, match="7"):
+        read_tree(tmp_path / "b.swc")
+
+
+def test_smoothing_keeps_ends_and_never_folds() -> None:
+    rng = np.random.default_rng(1)
+    points = np.cumsum(rng.normal([0, 0, 1.5], 1.0, (20, 3)), axis=0)
+    tube = smooth_tube("t", points, np.full(20, 1.2))
+    np.testing.assert_allclose(tube.points_mm[[0, -1]], points[[0, -1]], atol=1e-9)
+    bend = np.linalg.norm(np.gradient(tube.tangents, tube.step_mm, axis=0), axis=1)
+    assert np.max(bend * tube.radii_mm) < 1.0
+
+
+def test_scene_from_a_tree_builds(tmp_path: Path) -> None:
+    write_swc(tmp_path / "tree.swc")
+    study = build(from_anatomy(tmp_path / "tree.swc"), frames=2, size=40, truth_step_mm=0.8)
+    assert study.truth[-1].depth_mm > 20
+    assert study.quality["largest_residual_N"] < 1e-7
+
+
+def test_iso_wall_of_a_ball_is_its_distance() -> None:
+    grid = centred_grid([1.0, -2.0, 3.0], (40, 40, 40), 0.5)
+    share = lumen_coverage(Anatomy((ball("b", [1.1, -2.1, 3.05], 4.0),)), grid)
+    wall = iso_wall(share, grid, 0.5)
+    direction = np.random.default_rng(0).normal(size=(200, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    for radius in (3.5, 4.0, 4.6):
+        value, slope = wall.distance_and_gradient([1.1, -2.1, 3.05] + radius * direction)
+        np.testing.assert_allclose(
+            value, radius - 4.0, atol=0.06
+        )  # a tenth of a voxel: what a threshold is worth
+        assert np.median(np.sum(slope * direction, axis=1)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_iso_wall_gradient_is_its_derivative() -> None:
+    grid = centred_grid([0.0, 0, 0], (30, 30, 30), 0.5)
+    wall = iso_wall(lumen_coverage(Anatomy((ball("b", [0, 0, 0], 3.0),)), grid), grid, 0.5)
+    points = np.random.default_rng(3).uniform(-3, 3, (300, 3))
+    slope = wall.distance_and_gradient(points)[1]
+    for a in range(3):
+        step = 1e-5 * np.eye(3)[a]
+        change = (
+            wall.distance_and_gradient(points + step)[0] - wall.distance_and_gradient(points - step)[0]
+        ) / 2e-5
+        np.testing.assert_allclose(slope[:, a], change, atol=1e-6)
+
+
+def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
+    grid = centred_grid([0, 0, 10], (72, 48, 96), 0.5)
+    scan = 200 * lumen_coverage(shapes.bend(angle_deg=50.0, turn_mm=25.0, radius_mm=1.8), grid)
+    sitk.WriteImage(to_image(scan.astype(np.uint8), grid), str(tmp_path / "scan.mha"))
+    study = background_study(tmp_path / "scan.mha", frames=2, truth_step_mm=0.8)
+    assert study.truth[-1].depth_mm > 20
+    added = study.frame(1).astype(float) - study.reference
+    index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
+    assert np.mean(added[tuple(index.T)]) > 5 * added[:5].std()
+    assert np.all(
+        study.reference[tuple(index.T)] > 250
+    )  # vessel is at 1000, its wall at 500, less where pressed
+
+
+@pytest.mark.slow
+def test_wire_in_the_real_aneurysm_scan(real_data: Path, tmp_path: Path) -> None:
+    import gzip
+
+    raw = gzip.decompress((real_data / "aneurism_3dra" / "aneurism.raw.gz").read_bytes())
+    values = np.frombuffer(raw, np.uint8).reshape(256, 256, 256)
+    sitk.WriteImage(sitk.GetImageFromArray(values), str(tmp_path / "aneurism.mha"))
+    study = background_study(tmp_path / "aneurism.mha", voxel_mm=0.5, truth_step_mm=0.4)
+    assert len(study.truth) == 12
+    assert study.truth[-1].depth_mm > 60
+
+
+@pytest.mark.parametrize("name", ["BG001", "BG0002", "BG05", "BG10", "BG0019"])
+def test_real_trees_give_a_way(real_data: Path, name: str) -> None:
+    way = way_through(read_tree(real_data / "brava_swc" / f"{name}.swc"))
+    assert way.length_mm > 35
+    inner = way.anatomy.tubes[0].points_mm[8:-8]
+    assert np.all(way.anatomy.distance(inner) < -0.4)
