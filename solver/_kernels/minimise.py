@@ -160,11 +160,13 @@ def minimise(
         counter[SWEEPS] += 1
         noise = ROUND_OFF * (scale_of(problem, which, k) + abs(state.parts[which, LOAD]))
         if damping == 0.0 and definite and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
-            small = report[0] <= noise
+            before = energy
             which, energy = finish(problem, which, k, energy, report)
-            if small or at_rest(problem, which, k, report):
+            if report[0] <= noise or at_rest(problem, which, k, report):
                 return CONVERGED, iteration, which, energy
-            continue
+            if energy < before:
+                continue
+            # the full step does not help, as where a contact opens and closes again: search as usual
         trial = math.inf
         if definite:
             trial = search(problem, which, k, energy, report[0], noise)

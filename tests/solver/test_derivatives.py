@@ -1,0 +1,198 @@
+"""Derivatives: of the interpolated distance, of the energy, and the Newton step as a whole."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from solver import Grid, GuideWire, Status, VesselWall
+from solver._kernels.closed_form import gradients
+from solver._kernels.energy import total_energy
+from solver._kernels.follow import aim
+from solver._kernels.newton import costate, place, sweep
+from solver._kernels.rotation import jacobian_terms, sine_terms
+from solver.chain import Buffers, base_frame
+from solver.relax import Settings, buffers_for, relax_buffers, set_loads
+from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
+
+Array = NDArray[np.float64]
+
+
+def buffers(wire: GuideWire, wall: VesselWall | None, depth: float, quadrature: str = "tip") -> Buffers:
+    b = buffers_for(wire, wall, Settings(quadrature=quadrature))
+    b.lay_out(depth)
+    b.state.r[:, 0] = base_frame(np.array([0.0, 0.0, 1.0]), None, 30.0)
+    return b
+
+
+def energy_of(b: Buffers, controls: Array) -> float:
+    b.state.u[0, : b.k] = controls
+    place(b.chain, b.state, 0, b.k)
+    return float(total_energy(b.problem, 0, b.k))
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("q", [1e-12, 1e-3, 0.2, 0.2499999, 0.25, 0.3, 4.0])
+def test_rotation_series_meets_its_closed_form(q: float) -> None:
+    exact = Fraction(q)
+
+    def series(shift: int, factor: Callable[[int], int] = lambda n: 1) -> float:
+        terms = ((-exact) ** n * factor(n) / math.factorial(2 * n + shift) for n in range(25))
+        return float(sum(terms, Fraction(0)))
+
+    s, a = sine_terms(q)
+    b, da, db = jacobian_terms(q, s, a)
+    np.testing.assert_allclose((s, a, b), (series(1), series(2), series(3)), atol=2e-15)
+    # derivatives with respect to the angle, over the angle
+    slopes = (-series(4, lambda n: 2 * n + 2), -series(5, lambda n: 2 * n + 2))
+    np.testing.assert_allclose((da, db), slopes, atol=1e-13)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_wall_takes_the_values_at_the_nodes_and_differentiates_its_own_interpolant(dtype: str) -> None:
+    rng = np.random.default_rng(0)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    grid = Grid(rng.normal(size=(9, 8, 7)).astype(dtype), np.array([0.3, 0.5, 0.4]), rng.normal(size=3), turn)
+    wall = VesselWall(grid, 1.0)
+    nodes = np.argwhere(np.ones(grid.shape, bool))
+    np.testing.assert_allclose(wall.look_up(grid.to_mm(nodes))[0], grid.values[tuple(nodes.T)], atol=3e-6)
+    # beyond the faces as well: the continuation is linear along each axis
+    points = grid.to_mm(rng.uniform(-1.5, 9.0, size=(200, 3)))
+    _, gradient, hessian = wall.look_up(points)
+    step = 1e-5
+    for a in range(3):
+        d = np.zeros(3)
+        d[a] = step
+        up, down = wall.look_up(points + d), wall.look_up(points - d)
+        np.testing.assert_allclose(gradient[:, a], (up[0] - down[0]) / (2 * step), atol=1e-6)
+        np.testing.assert_allclose(hessian[:, :, a], (up[1] - down[1]) / (2 * step), atol=2e-5)
+
+
+def test_wall_bounds_hold_where_the_lumen_is() -> None:
+    wall = VesselWall(sampled(bend_distance, 0.5, (-5, -5, 0), (10, 5, 45)), 1.0)
+    rng = np.random.default_rng(1)
+    points = rng.uniform((-4, -4, 1), (9, 4, 44), size=(4000, 3))
+    value, gradient, _ = wall.look_up(points)
+    inside = value < 0
+    assert inside.sum() > 400
+    assert np.linalg.norm(gradient[inside], axis=1).max() <= wall.field.slope + 1e-12
+    # trilinear interpolation of the coefficients, spelled out
+    index = wall.distance.to_index(points) + 1
+    cell = np.floor(index).astype(int)
+    t = index - cell
+    linear = np.zeros(len(points))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.prod(np.where(corner, t, 1 - t), axis=1)
+        linear += weight * wall.field.coefficients[tuple((cell + corner).T)]
+    assert np.abs(linear - value)[inside].max() <= wall.field.gap + 1e-12
+
+
+WIRES = {
+    "straight": GuideWire(2.0, 0.18, 10.0),
+    "curved tip": GuideWire(2.0, 0.18, [[0, 1.0], [40, 10.0]], [[0, 0.1], [20, 0.1], [20, 0.0]]),
+    "twisting": GuideWire(2.0, 0.18, 10.0, 0.05, torsional_stiffness_N_mm2=8.0),
+}
+
+
+@pytest.mark.parametrize("hull", ["offset", "samples:3"])
+@pytest.mark.parametrize("quadrature", ["tip", "joints", "segments"])
+@pytest.mark.parametrize("name", WIRES)
+def test_gradient_at_the_base_is_the_derivative_of_the_energy(name: str, quadrature: str, hull: str) -> None:
+    b = buffers(WIRES[name], VesselWall(bend_grid(0.5), 0.05, hull=hull), 40.0, quadrature)
+    components = 3 if b.problem.twisting else 2
+    rng = np.random.default_rng(0)
+    controls = np.zeros((b.k, 3))
+    controls[:, :components] = 0.05 * rng.normal(size=(b.k, components))
+    energy_of(b, controls)
+    costate(b.problem, 0, b.k, b.report)
+    force, moment, step = b.report[6:9].copy(), b.report[9:12].copy(), 1e-6
+    frame = b.state.r[0, 0].copy()
+    for a in range(3):
+        ends = []
+        for side in (step, -step):
+            b.state.x[0, 0, a] += side
+            ends.append(energy_of(b, controls))
+            b.state.x[0, 0, a] -= side
+        assert force[a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6)
+        ends = []
+        for side in (step, -step):
+            axis = np.zeros(3)
+            axis[a] = side
+            skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+            b.state.r[0, 0] = frame @ (np.eye(3) + skew + skew @ skew / 2)
+            ends.append(energy_of(b, controls))
+        b.state.r[0, 0] = frame
+        assert moment[a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_newton_decrement_is_that_of_the_dense_hessian(name: str) -> None:
+    """Near a minimum the recursion must predict what a dense Hessian, by differences, predicts."""
+    b = buffers(WIRES[name], VesselWall(tube_grid(0.5), 0.05), 24.0)
+    components = 3 if b.problem.twisting else 2
+    set_loads(b, [2e-3, 1e-3, -2e-3])
+    n = components * b.k
+    rng = np.random.default_rng(0)
+
+    def padded(v: Array) -> Array:
+        return np.column_stack([v.reshape(b.k, components), np.zeros((b.k, 3 - components))])
+
+    energy_of(b, np.zeros((b.k, 3)))
+    status, _, _ = relax_buffers(b, Settings())
+    assert status is Status.CONVERGED
+    v = b.state.u[0, : b.k, :components].ravel() + 1e-5 * rng.normal(size=n)
+    gradient, hessian = dense(lambda w: energy_of(b, padded(w)), v)
+    energy_of(b, padded(v))
+    assert sweep(b.problem, 0, b.k, 0.0, b.report)
+    assert b.report[0] == pytest.approx(0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3)
+
+
+def dense(function: object, v: Array, step: float = 1e-4) -> tuple[Array, Array]:
+    """Gradient and Hessian by central differences."""
+    f, n = function, len(v)
+    e = step * np.eye(n)
+    up = np.array([f(v + d) for d in e])  # type: ignore[operator]
+    down = np.array([f(v - d) for d in e])  # type: ignore[operator]
+    here = f(v)  # type: ignore[operator]
+    hessian = np.diag((up - 2 * here + down) / step**2)
+    for i in range(n):
+        for j in range(i):
+            cross = f(v + e[i] + e[j]) - up[i] - up[j] + 2 * here - down[i] - down[j] + f(v - e[i] - e[j])  # type: ignore[operator]
+            hessian[i, j] = hessian[j, i] = cross / (2 * step**2)
+    return (up - down) / (2 * step), hessian
+
+
+@pytest.mark.parametrize("hull", ["offset", "samples:5"])
+def test_closed_form_turns_against_the_exact_gradient(hull: str) -> None:
+    """The numerator of eq. 10, corrected: turning one segment alone, roll handed on to every bend behind it."""
+    b = buffers(WIRES["curved tip"], VesselWall(bend_grid(0.5), 1.0, hull=hull), 50.0)
+    rng = np.random.default_rng(0)
+    controls = np.zeros((b.k, 3))
+    controls[:, :2] = 0.05 * rng.normal(size=(b.k, 2))
+    energy_of(b, controls)
+    gradients(b.problem, 0, b.k)
+    slope = -b.problem.scratch.gain[: b.k, :2, 0]
+    step = 1e-6
+    for i in range(b.k):
+        for a in range(2):
+            ends = [turned(b, i, a, side) for side in (step, -step)]
+            assert slope[i, a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
+
+
+def turned(b: Buffers, segment: int, axis: int, angle: float) -> float:
+    """Energy with one segment turned about its own axis 1 or 2, the others keeping their directions."""
+    s = b.state
+    s.x[1, 0], s.r[1, 0] = s.x[0, 0], s.r[0, 0]
+    for j in range(b.k):
+        along = s.r[0, j + 1, :, 2].copy()
+        if j == segment:
+            along += angle * (s.r[0, j + 1, :, 0] if axis == 1 else -s.r[0, j + 1, :, 1])
+        s.x[1, j + 1] = s.x[1, j] + b.chain.length[j] * along
+        s.u[1, j, 2] = 0.0
+        aim(b.chain, s.u[1], s.x[1], s.r[1], j)
+    return float(total_energy(b.problem, 1, b.k))
