@@ -52,7 +52,6 @@ CLOSED_FORM_SMALLEST = 1e-12
 """Smallest share of the closed form's own step that is tried before the sweep counts as stalled."""
 SWEEPS_PER_ITERATION = 500
 """Sweeps of the closed form that max_iterations allows for each of its iterations: it needs O(k²) of them."""
-RISE_RADII = 2.0
-"""How much deeper, in wire radii, one step may push a tip that goes straight on: 20 degrees at 1 mm."""
-BUDGET_STEPS = 20
-"""Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
+RISE_RADII = 0.5
+"""How deep, in wire radii, one step may push the axis of a tip that goes straight on into the wall: a tip that
+only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""

@@ -63,7 +63,7 @@ def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
 def free_way(
     field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float, weights: Any
 ) -> float:
-    """How far the tip may go straight on, mm: until it is ``rise`` mm deeper in the wall than it is now.
+    """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall, from where it is now or from the surface.
 
     Never less than a quarter of that, so that a jammed tip still presses on.
     """
@@ -71,7 +71,7 @@ def free_way(
     for a in range(3):
         end[a] = tip[a] + step * along[a]
     before = distance_at(field, tip, 0.0, end, weights)
-    limit = max(0.0, before + rise)
+    limit = max(0.0, before) + rise
     steps = 1 + math.ceil(2 * step / spacing)
     free = 1.0
     for i in range(1, steps + 1):

@@ -1,0 +1,131 @@
+"""What cannot work is a five-part ValueError at the door or a status with a sentence, never a crash or NaN."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import Grid, GuideWire, Insertion, Status, VesselWall, relax
+from tests.solver.scenes import sampled, tube_distance, tube_grid
+
+WIRE = GuideWire(1.0, 0.18, 10.0)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_grid_must_be_finite(bad: float) -> None:
+    values = np.zeros((4, 5, 6))
+    values[1, 2, 3] = bad
+    with pytest.raises(
+        ValueError, match=r"wall: grid values: got .*\[1, 2, 3\].*; allowed: .*; fill or crop"
+    ):
+        VesselWall(Grid(values), 1.0)
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ({"segment_mm": 0.0}, "segment_mm"),
+        ({"segment_mm": np.nan}, "segment_mm"),
+        ({"radius_mm": -1.0}, "radius_mm"),
+        ({"bending_stiffness_N_mm2": 0.0}, "bending_stiffness_N_mm2"),
+        ({"bending_stiffness_N_mm2": [[5, 1.0], [0, 2.0]]}, "bending_stiffness_N_mm2"),
+        ({"bending_stiffness_N_mm2": [1.0, 2.0]}, "bending_stiffness_N_mm2"),
+        ({"rest_curvature_per_mm": 3.0}, "rest_curvature_per_mm"),
+        ({"rest_curvature_per_mm": np.nan}, "rest_curvature_per_mm"),
+        ({"torsional_stiffness_N_mm2": 0.0}, "torsional_stiffness_N_mm2"),
+    ],
+)
+def test_wire_refuses_in_five_parts(arguments: dict[str, object], word: str) -> None:
+    good: dict[str, object] = {"segment_mm": 1.0, "radius_mm": 0.18, "bending_stiffness_N_mm2": 10.0}
+    with pytest.raises(ValueError, match=rf"wire: {word}: got .*; allowed: .*; \w+"):
+        GuideWire(**(good | arguments))  # type: ignore[arg-type]
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    "arguments", [{"stiffness_N_mm2": -1.0}, {"friction": -0.1}, {"hull": "samples:0"}, {"hull": "x"}]
+)
+def test_wall_refuses_in_five_parts(arguments: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=r"wall: \w+: got .*; allowed: .*; \w+"):
+        VesselWall(Grid(np.zeros((4, 4, 4))), **({"stiffness_N_mm2": 1.0} | arguments))  # type: ignore[arg-type]
+
+
+@pytest.mark.nojit
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"entry_mm": [0, 0]},
+        {"entry_mm": [0, np.nan, 0]},
+        {"entry_direction": [0, 0, 0]},
+        {"material_axis": [0, 0, 2]},
+        {"method": "magic"},
+        {"initial": "jump"},
+        {"quadrature": "none"},
+        {"step_mm": 0.0},
+        {"tolerance": 0.0},
+        {"max_iterations": 0},
+    ],
+)
+def test_insertion_refuses_in_five_parts(arguments: dict[str, object]) -> None:
+    good: dict[str, object] = {"entry_mm": [0, 0, 0], "entry_direction": [0, 0, 1]}
+    with pytest.raises(ValueError, match=r"(insertion|solver): \w+: got .*; allowed: .*; \w+"):
+        Insertion(WIRE, None, **(good | arguments))  # type: ignore[arg-type]
+
+
+def test_closed_form_refuses_what_it_cannot_do() -> None:
+    wire = GuideWire(1.0, 0.18, 10.0, torsional_stiffness_N_mm2=5.0)
+    with pytest.raises(ValueError, match="use method newton"):
+        relax(wire, depth_mm=5.0, method="closed_form")
+
+
+def test_depths_must_be_depths() -> None:
+    insertion = Insertion(WIRE, None, [0, 0, 0], [0, 0, 1])
+    with pytest.raises(ValueError, match="to_depths"):
+        list(insertion.to_depths([1.0, -1.0]))
+
+
+def test_entry_outside_the_lumen_is_a_status() -> None:
+    solution = next(Insertion(WIRE, VesselWall(tube_grid(), 1.0), [3.5, 0, 5], [0, 0, 1]).to_depths([10.0]))
+    assert solution.status is Status.ENTRY_OUTSIDE
+    assert solution.depth_mm == 0.0
+
+
+def test_leaving_the_grid_is_a_status_and_keeps_the_last_good_state() -> None:
+    wall = VesselWall(sampled(tube_distance, 0.5, (-4, -4, -4), (4, 4, 20)), 1.0)
+    solution = next(Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1]).to_depths([60.0]))
+    assert solution.status is Status.LEFT_GRID
+    assert 18.0 < solution.depth_mm < 21.0
+    assert solution.joints_mm[-1, 2] == pytest.approx(solution.depth_mm)
+
+
+def test_absurd_depth_is_a_status_at_once() -> None:
+    solution = next(Insertion(WIRE, VesselWall(tube_grid(), 1.0), [0, 0, 0], [0, 0, 1]).to_depths([1e9]))
+    assert solution.status is Status.TOO_LONG
+
+
+@pytest.mark.parametrize("lumen", [0.05, 0.1])
+def test_lumen_narrower_than_the_wire_and_than_a_voxel(lumen: float) -> None:
+    grid = sampled(lambda p: tube_distance(p, lumen), 0.3, (-3, -3, -3), (3, 3, 30))
+    solution = next(Insertion(WIRE, VesselWall(grid, 10.0), [0, 0, 0], [0.05, 0, 1]).to_depths([20.0]))
+    assert np.isfinite(solution.joints_mm).all()
+    assert solution.converged
+    assert solution.max_penetration_mm > 0.0
+
+
+@pytest.mark.parametrize("degrees", [20.0, 60.0])
+def test_misaligned_entry_ends_in_a_state_or_a_sentence(degrees: float) -> None:
+    tilt = np.deg2rad(degrees)
+    wire = GuideWire(1.0, 0.18, [[0, 0.5], [30, 20.0]])
+    insertion = Insertion(wire, VesselWall(tube_grid(), 10.0), [0.25, 0, 2], [np.sin(tilt), 0, np.cos(tilt)])
+    for solution in insertion.to_depths(np.arange(2.0, 31.0, 2.0)):
+        assert np.isfinite(solution.joints_mm).all()
+        assert np.isfinite(solution.energy_N_mm)
+        assert solution.sentence
+
+
+def test_iteration_limit_is_a_status() -> None:
+    solution = relax(WIRE, depth_mm=100.0, load_N=[0.05, 0, 0], max_iterations=1)
+    assert solution.status is Status.MAX_ITERATIONS
+    assert "max_iterations" in solution.sentence
