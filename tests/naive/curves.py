@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 
@@ -18,7 +20,7 @@ def point_to_curve(points, curve):
     result = []
     for point in points:
         best, arc = (np.inf, 0.0), 0.0
-        for start, end in zip(curve[:-1], curve[1:], strict=True):
+        for start, end in pairwise(curve):
             distance, fraction = point_to_segment(point, start, end)
             length = float(np.linalg.norm(end - start))
             best = min(best, (distance, arc + fraction * length))

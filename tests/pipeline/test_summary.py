@@ -1,4 +1,4 @@
-"""Pooling and intervals: points are pooled, merging a run with itself changes nothing, blocks keep neighbours together."""
+"""Pooling and intervals: points are pooled, merging changes nothing, blocks keep neighbours together."""
 
 from __future__ import annotations
 
