@@ -55,3 +55,5 @@ SWEEPS_PER_ITERATION = 500
 RISE_RADII = 0.5
 """How deep, in wire radii, one step may push the axis of a tip that goes straight on into the wall: a tip that
 only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
+BUDGET_STEPS = 20
+"""Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
