@@ -118,10 +118,11 @@ def flood(
         top -= 1
         packed = stack[top]
         i, j, k = packed >> 42, (packed >> 21) & 0x1FFFFF, packed & 0x1FFFFF
-        if plain:
-            here = _plain_level(volume, low, scale, i, j, k)
-        else:
-            here = _level(volume, levels, taps, low, scale, i, j, k)
+        here = (
+            _plain_level(volume, low, scale, i, j, k)
+            if plain
+            else _level(volume, levels, taps, low, scale, i, j, k)
+        )
         if count + offsets.shape[0] >= order.shape[0]:
             order = _grown(order)
         if top + offsets.shape[0] >= stack.shape[0]:

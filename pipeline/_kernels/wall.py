@@ -233,9 +233,12 @@ def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], b
     along = ax * n[0] + ay * n[1] + az * n[2]
     square = ax * ax + ay * ay + az * az
     lift = 1.0 + bend * along
-    if bend == 0.0 or lift <= 0.2:
-        return float(np.sqrt(square) if along > 0 else -np.sqrt(square))
-    return float(along + 0.5 * bend * max(0.0, square - along * along) / lift)
+    far = np.sqrt(square)
+    if bend == 0.0 or lift <= 0.3:
+        return float(far if along > 0 else -far)
+    # no point is further from the surface than from its foot, however bent the surface is there
+    near = along + 0.5 * bend * max(0.0, square - along * along) / lift
+    return float(min(max(near, -far), far))
 
 
 @njit(cache=True, inline="always")
@@ -303,6 +306,38 @@ def propagate(
         front, following = following, front
         count = fresh
     return visits
+
+
+@njit(cache=True)
+def lost_feet(
+    owner: NDArray[Any], spacing: NDArray[Any], voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]
+) -> NDArray[Any]:
+    """Voxels beside the surface whose foot was not found and whose neighbours' are two voxels off and more.
+
+    A branch as thin as that has its peak at the level of the wall: the wall is put through the voxel itself.
+    Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
+    """
+    _, nj, nk = owner.shape
+    limit = (2.0 * max(spacing[0], spacing[1], spacing[2])) ** 2
+    lost = np.empty(voxels.shape[0], np.int64)
+    count = 0
+    for n in range(voxels.shape[0]):
+        if good[n]:
+            continue
+        flat = voxels[n]
+        k = flat % nk
+        rest = flat // nk
+        j = rest % nj
+        i = rest // nj
+        x, y, z = i * spacing[0], j * spacing[1], k * spacing[2]
+        m = owner[i, j, k] - 1
+        if m >= 0 and _square(x, y, z, foot[m]) < limit:
+            continue
+        foot[n, 0], foot[n, 1], foot[n, 2] = x, y, z
+        owner[i, j, k] = n + 1
+        lost[count] = n
+        count += 1
+    return lost[:count]
 
 
 @njit(cache=True)

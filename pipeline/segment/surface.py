@@ -13,6 +13,7 @@ from pipeline._kernels.wall import (
     dilate,
     distances,
     feet,
+    lost_feet,
     mean_around,
     propagate,
     smooth_lattice,
@@ -122,6 +123,10 @@ def signed_distance(
     wall, bend = corrected(wall, owner, blur, spacing)
     inside.reshape(-1)[voxels[good]] = wall.distance[good] < 0
     visits = propagate(owner, inside, spacing, voxels, wall.foot, outer_mm)
+    stray = lost_feet(owner, spacing, voxels, wall.foot, good)
+    if len(stray):
+        bend[stray] = 0.0
+        visits += propagate(owner, inside, spacing, voxels[stray], wall.foot, outer_mm)
     distance = owner.view(np.float32)
     distances(owner, inside, spacing, wall.foot, wall.normal, bend, outer_mm, distance)
     keep = tuple(slice(PAD, n - PAD) for n in box.shape)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pipeline._kernels.jets import values_at
 from pipeline._kernels.tube import active_voxels
@@ -112,10 +113,11 @@ def dense(tube: Tube, step: float) -> Array:
 def unexplained_mm(pieces: list[Tracklet], curve: Array, near: float) -> float:
     """Length of the crests that run further than ``near`` mm from the curve (n, 3); pieces under 1.5 ``near`` are
     noise."""
+    tree = cKDTree(curve)
     total = 0.0
     for piece in pieces:
-        square = np.min(np.sum((piece.points[:, None] - curve[None]) ** 2, axis=2), axis=1)
-        off = float(np.mean(square > near**2)) * piece.length
+        far = tree.query(piece.points[::2], distance_upper_bound=near)[0]
+        off = float(np.mean(~np.isfinite(far))) * piece.length
         total += off if off > 1.5 * near else 0.0
     return total
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
+from pipeline._kernels.skyline import factorise, inverse, substitute
 from pipeline._kernels.tube import active_voxels, normal_equations, render
 from pipeline.model import Array, arc_length
 
@@ -101,7 +101,9 @@ def spline_through(points: Array, knot: float) -> Array:
     third = np.diff(np.eye(k), n=3, axis=0)
     density = len(u) / k
     normal = basis.T @ basis + 1e-3 * density * third.T @ third
-    return np.asarray(np.linalg.solve(normal, basis.T @ points))
+    lower, first = _factors(normal)
+    right = basis.T @ points
+    return np.stack([substitute(lower, first, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
 
 
 def _prior(controls: int, columns: int, noise: float, voxel: float) -> Array:
@@ -188,6 +190,18 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
     return out
 
 
+def _factors(normal: Array) -> tuple[Array, NDArray[np.int64]]:
+    lower, first, good = factorise(normal)
+    if not good:
+        msg = "the normal equations of the tube are singular: the path leads where there is nothing to fit"
+        raise np.linalg.LinAlgError(msg)
+    return lower, first
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    return np.asarray(substitute(*_factors(normal), right))
+
+
 def _moved(tube: Tube, step: Array, voxel: float, samples: Samples) -> tuple[Tube, float]:
     """The tube after a step that moves its curve by at most a voxel; and the largest move that counts.
 
@@ -236,12 +250,12 @@ def fit_tube(
         held_now = held if done > 2 else [columns - 2]
         normal = _frozen(_damped(normal, tube, 3e-2), held_now)
         right[held_now] = 0.0
-        tube, size = _moved(tube, cho_solve(cho_factor(normal), right), voxel, samples)
+        tube, size = _moved(tube, _solved(normal, right), voxel, samples)
         if size < tolerance * voxel and done > 2:
             break
     normal, _, rms, _ = _step(data, tube, samples, prior, slot)
     normal = _frozen(_damped(normal, tube, 1e-6), held)
-    covariance = np.asarray(np.linalg.inv(normal) * data.noise**2, np.float64)
+    covariance = inverse(*_factors(normal)) * data.noise**2
     return replace(tube, covariance=covariance, residual_rms=rms, iterations=done)
 
 

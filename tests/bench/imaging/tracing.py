@@ -68,9 +68,8 @@ def volumes(s, cnr, seed, correlation=0.0):
 def errors(points, s):
     """Mean, p95, tip (voxel) and coverage of the true curve from the entry plane on."""
     off, _ = point_to_curve(points, s.wire)
-    ahead = s.wire[s.wire @ s.direction > s.entry @ s.direction] if False else s.wire
     first = int(np.argmin(np.linalg.norm(s.wire - points[0], axis=1)))
-    seen = cKDTree(phantoms.resample(points, 0.05)).query(ahead[first:])[0] < 2 * VOXEL
+    seen = cKDTree(phantoms.resample(points, 0.05)).query(s.wire[first:])[0] < 2 * VOXEL
     tip = np.linalg.norm(points[-1] - s.wire[-1]) / VOXEL
     return off.mean() / VOXEL, np.percentile(off, 95) / VOXEL, tip, seen.mean()
 
