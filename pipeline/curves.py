@@ -24,7 +24,7 @@ def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
 def samples(length_mm: float, step_mm: float) -> Array:
     """Arc lengths 0, step, 2 step, ... and the end itself, mm."""
     count = max(int(np.floor(length_mm / step_mm + 1e-9)), 0)
-    arc: Array = np.arange(count + 1) * step_mm
+    arc = np.asarray(np.arange(count + 1) * step_mm, dtype=np.float64)
     return arc if length_mm - arc[-1] < 1e-6 else np.concatenate([arc, [length_mm]])
 
 

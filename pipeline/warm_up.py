@@ -6,7 +6,6 @@ import contextlib
 import io
 import sys
 import tempfile
-from pathlib import Path
 from time import perf_counter
 
 from pipeline.cli import main
@@ -15,10 +14,14 @@ from pipeline.cli import main
 def warm_up() -> float:
     """Seconds that it took; the tiny study and its output are thrown away."""
     clock = perf_counter()
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
-        with contextlib.redirect_stderr(io.StringIO()):
-            main(["synth", "bend", "-o", f"{folder}/study", "--frames", "2", "--size", "48"])
-            main(["run", f"{folder}/study/manifest.toml", "-o", str(Path(folder) / "out"), "--no-cache"])
+    silent = io.StringIO()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.redirect_stdout(silent),
+        contextlib.redirect_stderr(silent),
+    ):
+        main(["synth", "bend", "-o", f"{folder}/study", "--frames", "2", "--size", "48"])
+        main(["run", f"{folder}/study/manifest.toml", "-o", f"{folder}/out", "--no-cache"])
     return perf_counter() - clock
 
 
