@@ -9,9 +9,9 @@ from data_synthetic.background import background_study
 from data_synthetic.scene import Scene, Study
 from data_synthetic.scenes import SCENES
 from data_synthetic.scenes.from_file import scene_from_file
-from data_synthetic.study import ScannerFactory, make_study, psf_scanner
+from data_synthetic.study import ScannerFactory, conebeam_scanner, make_study, psf_scanner
 
-SCANNERS: dict[str, ScannerFactory] = {"psf": psf_scanner}
+SCANNERS: dict[str, ScannerFactory] = {"psf": psf_scanner, "conebeam": conebeam_scanner}
 """What turns a phantom into grey values."""
 
 _BY_NAME = {scene.name: scene for scene in SCENES}

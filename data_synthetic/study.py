@@ -37,6 +37,13 @@ def psf_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
     return PsfScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, setup.greys)
 
 
+def conebeam_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
+    """3D rotational X-ray; needs the extra [conebeam]."""
+    from data_synthetic.scanner.conebeam import ConeBeamScanner
+
+    return ConeBeamScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid)
+
+
 def make_study(
     scene: Scene,
     *,
