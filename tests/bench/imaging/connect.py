@@ -16,7 +16,7 @@ LEVELS = Levels(1000.0, 100.0, 50.0)
 
 
 def tortuous(side, span=None):
-    """A bright tortuous tube of about 1 % of ``span``^3 in the middle of ``side``^3, blurred and noisy near it alone."""
+    """A bright tortuous tube of about 1 % of ``span``^3 in the middle of ``side``^3, in even noise."""
     span = span or side
     rng = np.random.default_rng(100)
     values = np.full((side, side, side), 100, np.int16)

@@ -35,7 +35,7 @@ def catphan(data: Path):
     for (x0, y0), (x1, y1) in BOXES:
         grey = volume.crop((x0, y0, 26), (x1, y1, 39)).values
         ends = [
-            np.array([*np.unravel_index(grey[:, :, k].argmax(), grey.shape[:2]), k]) + [x0, y0, 26]
+            np.array([*np.unravel_index(grey[:, :, k].argmax(), grey.shape[:2]), k]) + np.array([x0, y0, 26])
             for k in (3, 9)
         ]
         a, b = (volume.to_mm(e) for e in ends)

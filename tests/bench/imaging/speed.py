@@ -82,7 +82,7 @@ def report(quick):
     print(f"   only reading {reading:.2f}; load {loads:.2f} + segment {seg:.2f} + trace {traces:.2f} = {total:.2f}: "
           f"{total / reading:.1f} times reading (bar 6)")  # fmt: skip
     ratio = (chain * frames + loads) / total
-    print(f"   ridge filter + minimal path of scikit-image in the lumen's box: {chain:.2f} a frame, that is {ratio:.0f} "
+    print(f"   ridge filter + minimal path of scikit-image in the lumen's box: {chain:.2f} a frame, {ratio:.0f} "
           "times as long (bar 10)")  # fmt: skip
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(

@@ -64,7 +64,8 @@ def report(quick):
     """Print the table."""
     seeds = range(100, 130 if quick else 300)
     print(
-        f"\n## Topology at CNR 8: {len(seeds)} wires, seeds {seeds.start}-{seeds.stop - 1} (bar: 98 % right, none wrong unflagged)"
+        f"\n## Topology at CNR 8: {len(seeds)} wires, seeds {seeds.start}-{seeds.stop - 1} "
+        "(bar: 98 % right, none wrong unflagged)"
     )
     counts = tally(seeds)
     for kind, c in counts.items():
@@ -76,12 +77,14 @@ def report(quick):
         )
     total = sum(counts.values(), Counter())
     print(
-        f"   together  {100 * total['right'] / total['all']:.1f} % right, {total['wrong, unflagged']} wrong and unflagged"
+        f"   together  {100 * total['right'] / total['all']:.1f} % right, "
+        f"{total['wrong, unflagged']} wrong and unflagged"
     )
     few = range(100, 104 if quick else 112)
     right, flagged = contact(few)
     print(
-        f"   turns in contact (1.4 voxels) from the previous frame: {right} of {len(few)} right, {flagged} wrong but flagged"
+        f"   turns in contact (1.4 voxels) from the previous frame: {right} of {len(few)} right, "
+        f"{flagged} wrong but flagged"
     )
     for cnr in (2.0, 1.5):
         print(f"   CNR {cnr}: {dict(low_contrast(few, cnr))}")

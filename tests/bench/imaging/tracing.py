@@ -206,7 +206,8 @@ def report(quick):
     side = 128 if quick else 256
     seeds = range(100, 104 if quick else 108)
     print(
-        f"\n## Tracing, {side}^3 frames of 0.3 mm, 0.4 mm wire, PSF 0.8 voxel, seeds {seeds.start}-{seeds.stop - 1}; voxels"
+        f"\n## Tracing, {side}^3 frames of 0.3 mm, 0.4 mm wire, PSF 0.8 voxel, "
+        f"seeds {seeds.start}-{seeds.stop - 1}; errors in voxels"
     )
     print("   bars at CNR 16 / 8 / 4: mean 0.04 / 0.07 / 0.13, median tip 0.2 / 0.35 / 0.55, pull 0.8-1.25")
     print("   limit: mean 2-D error of a line fit with knots every 8 voxels, 1.25 * 0.8 / (CNR sqrt 8)")
@@ -220,7 +221,7 @@ def report(quick):
             got, across, tips, seconds, other = row(
                 side, cnr, seeds, correlation, given, chains=label[:11] == "white, one "
             )
-            mean, p95, tip, cover = got.mean(axis=0)
+            mean, p95, _, cover = got.mean(axis=0)
             limit = 1.25 * 0.8 / (cnr * np.sqrt(8))
             print(f"   {label:18s} {cnr:4d}  {mean:.3f}  {p95:.3f}  {np.median(got[:, 2]):.3f}  {cover:.3f}  "
                   f"{across.std():.2f}   {np.sqrt(np.mean(tips**2)):.2f}     {limit:.3f}  {seconds:.3f}")  # fmt: skip
