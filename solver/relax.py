@@ -137,9 +137,9 @@ def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     """One run of the loop; the result is moved to state 0."""
     if settings.method == "closed_form":
         sweeps = settings.max_iterations * tol.SWEEPS_PER_ITERATION
-        result = minimise_closed_form(b.problem, b.k, settings.tolerance, sweeps, b.report)
+        result = minimise_closed_form(b.problem, 0, b.k, settings.tolerance, sweeps, b.report)
     else:
-        result = minimise(b.problem, b.k, settings.tolerance, settings.max_iterations, b.report)
+        result = minimise(b.problem, 0, b.k, settings.tolerance, settings.max_iterations, b.report)
     outcome, iterations, which, energy = result
     if which == 1:
         copy_state(b.problem, 1, 0, b.k)

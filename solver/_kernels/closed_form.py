@@ -111,10 +111,10 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
 
 @kernel
 def minimise_closed_form(
-    problem: Problem, k: int, tolerance: float, max_sweeps: int, report: Any
+    problem: Problem, which: int, k: int, tolerance: float, max_sweeps: int, report: Any
 ) -> tuple[int, int, int, float]:
-    """Relax state 0 by the seed's sweeps; arguments and results as ``minimise``, iterations are sweeps."""
-    which, share = 0, 1.0
+    """Relax state ``which`` by the seed's sweeps; arguments and results as ``minimise``, iterations are sweeps."""
+    share = 1.0
     energy = total_energy(problem, which, k)
     report[18] = energy
     check = 32

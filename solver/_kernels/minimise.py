@@ -63,7 +63,7 @@ def search(problem: Problem, which: int, k: int, energy: float, decrement: float
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
     for _ in range(SEARCHES):
-        rollout(problem, which, k, 0, fraction)
+        rollout(problem, which, k, 0 * k, fraction)
         problem.scratch.counter[ROLLOUTS] += 1
         trial = total_energy(problem, 1 - which, k)
         enough = trial <= energy - SUFFICIENT * fraction * decrement
@@ -120,7 +120,7 @@ def unloaded(chain: Chain, k: int) -> bool:
 @kernel
 def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
-    rollout(problem, which, k, 0, 1.0)
+    rollout(problem, which, k, 0 * k, 1.0)
     problem.scratch.counter[ROLLOUTS] += 1
     trial = total_energy(problem, 1 - which, k)
     if trial <= energy and admissible(problem, which, k):
@@ -137,14 +137,14 @@ def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
 
 @kernel
 def minimise(
-    problem: Problem, k: int, tolerance: float, max_iterations: int, report: Any
+    problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:
-    """Relax state 0 with Newton's method.
+    """Relax state ``which`` with Newton's method (an argument: a literal 0 would compile everything twice).
 
     Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
     ``costate``, at the result.
     """
-    which, damping, last, patience = 0, 0.0, FIRST_DAMPING, 0
+    damping, last, patience = 0.0, FIRST_DAMPING, 0
     energy = total_energy(problem, which, k)
     report[18] = energy
     state, counter = problem.state, problem.scratch.counter

@@ -63,7 +63,7 @@ def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
 def free_way(
     field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float, weights: Any
 ) -> float:
-    """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall, from where it is now or from the surface.
+    """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall (or beyond it).
 
     Never less than a quarter of that, so that a jammed tip still presses on.
     """
