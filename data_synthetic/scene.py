@@ -63,7 +63,8 @@ class Scene:
     """A name, one line of why, natural sizes, and how to set it up from a seeded generator and a number of frames.
 
     fov_mm : edge of the field of view, so that a smaller ``size`` means larger voxels of the same scene.
-    expected : the status of every frame that the pipeline should end in (its identifier), or one per frame.
+    expected : the status of every frame that the pipeline should end in (its identifier), or one per frame;
+    a bar separates what is equally right.
     """
 
     name: str
@@ -85,7 +86,8 @@ class Scene:
 class Study:
     """Scans with truth, in memory. ``frames()`` makes one volume at a time; ``reference`` is the scan without wire.
 
-    manifest : the [[case]] table, [wires] and [case.wall] as nested dicts.     truth : one TrueFrame per frame.
+    manifest : the [[case]] table, [wires] and [case.wall] as nested dicts.     truth : one TrueFrame per frame,
+    in the phantom as the reference shows it (a moved phantom carries its wire along).
     """
 
     name: str

@@ -70,7 +70,7 @@ def make_study(
         why=scene.why,
         grid=grid,
         reference=machine.at(np.zeros(3)).scan((), (seed, 2)),
-        truth=tuple(_shifted(f, setup.motion_mm, i) for i, f in enumerate(truth)),
+        truth=truth,
         expected=scene.expected_statuses(frames),
         manifest=describe_case(scene.name, setup, grid, np.random.default_rng([seed, 4])),
         quality=truth_quality(insertion, truth),
@@ -123,10 +123,6 @@ class _Machine:
         shown = setup.visible is None or setup.visible[number]
         wires: Wires = [(truth.points_mm, setup.wire.radius_mm)] if shown else []
         return self.at(shift).scan([*wires, *setup.others], (self.seed, 3, number))
-
-
-def _shifted(frame: TrueFrame, motion_mm: Array | None, number: int) -> TrueFrame:
-    return frame if motion_mm is None else replace(frame, points_mm=frame.points_mm + motion_mm[number])
 
 
 def describe_case(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:

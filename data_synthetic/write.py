@@ -51,6 +51,10 @@ def _write_truth(study: Study, path: Path) -> None:
         }
         for f in study.truth
     ]
+    if study.setup.motion_mm is not None:
+        # points_mm lie in the phantom as the reference scan shows it; in the frame's own scan they are shifted by this
+        for frame, shift in zip(frames, study.setup.motion_mm, strict=True):
+            frame["phantom_shift_mm"] = [round(float(s), 6) for s in shift]
     record = {
         "scene": study.name,
         "why": study.why,

@@ -109,6 +109,7 @@ HARD = (
         160,
         5,
         _moved,
+        "ok|no_wire|trace_left_lumen|trace_ambiguous|length_mismatch",
     ),
     Scene("anisotropic", "slices twice as thick as pixels are wide", 48.0, 160, 5, _anisotropic),
     Scene("oblique", "a scan whose axes are not the patient's", 48.0, 160, 5, _oblique),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from data_synthetic import catalogue
+from data_synthetic import catalogue, coverage
 from data_synthetic.scene import Study
 from data_synthetic.write import FORMATS, write_study
 
@@ -108,3 +108,24 @@ def read_hdf5(path: Path) -> list[sitk.Image]:
 def test_unknown_format_is_refused(study: Study, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="allowed: mha"):
         write_study(study, tmp_path, format="tiff")
+
+
+def test_every_scene_tries_something_and_every_stage_is_tried(capsys: pytest.CaptureFixture[str]) -> None:
+    with capsys.disabled():
+        print("\n" + coverage.matrix())
+    assert tuple(coverage.TRIED) == catalogue.names()
+    for stage in coverage.STAGES:
+        assert sum(stage in tried for tried in coverage.TRIED.values()) >= 3, stage
+    assert all(set(tried) <= set(coverage.STAGES) for tried in coverage.TRIED.values())
+
+
+@pytest.mark.parametrize(
+    "name", ["helix", "two-wires", "moved-phantom", "anisotropic", "oblique", "stenosis"]
+)
+def test_scene_builds_small_with_a_sound_truth(name: str) -> None:
+    study = catalogue.build(name, **SMALL)
+    assert study.quality["largest_residual_N"] < 1e-7
+    assert study.frame(1).shape == study.reference.shape == study.grid.shape
+    assert len(study.expected) == 2
+    lengths = [np.linalg.norm(np.diff(f.points_mm, axis=0), axis=1).sum() for f in study.truth]
+    np.testing.assert_allclose(lengths, [f.depth_mm for f in study.truth], atol=2e-3)
