@@ -21,6 +21,8 @@ from pipeline.trace.tube import Tube, evaluate, point_sigmas
 
 SAMPLE_VOXELS = 1.0
 """Spacing of the curve's points."""
+FINE_VOXELS = 0.55
+"""Blur in which crests are looked for where strands may cross: they stay apart longest."""
 WIDE_VOXELS = 1.2
 """Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
 WIDE_SIGMAS = 4.0
@@ -122,7 +124,7 @@ def explain(scene: Scene, entry: Entry, previous: Curve | None, config: TraceCon
     gap = config.longest_gap_mm
     found = _read_off(scene, cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry, config)
     if _doubtful(scene, found, entry, config):
-        strict = cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap, STRICT_BEND)
+        strict = cold(scene, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND)
         found += _read_off(scene, strict, entry, config)
         found += _read_off(scene, cold(scene, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry, config)
         if previous is not None and len(previous.points_mm):
