@@ -17,6 +17,7 @@ from pipeline.config import Config
 from pipeline.curves import to_length
 from pipeline.entry import Entry, measured_entry
 from pipeline.frame import Frame
+from pipeline.in_place import counters_of, place_of, put_in_place, said
 from pipeline.load import Header, LoadError
 from pipeline.manifest import Case
 from pipeline.model import Curve, Lumen, Volume
@@ -172,6 +173,8 @@ def _trace_frames(run: CaseRun) -> None:
         with run.timed("load"):
             reference = scans.load_crop(run.headers.reference, box, run.config.load)
     given = _given_traces(run)
+    with run.timed("trace"):
+        place = place_of(run.lumen, box, reference, run.config.load, run.config.trace, bool(given))
     window: tuple[float, float] | None = None
     for frame, header in zip(run.frames, run.headers.frames, strict=True):
         try:
@@ -180,14 +183,20 @@ def _trace_frames(run: CaseRun) -> None:
         except StageError as error:
             frame.fail_from("load", error)
             continue
-        window = window or scans.grey_window(volume)
-        frame.projections = scans.projections(volume, window)
+        with run.timed("trace", frame):
+            volume, shown, frame.registration = put_in_place(volume, header, place)
+        run.count("trace", counters_of(frame.registration))
+        window = window or scans.grey_window(shown)
+        frame.projections = scans.projections(shown, window)
         with run.timed("trace", frame):
             frame.curve = given[frame.index] if given else _trace(run, frame, header, volume, reference)
         _judge_trace(run, frame)
         run.progress(
             "trace", frame.index + 1, len(run.frames), f"{frame.status} {frame.curve.length_mm:.1f} mm"
         )
+    assumed, doubtful = said(place, run.frames)
+    run.assumptions += assumed
+    run.warnings += doubtful
 
 
 def _given_traces(run: CaseRun) -> list[Curve]:

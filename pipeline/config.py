@@ -6,6 +6,7 @@ Performance settings live in their own table and never enter a cache key.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,10 @@ class TraceConfig:
     """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
     longest_gap_mm: float = 5.0
     """Longest gap between two pieces of wire that is bridged."""
+    register: Literal["auto", "off"] = "auto"
+    """auto (frames are registered to the reference scan where the phantom moved) or off."""
+    register_skip_voxels: float = 0.1
+    """A phantom that moved by less than this everywhere on the lumen's wall is taken not to have moved."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipeline.compare import Comparison, TruthErrors
 from pipeline.model import Array, Curve, Simulated
+from pipeline.register import Registration
 from pipeline.status import FrameStatus, StageError
 
 
@@ -29,6 +30,7 @@ class Frame:
     curve: Curve | None = None
     simulated: Simulated | None = None
     comparison: Comparison | None = None
+    registration: Registration | None = None
     truth_mm: Array | None = None
     truth: TruthErrors = field(default_factory=TruthErrors)
     nulls_rms_mm: dict[str, float] = field(default_factory=dict)

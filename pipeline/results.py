@@ -13,6 +13,7 @@ from skimage.measure import marching_cubes
 
 from pipeline.case import CaseRun
 from pipeline.frame import Frame
+from pipeline.in_place import record
 from pipeline.model import Lumen, Volume
 from pipeline.scans import projections, voxels
 from pipeline.summary import NULLS, skill_of
@@ -184,7 +185,8 @@ def result_of(
         "status": row["status"],
         "sentence": str(run.failure) if run.failure else _first_sentence(run.frames),
         "frames": [
-            {k: getattr(f, k) for k in ("status", "sentence", "stage", "message")} | {"frame": f.index}
+            {k: getattr(f, k) for k in ("status", "sentence", "stage", "message")}
+            | {"frame": f.index, "registration": record(f.registration)}
             for f in run.frames
         ],
         "counts": {"ok": row["frames_ok"], "failed": row["frames_failed"]},

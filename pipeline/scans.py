@@ -13,6 +13,7 @@ from pipeline.config import LoadConfig
 from pipeline.load import Box, Header, Source, load, read_header, require_same_geometry
 from pipeline.manifest import Case
 from pipeline.model import Lumen, Volume
+from pipeline.register.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +59,12 @@ def read_headers(case: Case, config: LoadConfig) -> Scans:
     return scans
 
 
-def lumen_box(header: Header, lumen: Lumen) -> Box:
-    """The voxels of a scan that the lumen's box covers."""
+def lumen_box(header: Header, lumen: Lumen, motion: Motion | None = None) -> Box:
+    """The voxels of a scan that the lumen's box covers, moved with the phantom where it moved."""
     grid = lumen.distance
-    corners = header.grid.to_index(grid.to_mm(np.array([(0, 0, 0), grid.shape]) - [[0], [1]]))
+    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in grid.shape], indexing="ij"), -1).reshape(-1, 3)
+    points = grid.to_mm(ends)
+    corners = header.grid.to_index(points if motion is None else motion.moved(points))
     low = np.clip(np.floor(corners.min(axis=0) + 1e-6), 0, np.array(header.shape) - 1).astype(int)
     high = np.clip(np.ceil(corners.max(axis=0) - 1e-6) + 1, low + 1, header.shape).astype(int)
     return (int(low[0]), int(low[1]), int(low[2])), (int(high[0]), int(high[1]), int(high[2]))
