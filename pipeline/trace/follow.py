@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,10 +101,17 @@ def _doubtful(scene: Scene, found: list[Candidate], entry: Entry, config: TraceC
     return weak or doubts or off > config.length_tolerance_mm or best.verdict.status is not FrameStatus.OK
 
 
+def _missed(found: Candidate, entry: Entry, config: TraceConfig) -> float:
+    """How far the length is beyond what may differ from the expected depth, mm."""
+    if entry.expected_mm is None:
+        return 0.0
+    return max(0.0, abs(found.length_mm - entry.expected_mm) - config.length_tolerance_mm)
+
+
 def _best(scene: Scene, found: list[Candidate], entry: Entry, config: TraceConfig) -> Candidate:
     """The candidate that leaves least unexplained: misfit, with a length far from the expected one held against it.
 
-    A millimetre of length missing or too much costs what a millimetre of wire explains.
+    A millimetre missing or too much costs half of what a millimetre of wire explains, a flagged one a tenth.
     """
     if len(found) == 1:
         return found[0]
@@ -124,8 +131,9 @@ def explain(scene: Scene, entry: Entry, previous: Curve | None, config: TraceCon
     gap = config.longest_gap_mm
     found = _read_off(scene, cold(scene, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry, config)
     if _doubtful(scene, found, entry, config):
-        strict = cold(scene, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND)
-        found += _read_off(scene, strict, entry, config)
+        if not found or found[0].attempt.cnr(scene) > SURE_CNR:
+            strict = cold(scene, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND)
+            found += _read_off(scene, strict, entry, config)
         found += _read_off(scene, cold(scene, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry, config)
         if previous is not None and len(previous.points_mm):
             found += _read_off(scene, warm(scene, entry, previous, config.ridge_voxels, gap), entry, config)
@@ -202,4 +210,11 @@ def trace(
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
     entry = Entry(scene.local(np.asarray(entry_mm, float)[None])[0], scene.turned(heading), expected_mm)
     best = explain(scene, entry, previous, config)
-    return _no_wire(scene) if best is None else _curve(scene, best)
+    if best is None:
+        return _no_wire(scene)
+    curve = _curve(scene, best)
+    if curve.status is FrameStatus.OK and _missed(best, entry, config) > 0:
+        note = f"trace: length: got {best.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
+        note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest"
+        return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)
+    return curve
