@@ -82,12 +82,12 @@ def cantilever(n: int, reduced: int = 2) -> Answer:
     return Answer(points, np.array([seconds]), f"ANCFCable2D, static, {LOAD_STEPS} load steps")
 
 
-def bend(n: int, steps: int = STEPS_B) -> Answer:
+def bend(n: int, steps: int = STEPS_B, pushes: int | None = None) -> Answer:
     """Scene B: a wire of 60 mm starts in the straight tube before the entry and is pushed in by its clamp."""
     wall = wall_of(n)
     model = _Model(n, wall)
     seconds = []
-    for i in range(steps):
+    for i in range(pushes or steps):
         start = process_time()
         model.push(DEPTH_B_MM * (i + 1) / steps, DEPTH_B_MM / steps)
         seconds.append(process_time() - start)

@@ -115,7 +115,7 @@ def cantilever(n: int) -> Answer:
     return Answer(cable.points(), np.array([seconds]), note)
 
 
-def bend(n: int, steps: int = STEPS_B) -> Answer:
+def bend(n: int, steps: int = STEPS_B, pushes: int | None = None) -> Answer:
     """Scene B."""
     wall = wall_of(n)
     segment = DEPTH_B_MM / n
@@ -123,7 +123,7 @@ def bend(n: int, steps: int = STEPS_B) -> Answer:
     cable = Cable(n, DEPTH_B_MM, -DEPTH_B_MM, 0.5 * DEPTH_B_MM, wall.wall.stiffness_N_mm2 * segment)
     base = mujoco.mj_name2id(cable.model, mujoco.mjtObj.mjOBJ_BODY, "base")
     seconds, total = [], 0
-    for i in range(steps):
+    for i in range(pushes or steps):
         start = process_time()
         cable.model.body_pos[base, 0] = -DEPTH_B_MM * (1 - (i + 1) / steps) - 0.5 * segment
         total += cable.settle(wall.forces)

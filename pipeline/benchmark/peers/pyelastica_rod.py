@@ -138,7 +138,7 @@ def cantilever(n: int) -> Answer:
     return Answer(rod.points(), np.array([seconds]), note)
 
 
-def bend(n: int, steps: int = STEPS_B) -> Answer:
+def bend(n: int, steps: int = STEPS_B, pushes: int | None = None) -> Answer:
     """Scene B."""
     wall = wall_of(n)
     segment = DEPTH_B_MM / (n - 0.5)
@@ -148,7 +148,7 @@ def bend(n: int, steps: int = STEPS_B) -> Answer:
     push = wall.wall.stiffness_N_mm2 * segment
     rod = Rod(n, DEPTH_B_MM, -DEPTH_B_MM, 0.5 * DEPTH_B_MM, lambda x: wall.forces(x.T).T, push)
     seconds, total = [], 0
-    for i in range(steps):
+    for i in range(pushes or steps):
         start = process_time()
         rod.place[2] = -DEPTH_B_MM * (1 - (i + 1) / steps) - 0.5 * segment
         rod.rod.position_collection[2] += DEPTH_B_MM / steps

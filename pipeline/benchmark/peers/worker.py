@@ -18,7 +18,7 @@ def main(argv: list[str]) -> None:
         module.cantilever(5)  # compile and load, on nobody's clock
         answer = module.cantilever(n)
     else:
-        module.bend(6, 2)
+        module.bend(6, STEPS_B, pushes=2)
         answer = module.bend(n, STEPS_B * per_mm)
     result = {
         "name": module.NAME,

@@ -14,8 +14,8 @@ from pipeline.benchmark.stress.scene_run import Outcome, run_scene
 
 LIMIT_S = 120.0
 """A scene that takes longer hangs: the slowest sound one takes a few seconds."""
-START_S = 300.0
-"""Room for compiling the kernels in a new process."""
+START_S = 1200.0
+"""Room for compiling the kernels in a new process of a busy machine."""
 
 
 def _serve(pipe: Connection, seed: int) -> None:
@@ -37,7 +37,8 @@ class Worker:
         self.process: BaseProcess | None = None
         self.pipe: Connection | None = None
 
-    def _started(self) -> Connection:
+    def start(self) -> Connection:
+        """The pipe to a running process, a new one where there is none."""
         if self.process is None or self.pipe is None:
             context = multiprocessing.get_context("spawn")
             self.pipe, theirs = context.Pipe()
@@ -52,7 +53,7 @@ class Worker:
 
     def run(self, index: int) -> Outcome:
         """Run one scene; a crash or a hang is its outcome."""
-        pipe = self._started()
+        pipe = self.start()
         pipe.send(index)
         if not pipe.poll(self.limit_s):
             self.stop()
@@ -60,9 +61,16 @@ class Worker:
         try:
             return pipe.recv()  # type: ignore[no-any-return]
         except EOFError:
-            code = self.process.exitcode if self.process else None
+            code = self._exit_code()
             self.stop()
             return _lost(self.seed, index, "crash", f"the process died, exit code {code}")
+
+    def _exit_code(self) -> int | None:
+        """Of a process that closed its pipe: it may take a moment to be gone."""
+        if self.process is None:
+            return None
+        self.process.join(10.0)
+        return self.process.exitcode
 
     def stop(self) -> None:
         """End the process."""
@@ -93,6 +101,8 @@ def run_isolated(
             free.put(worker)
 
     try:
+        # one compiles into the cache, the others read it
+        workers[0].start()
         with ThreadPoolExecutor(jobs) as pool:
             yield from pool.map(one, indices)
     finally:

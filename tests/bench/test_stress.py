@@ -1,0 +1,152 @@
+"""The stress study: a random part of it by default, the whole of it as a slow test; and its own judges on trial."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.benchmark.stress import AXES, draw, isolate, run_stress, stress_table
+from pipeline.benchmark.stress.judge import judge
+from pipeline.benchmark.stress.plan import Plan
+from pipeline.benchmark.stress.scene_run import Outcome, build, run_scene, solve
+
+SEED = 100
+SAMPLE = 100
+SECONDS = 15.0
+
+
+def test_a_random_part_of_the_scenes_ends_as_it_may() -> None:
+    run_scene(SEED, 3)  # compiles, on nobody's clock
+    stop = time.perf_counter() + SECONDS
+    chosen = np.random.default_rng(1).choice(5000, SAMPLE, replace=False).tolist()
+    # a slow machine sees fewer of them, never fewer than ten
+    done = [run_scene(SEED, i) for n, i in enumerate(chosen) if n < 10 or time.perf_counter() < stop]
+    faults = [outcome for outcome in done if outcome.fault]
+    assert not faults, faults
+
+
+@pytest.mark.slow
+def test_all_scenes_end_as_they_may() -> None:
+    rows = run_stress(SEED, range(5000), min(2, os.cpu_count() or 1))
+    faults = rows[rows["fault"] != ""]
+    assert faults.empty, faults[["index", "axes", "fault", "detail"]].to_string()
+
+
+def test_scenes_are_the_same_in_any_order_and_cover_every_axis() -> None:
+    again = [draw(SEED, i) for i in (40, 7)]
+    assert repr(again[1]) == repr(draw(SEED, 7))
+    assert repr(again[0]) != repr(again[1])
+    firsts = {draw(SEED, i).axes[0] for i in range(len(AXES))}
+    assert firsts == set(AXES)
+    ranges = [draw(SEED, i) for i in range(0, 400)]
+    assert min(p.segment_mm for p in ranges) < 0.2
+    assert max(p.joints for p in ranges) > 1000
+    assert max(p.wall_stiffness for p in ranges) > 1e5
+    assert max(max(abs(r) for r in p.rolls) for p in ranges) > 3000.0
+
+
+def _solved(**changes: Any) -> tuple[Plan, Any, Any, Any]:
+    plan = Plan(0, 0, way="relax", joints=20, depths=[20.0], rolls=[0.0], lumen_mm=1.0, tilt_deg=20.0)
+    for name, value in changes.items():
+        setattr(plan, name, value)
+    wire, wall = build(plan)
+    return plan, wire, wall, solve(plan, wire, wall)[0]
+
+
+def test_a_sound_solution_passes() -> None:
+    plan, wire, wall, (solution, start) = _solved()
+    assert solution.converged
+    assert start > solution.energy_N_mm > 0.0
+    verdict = judge(plan, wire, wall, solution, start, True)
+    assert not verdict.fault
+    assert verdict.residual < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("fault", "spoil"),
+    [
+        ("nan", lambda s: replace(s, push_force_N=float("nan"))),
+        ("stretched", lambda s: replace(s, joints_mm=s.joints_mm * (1 + 1e-9))),
+        ("wrong_energy", lambda s: replace(s, energy_N_mm=s.energy_N_mm * 0.999)),
+        ("energy_rose", lambda s: replace(s, energy_N_mm=1e9)),
+    ],
+)
+def test_the_judge_sees(fault: str, spoil: Any) -> None:
+    plan, wire, wall, (solution, start) = _solved()
+    assert judge(plan, wire, wall, spoil(solution), start, False).fault == fault
+
+
+def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
+    from pipeline.benchmark import statics
+
+    plan, wire, wall, (solution, _) = _solved()
+    joints = statics.joints_of(wire, 20.0)
+    angles = statics.angles_of(solution.frames, joints)
+    angles[5, 0] += 0.01
+    nodes, frames = statics.roll_out(joints, angles, solution.joints_mm[0], solution.frames[0])
+    forces = statics.wall_forces(wall, wire, joints, nodes, frames)
+    energy = statics.energy_of(joints, frames, forces.energy, nodes)
+    moved = replace(solution, joints_mm=nodes, frames=frames, energy_N_mm=energy)
+    assert judge(plan, wire, wall, moved, float("nan"), False).fault == "not_at_rest"
+
+
+def test_the_judge_sees_a_saddle() -> None:
+    """A straight column under four times its buckling load is at rest, and no minimum."""
+    from pipeline.benchmark import statics
+    from solver import relax
+
+    plan = Plan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
+    plan.stiffness = [[0.0, 10.0]]
+    wire, _ = build(plan)
+    force = 4 * np.pi**2 * 10.0 / (4 * 20.0**2)
+    plan.load_N = (0.0, 0.0, -force)
+    unloaded = relax(wire, None, depth_mm=20.0)
+    load = np.zeros((len(unloaded.joints_mm), 3))
+    load[-1, 2] = -force
+    joints = statics.joints_of(wire, 20.0)
+    energy = statics.energy_of(joints, unloaded.frames, 0.0, unloaded.joints_mm, load)
+    column = replace(unloaded, energy_N_mm=energy)
+    assert judge(plan, wire, None, column, float("nan"), True).fault == "no_minimum"
+    assert not judge(plan, wire, None, column, float("nan"), False).fault
+
+
+def _crashes(seed: int, index: int) -> Outcome:
+    if index == 1:
+        os._exit(3)
+    if index == 2:
+        time.sleep(60.0)
+    return Outcome(index, ("roll",), "converged")
+
+
+def _serve_crashing(pipe: Any, seed: int) -> None:
+    pipe.send(None)
+    while True:
+        pipe.send(_crashes(seed, pipe.recv()))
+
+
+def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(isolate, "_serve", _serve_crashing)
+    done = list(isolate.run_isolated(0, [0, 1, 0, 2], limit_s=2.0))
+    assert [d.outcome for d in done] == ["converged", "crash", "converged", "hang"]
+    assert "exit code 3" in done[1].detail
+
+
+def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "pipeline.benchmark.stress.study.run_isolated",
+        lambda *_: [
+            Outcome(0, ("roll", "hull"), "converged", iterations=4),
+            Outcome(1, ("roll",), "crash", "crash"),
+        ],
+    )
+    table = stress_table(run_stress(0, range(2)))
+    found = {(row.axis, row.outcome): row.count for row in table.itertuples(index=False)}
+    assert dict(zip(table["axis"] + " " + table["outcome"], table["count"], strict=True)) == {
+        "all converged": 1, "all CRASH": 1, "roll converged": 1, "hull converged": 1, "roll CRASH": 1,
+    }  # fmt: skip
+    assert len(found) == 5

@@ -1,0 +1,201 @@
+"""The benchmark's plumbing at a tiny size: what is measured is what is meant."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import check_grad
+
+from pipeline.benchmark import outputs, scenes, statics
+from pipeline.benchmark.clock import timed
+from pipeline.benchmark.errors import arc_samples, resampled, shape_error
+from pipeline.benchmark.insert import Setting, insert
+from pipeline.benchmark.peers.judge import bending_energy
+from pipeline.benchmark.peers.table import sentences
+from pipeline.benchmark.reference import reference
+from pipeline.benchmark.study import settings, study
+from pipeline.commands import bench as command
+from solver import GuideWire, VesselWall
+from tests.analytic import elastica_tip
+
+
+def test_bend_scene_is_a_distance() -> None:
+    scene = scenes.bend()
+    grid = scene.grid()
+    assert grid is not None
+    wall = VesselWall(grid, 1.0)
+    turn, lumen = scenes.BEND_TURN_MM, scenes.BEND_LUMEN_MM
+    angle = np.linspace(0.05, 1.3, 20)
+    centre = np.column_stack(
+        [turn * (1 - np.cos(angle)), 0 * angle, scenes.BEND_INLET_MM + turn * np.sin(angle)]
+    )
+    outward = np.column_stack([-np.cos(angle), 0 * angle, np.sin(angle)])
+    for offset in (1.0, 1.9, 2.3):
+        assert wall.look_up(centre + offset * outward)[0] == pytest.approx(offset - lumen, abs=2e-3)
+
+
+def test_far_from_the_wall_the_sampled_distance_still_leads_back() -> None:
+    low, high = (-6.0, -6.0, -6.0), (6.0, 6.0, 6.0)
+    grid = scenes.sampled(lambda p: np.linalg.norm(p, axis=1) - 2.0, (low, high), 0.4)
+    x, y, z = np.meshgrid(
+        *(np.asarray(grid.to_mm([[i] * 3 for i in range(n)]))[:, a] for a, n in enumerate(grid.shape)),
+        indexing="ij",
+    )
+    exact = np.sqrt(x**2 + y**2 + z**2) - 2.0
+    near = exact < 1.5
+    off = np.asarray(grid.values) - exact
+    assert np.abs(off)[near].max() < 1e-5
+    # between coarse nodes the distance from a ball is convex: interpolation errs outwards, by little
+    assert 0.0 < off.max() < 0.3
+
+
+@pytest.mark.parametrize("scene", [scenes.siphon], ids=["siphon"])
+def test_anatomies_contain_their_entry(scene: object) -> None:
+    built = scene()  # type: ignore[operator]
+    wall = built.wall()
+    assert wall.look_up([built.entry_mm])[0][0] < -built.radius_mm
+    box = np.array(built.box)
+    assert np.all(box[0] < built.entry_mm)
+    assert np.all(built.entry_mm < box[1])
+
+
+def test_cantilever_reference_is_the_elastica() -> None:
+    limit = reference(scenes.cantilever(), fine_mm=1.0)
+    x, y = elastica_tip(5.0)
+    np.testing.assert_allclose(limit.points_mm[-1], [200.0 * y, 0.0, 200.0 * x], atol=2e-4)
+    assert limit.uncertainty_mm < 1e-3
+
+
+def test_second_order_is_seen_by_the_study() -> None:
+    rows = study([scenes.cantilever()], [Setting(10.0), Setting(5.0)], repeats=1, fine_mm=1.0)
+    assert (rows["status"] == "converged").all()
+    assert np.log2(rows["tip_error_mm"][0] / rows["tip_error_mm"][1]) == pytest.approx(2.0, abs=0.05)
+    assert (rows["ms_per_mm"] > 0).all()
+
+
+def test_every_setting_is_of_its_own() -> None:
+    chosen = settings()
+    assert len(set(chosen)) == len(chosen)
+    assert {"newton", "closed_form"} == {s.method for s in chosen}
+    assert set(settings(quick=True)) < set(chosen)
+
+
+def test_shape_error_of_a_shift_and_of_sampling() -> None:
+    arcs = arc_samples(10.0)
+    line = np.column_stack([arcs, 0 * arcs, 0 * arcs])
+    assert shape_error(line + np.array([0.0, 3.0, 4.0]), line) == pytest.approx((5.0, 5.0))
+    coarse = np.array([[0.0, 0, 0], [10.0, 0, 0]])
+    np.testing.assert_allclose(resampled(coarse, np.array([0.0, 10.0]), arcs), line, atol=1e-12)
+
+
+def test_processor_time_is_of_the_work() -> None:
+    seconds, result = timed(lambda: sum(range(200_000)), 3)
+    assert result == sum(range(200_000))
+    assert seconds > 0.0
+
+
+def test_second_assembly_has_the_gradient_of_its_energy() -> None:
+    wall = scenes.bend().wall()
+    assert wall is not None
+    wire = GuideWire(2.0, 0.18, [[0.0, 0.5], [20.0, 30.0]], [[0.0, 0.05], [9.0, 0.05], [9.0, 0.0]], 7.0)
+    joints = statics.joints_of(wire, 41.3)
+    rng = np.random.default_rng(3)
+    start = 0.05 * rng.normal(size=(len(joints.length), 3))
+    load = np.zeros((len(joints.length) + 1, 3))
+    load[-1] = [0.01, -0.02, 0.005]
+    frame = np.eye(3)
+
+    def state(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, statics.WallForces]:
+        nodes, frames = statics.roll_out(joints, u.reshape(-1, 3), np.zeros(3), frame)
+        return nodes, frames, statics.wall_forces(wall, wire, joints, nodes, frames)
+
+    def energy(u: np.ndarray) -> float:
+        nodes, frames, forces = state(u)
+        return statics.energy_of(joints, frames, forces.energy, nodes, load)
+
+    def gradient(u: np.ndarray) -> np.ndarray:
+        nodes, frames, forces = state(u)
+        return statics.residual_moments(joints, nodes, frames, forces, load)[0].ravel()
+
+    flat = start.ravel()
+    assert energy(flat) > 0.1
+    assert check_grad(energy, gradient, flat) < 1e-5 * np.linalg.norm(gradient(flat))
+
+
+def test_joint_constants_of_a_profile() -> None:
+    wire = GuideWire(1.0, 0.18, [[0.0, 1.0], [10.0, 1e3]], [[0.0, 0.1], [4.2, 0.1], [4.2, 0.0]])
+    joints = statics.joints_of(wire, 20.3)
+    assert joints.length.sum() == pytest.approx(20.3)
+    # the last half segment belongs to no joint
+    from_tip = np.linspace(0.5, 20.3, 2_000_001)
+    compliance = np.trapezoid(1 / np.interp(from_tip, [0.0, 10.0], [1.0, 1e3]), from_tip)
+    assert np.sum(1 / joints.bend) == pytest.approx(compliance, rel=1e-6)
+    assert joints.rest.sum() == pytest.approx(0.1 * (4.2 - 0.5))
+
+
+def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = study([scenes.cantilever()], [Setting(10.0), Setting(5.0), Setting(2.0)], repeats=1, fine_mm=1.0)
+    rows.to_csv(tmp_path / outputs.SOLVER_CSV, index=False)
+    page = outputs.write_page(tmp_path)
+    assert page.exists()
+    assert len(pd.read_csv(tmp_path / outputs.BENCH_CSV)) == 3
+    lines = list(outputs.advice(rows))
+    assert any("for 0.1 mm use newton, segment 5" in line for line in lines)
+    assert any("for 0.01 mm" in line or "reaches 0.01" in line for line in lines)
+    assert "cores" in outputs.machine()
+    missing = Namespace(
+        manifest=tmp_path / "none.toml", stress=False, peers=False, quick=True, seed=0, out=tmp_path
+    )
+    assert command.main(missing) == 2
+    assert "none.toml" in capsys.readouterr().err
+
+
+def test_insert_reports_what_it_did() -> None:
+    scene = scenes.bend().with_(depth_mm=12.0)
+    run = insert(scene, Setting(2.0))
+    assert run.reached
+    assert run.steps == 12
+    np.testing.assert_allclose(run.joints_mm[-1], [0.0, 0.0, 12.0], atol=1e-9)
+    assert run.work["wall_look_ups_proven_unnecessary"] + run.work["wall_look_ups_cheap"] > 0
+
+
+def test_bending_energy_of_a_circle_and_of_a_fold() -> None:
+    angle = np.linspace(0.0, 1.0, 200)
+    circle = 30.0 * np.column_stack([1 - np.cos(angle), 0 * angle, np.sin(angle)])
+    assert bending_energy(circle) == pytest.approx(0.5 * 10.0 * 30.0 / 30.0**2, rel=1e-2)
+    folded = circle.copy()
+    folded[100:] = circle[99] - (circle[100:] - circle[99])
+    assert bending_energy(folded) > 100 * bending_energy(circle)
+
+
+def test_peers_are_compared_within_one_run() -> None:
+    base = {"steps_per_mm": 1, "callback_share": 0.2, "relative_tip_error": 5e-5, "shape_error_mm": 0.01}
+    rows = pd.DataFrame(
+        [
+            {
+                **base,
+                "method": "wireval newton",
+                "scene": "bend",
+                "joints": 60,
+                "ms_per_step": 0.1,
+                "ms_last_step": 0.2,
+            },
+            {
+                **base,
+                "method": "Other",
+                "scene": "bend",
+                "joints": 60,
+                "ms_per_step": 10.0,
+                "ms_last_step": 40.0,
+            },
+        ]
+    )
+    text = " ".join(sentences(rows))
+    assert "100 times ours" in text
+    assert "last step 200 times" in text
+    assert "20 %" in text
+    assert "expert" in text
