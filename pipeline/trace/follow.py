@@ -116,13 +116,11 @@ def _best(scene: Scene, found: list[Candidate], entry: Entry, config: TraceConfi
     if len(found) == 1:
         return found[0]
     costs = np.array(misfit(scene, [c.attempt for c in found]))
-    if entry.expected_mm is not None:
-        h = float(scene.spacing.min())
-        for n, c in enumerate(found):
-            worth = c.attempt.cnr(scene) ** 2 * np.pi * (c.attempt.tube.sigma / h) ** 2 / h
-            costs[n] += (
-                0.5 * worth * max(0.0, abs(c.length_mm - entry.expected_mm) - config.length_tolerance_mm)
-            )
+    h = float(scene.spacing.min())
+    for n, c in enumerate(found):
+        worth = c.attempt.cnr(scene) ** 2 * np.pi * (c.attempt.tube.sigma / h) ** 2 / h
+        doubtful = float(c.verdict.flagged.sum()) * h
+        costs[n] += worth * (0.5 * _missed(c, entry, config) + 0.1 * doubtful)
     return found[int(np.argmin(costs))]
 
 
