@@ -15,7 +15,7 @@ from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
 
-REPORT = 19
+REPORT = 20
 
 
 def unit(vector: ArrayLike, name: str) -> Array:

@@ -84,7 +84,9 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
     size = 0.3
     while size > 1e-6:
         for side in (1.0, -1.0):
-            gain[j, 0, 0], gain[j, 1, 0] = side * size * report[3], side * size * report[4]
+            for a in range(2):
+                gain[j, a, 0] = side * size * report[3 + a]
+            gain[j, 2, 0] = side * size * report[19]
             rollout(problem, which, k, j, 1.0)
             problem.scratch.counter[ROLLOUTS] += 1
             trial = total_energy(problem, 1 - which, k)
@@ -144,7 +146,7 @@ def minimise(
     Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
     ``costate``, at the result.
     """
-    damping, last, patience = 0.0, FIRST_DAMPING, 0
+    damping, last, patience, settled = 0.0, FIRST_DAMPING, 0, 0
     energy = total_energy(problem, which, k)
     report[18] = energy
     state, counter = problem.state, problem.scratch.counter
@@ -167,6 +169,10 @@ def minimise(
             if energy < before:
                 continue
             # the full step does not help, as where a contact opens and closes again: search as usual
+        if damping > 0.0 and definite and report[0] <= noise and settled < SEARCHES:
+            # nothing left to gain with the wire held back: look at it free before it is judged
+            damping, patience, settled = 0.0, 0, settled + 1
+            continue
         trial = math.inf
         if definite:
             trial = search(problem, which, k, energy, report[0], noise)

@@ -319,8 +319,8 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
     damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
     leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
     Returns False and stops at the first block that is not positive (semi-)definite.
-    report: [0] Newton decrement (predicted fall of the energy), [2] joint of that block or -1, [3:5] its
-    direction of negative curvature, [5] that curvature.
+    report: [0] Newton decrement (predicted fall of the energy), [2] joint of that block or -1, [3:5] and
+    [19] its direction of negative curvature (bending, twist), [5] that curvature.
     """
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
@@ -344,7 +344,7 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
         floor, least = CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
         # written so that NaN, from an overflow in a long compressed chain, fails too
         if not least > -floor:
-            note_direction(q_uu, j, report)
+            note_direction(q_uu, j, least, report)
             return False
         if least < floor:
             # neutral, e.g. turning a buckled wire about its axis: no force there, so any stiffness will do
@@ -368,14 +368,21 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
 
 
 @kernel
-def note_direction(q: Six, j: int, report: Any) -> None:
+def note_direction(q: Six, j: int, least: float, report: Any) -> None:
     """Keep the direction of negative curvature of an indefinite block: the way off a saddle."""
-    half = 0.5 * (q[0] - q[1])
-    radius = math.sqrt(half * half + q[3] * q[3])
-    angle = 0.5 * math.atan2(q[3], half) + 0.5 * math.pi
     report[2] = j
-    report[3], report[4] = math.cos(angle), math.sin(angle)
-    report[5] = 0.5 * (q[0] + q[1]) - radius
+    if least == -math.inf:
+        # bending alone is stable, together with twist it is not: bending follows the twist as it likes best
+        det = q[0] * q[1] - q[3] * q[3]
+        v0, v1 = (q[3] * q[5] - q[1] * q[4]) / det, (q[3] * q[4] - q[0] * q[5]) / det
+        size = math.sqrt(v0 * v0 + v1 * v1 + 1.0)
+        report[3], report[4], report[19] = v0 / size, v1 / size, 1.0 / size
+        report[5] = (q[2] + q[4] * v0 + q[5] * v1) / (size * size)
+        return
+    half = 0.5 * (q[0] - q[1])
+    angle = 0.5 * math.atan2(q[3], half) + 0.5 * math.pi
+    report[3], report[4], report[19] = math.cos(angle), math.sin(angle), 0.0
+    report[5] = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
 
 
 @inlined

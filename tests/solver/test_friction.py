@@ -21,7 +21,7 @@ def axial(joints: np.ndarray, force: np.ndarray, load: np.ndarray) -> np.ndarray
 def test_capstan(coefficient: float) -> None:
     """A limp wire pulled back around a bend by its tip load: tension grows by exp(μ Θ)."""
     wall = VesselWall(bend_grid(), 5.0, friction=coefficient)
-    wire = GuideWire(1.0, 0.18, 0.02)
+    wire = GuideWire(1.0, 0.18, 0.5)
     tip_load = np.array([0.05, 0.0, 0.0])
     insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], tip_load_N=tip_load, max_iterations=500)
     solution = last(insertion, [*np.arange(1.0, 96.0), 94.0, 93.0, 92.0, 91.0])
@@ -45,7 +45,7 @@ def test_friction_raises_the_push_and_is_not_computed_without_a_coefficient() ->
         work.append(solution.friction_energy_N_mm)
         assert insertion.buffers.problem.friction.load.size == 0 or coefficient > 0
         np.testing.assert_allclose(
-            solution.reaction_force_N, -solution.contact_force_N.sum(axis=0), atol=1e-9
+            solution.reaction_force_N, -solution.contact_force_N.sum(axis=0), atol=1e-6
         )
     assert push[0] < push[1] < push[2]
     assert work[0] == 0.0 < work[1] < work[2]
