@@ -29,6 +29,9 @@ METAL_VOXELS = 4.0
 """Its blurred skirts (sd 1.4 voxels with the blur in which grey is read) reach this far."""
 MOST_METAL = 0.4
 """Share of the points that must stay: if fewer do, it is not metal but a wall in another place."""
+LEAST_GAIN = 0.4
+"""Contrast relative to the reference's below which (or above whose inverse) the wall is not the reference's: a frame
+that shows nothing but tissue at the points is explained to perfection by a gain of 0."""
 MOST_SEEN = 0.8
 """Share of the points that a motion must leave inside the scan."""
 UNSEEN_VOXELS = 0.03
@@ -128,7 +131,8 @@ def near_metal(points_mm: Array, metal: NDArray[np.bool_], reach_mm: float) -> N
 def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[Array, float]:
     """Six motion parameters (shift mm, turn rad about the centroid) that the residuals ask for, and the misfit.
 
-    Unknowns also hold a gain and an offset of grey, since contrast drifts between scans.
+    Unknowns also hold a gain and an offset of grey, since contrast drifts between scans. The misfit is infinite where
+    the gain says that there is no such wall here.
     """
     h, radius = s.voxel_mm, max(s.radius_mm, s.voxel_mm)
     gradient = s.gradient @ motion.rotation.T
@@ -141,7 +145,8 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[A
     clear = ~near_metal(s.points_mm, residual > METAL_SCALES * scale, METAL_VOXELS * h)
     if MOST_METAL * len(grey) < np.count_nonzero(clear) < len(grey):
         solution, scale, _ = _reweighted(design, grey, clear)
-    return solution[:6] * np.repeat([h, h / radius], 3), scale / max(slope, 1e-9)
+    shown = LEAST_GAIN < solution[6] < 1.0 / LEAST_GAIN
+    return solution[:6] * np.repeat([h, h / radius], 3), scale / max(slope, 1e-9) if shown else float("inf")
 
 
 def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, rounds: int = ROUNDS) -> Fit:

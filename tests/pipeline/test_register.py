@@ -1,0 +1,160 @@
+"""Registration: a known motion is found, a small one is left alone and said so, metal does not pull."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from data_synthetic import catalogue
+from data_synthetic.scene import Study
+from data_synthetic.study import psf_scanner
+from pipeline.config import LoadConfig, TraceConfig
+from pipeline.frame import Frame
+from pipeline.in_place import place_of, record, said
+from pipeline.model import Lumen, Volume
+from pipeline.register import Anchor, Motion, Registration, anchor, register
+from pipeline.register.rigid import rigid
+from pipeline.register.shift import fit_motion
+from pipeline.segment import segment
+
+VOXEL = 0.5
+SKIP = 0.1
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return catalogue.build("bend", frames=2, size=96, seed=100, truth_step_mm=0.4)
+
+
+def volume(study: Study, values: np.ndarray) -> Volume:
+    return Volume(values, study.grid.spacing_mm, study.grid.origin_mm, study.grid.direction)
+
+
+@pytest.fixture(scope="module")
+def lumen(study: Study) -> Lumen:
+    return segment(volume(study, study.reference), [study.setup.entry_mm])
+
+
+@pytest.fixture(scope="module")
+def fixed(study: Study, lumen: Lumen) -> Anchor:
+    return anchor(volume(study, study.reference), lumen)
+
+
+def scanned(study: Study, motion: Motion, wire: bool = True, seed: int = 0) -> Volume:
+    """A scan of the phantom moved as told: the scanner's grid goes the other way."""
+    grid = study.grid
+    origin = motion.rotation.T @ (grid.origin_mm - motion.shift_mm)
+    moved = replace(grid, origin_mm=origin, direction=motion.rotation.T @ grid.direction)
+    wires = [(study.truth[-1].points_mm, study.setup.wire.radius_mm)] if wire else []
+    return volume(study, psf_scanner(study.setup, moved).scan(wires, (11, seed)))
+
+
+def a_motion(centre: np.ndarray, voxels: float, degrees: float, seed: int) -> Motion:
+    shift, turn = np.random.default_rng(seed).normal(size=(2, 3))
+    return Motion.about(
+        centre,
+        np.radians(degrees) * turn / np.linalg.norm(turn),
+        voxels * VOXEL * shift / np.linalg.norm(shift),
+    )
+
+
+def off_by(found: Motion, true: Motion, points: np.ndarray) -> float:
+    """Largest displacement between two motions, voxels."""
+    return float(np.linalg.norm(found.moved(points) - true.moved(points), axis=1).max()) / VOXEL
+
+
+@pytest.mark.parametrize(("voxels", "degrees"), [(0.3, 0.0), (1.0, 0.3), (3.0, 1.0), (7.0, 2.0)])
+def test_a_known_motion_is_found(study: Study, fixed: Anchor, voxels: float, degrees: float) -> None:
+    true = a_motion(fixed.wall.centre_mm, voxels, degrees, seed=int(10 * voxels) + 100)
+    found = register(scanned(study, true), fixed, SKIP)
+    assert found.applied
+    assert found.trusted
+    assert off_by(found.motion, true, fixed.wall.points_mm) < 0.1
+    assert found.left_voxels < 0.05
+    assert found.sentence.startswith("registered: phantom moved by (")
+
+
+@pytest.mark.parametrize("voxels", [0.0, 0.04])
+def test_a_small_motion_is_measured_said_and_not_applied(
+    study: Study, fixed: Anchor, lumen: Lumen, voxels: float
+) -> None:
+    frame = scanned(study, a_motion(fixed.wall.centre_mm, voxels, 0.0, seed=103))
+    found = register(frame, fixed, SKIP)
+    assert not found.applied
+    assert found.moved_voxels == pytest.approx(voxels, abs=0.05)
+    np.testing.assert_array_equal(found.motion.rotation, np.eye(3))
+    whole = ((0, 0, 0), study.grid.shape)
+    place = place_of(lumen, whole, fixed.reference, LoadConfig(), TraceConfig(), own_curves=False)
+    texts, warnings = said(place, [Frame(0, registration=found)])
+    assert texts[0].startswith("no registration applied to 1 of 1 frames: the phantom moved 0.0")
+    assert not warnings
+
+
+def test_metal_does_not_pull(study: Study, fixed: Anchor) -> None:
+    with_wire, without = (fit_motion(scanned(study, Motion(), wire), fixed.wall) for wire in (True, False))
+    assert off_by(with_wire.motion, without.motion, fixed.wall.points_mm) < 0.05
+
+
+def test_contrast_that_drifts_is_no_motion(study: Study, fixed: Anchor) -> None:
+    frame = scanned(study, Motion())
+    fainter = volume(study, np.rint(0.8 * np.asarray(frame.values, float) + 40).astype(np.int16))
+    assert not register(fainter, fixed, SKIP).applied
+
+
+def test_registration_is_deterministic_and_found_by_simpleitk_alone(study: Study, fixed: Anchor) -> None:
+    true = a_motion(fixed.wall.centre_mm, 3.0, 1.0, seed=105)
+    frame = scanned(study, true)
+    first, second = (rigid(frame, fixed.reference, fixed.edges, fixed.wall.centre_mm) for _ in range(2))
+    np.testing.assert_array_equal(first.rotation, second.rotation)
+    np.testing.assert_array_equal(first.shift_mm, second.shift_mm)
+    assert off_by(first, true, fixed.wall.points_mm) < 0.5
+
+
+def test_another_phantom_is_not_forced_into_place(study: Study, fixed: Anchor) -> None:
+    noise = np.random.default_rng(100).normal(100.0, 40.0, study.grid.shape).astype(np.int16)
+    found = register(volume(study, noise), fixed, SKIP)
+    assert not found.applied
+    assert not found.trusted
+    assert "the walls fit the reference in no place" in found.sentence
+
+
+def test_motions_compose_and_undo() -> None:
+    a = Motion.about([1.0, 2.0, 3.0], [0.1, 0.0, -0.2], [0.5, -1.0, 2.0])
+    b = Motion.about([-4.0, 0.0, 1.0], [0.0, 0.3, 0.1], [0.0, 1.0, 0.0])
+    points = np.random.default_rng(0).normal(size=(5, 3)) * 30
+    np.testing.assert_allclose(a.then(b).moved(points), b.moved(a.moved(points)))
+    np.testing.assert_allclose(a.then(b.after(a)).moved(points), b.moved(points), atol=1e-12)
+    scan = Volume(np.zeros((4, 5, 6), np.int16), np.array([0.3, 0.4, 0.5]), np.array([5.0, -7.0, 2.0]))
+    voxel = np.array([1.0, 2.0, 3.0])
+    np.testing.assert_allclose(a.moved(a.undone(scan).to_mm(voxel)), scan.to_mm(voxel))
+    assert a.angle_deg == pytest.approx(np.degrees(np.hypot(0.1, 0.2)))
+
+
+@pytest.mark.parametrize(
+    ("register_", "reference", "own", "reason"),
+    [
+        ("off", True, False, "switched off"),
+        ("auto", False, False, "no reference scan"),
+        ("auto", True, True, "the manifest's own"),
+    ],
+)
+def test_what_is_not_registered_is_said(
+    fixed: Anchor, lumen: Lumen, register_: str, reference: bool, own: bool, reason: str
+) -> None:
+    config = TraceConfig(register=register_)  # type: ignore[arg-type]
+    scan = fixed.reference if reference else None
+    place = place_of(lumen, ((0, 0, 0), (1, 1, 1)), scan, LoadConfig(), config, own)
+    texts, _ = said(place, [])
+    assert texts[0].startswith("no registration applied: ")
+    assert reason in texts[0]
+
+
+def test_the_record_holds_the_transform() -> None:
+    assert record(None) is None
+    found = Registration(Motion(shift_mm=np.array([0.1, 0.2, 0.3])), True, 1.0)
+    written = record(found)
+    assert written is not None
+    assert list(written["shift_mm"]) == [0.1, 0.2, 0.3]
+    assert written["applied"]
