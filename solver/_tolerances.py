@@ -57,3 +57,5 @@ RISE_RADII = 0.5
 only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
 BUDGET_STEPS = 20
 """Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
+LOOK_AHEAD_MM = 2.0
+"""How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""

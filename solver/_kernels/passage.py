@@ -13,6 +13,7 @@ from solver._kernels.problem import Problem
 from solver._kernels.spline import Field, locate, set_basis, value
 
 HOP = tol.HOP_VOXELS
+LOOK_AHEAD = tol.LOOK_AHEAD_MM
 
 
 @kernel
@@ -71,8 +72,10 @@ def free_way(
     for a in range(3):
         end[a] = tip[a] + step * along[a]
     before = distance_at(field, tip, 0.0, end, weights)
-    limit = max(0.0, before) + rise
     steps = 1 + math.ceil(2 * step / spacing)
+    # where no other vessel lies ahead there is nothing to tunnel into, and four times as deep is allowed
+    ease = 1.0 if ridge_ahead(field, tip, end, step, spacing, weights) else 4.0
+    limit = max(0.0, before) + ease * rise
     free = 1.0
     for i in range(1, steps + 1):
         here = distance_at(field, tip, i / steps, end, weights)
@@ -84,3 +87,15 @@ def free_way(
         end[a] = tip[a] + free * step * along[a]
     free *= step * free_fraction(field, tip, end, free * step, spacing, weights)
     return max(free, min(step, 0.25 * rise))
+
+
+@kernel
+def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float, weights: Any) -> bool:
+    """Whether the distance on the ray from a through b rises above the surface and falls again, 2 mm past b."""
+    top = 0.0
+    for i in range(1, 2 + math.ceil(2 * (step + LOOK_AHEAD) / spacing)):
+        here = distance_at(field, a, 0.5 * i * spacing / step, b, weights)
+        if here < top - HOP * spacing:
+            return True
+        top = max(top, here)
+    return False
