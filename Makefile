@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study bench stress peers aneurism clean
+.PHONY: setup validate test lint study baseline anatomies bench stress peers aneurism clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -32,6 +32,14 @@ bars: setup
 	  $(BIN)/wireval synth circle-of-willis -o $(OUT)/bars/$$seed --frames 30 --size 256 --seed $$seed && \
 	  $(BIN)/wireval run $(OUT)/bars/$$seed/manifest.toml -o $(OUT)/bars/out-$$seed --resume || exit 1; done
 	$(BIN)/python -m tests.studies.bars $(foreach seed,$(SEEDS),$(OUT)/bars/out-$(seed))
+
+# the golden errors of the small catalogue, written anew: look at the difference before committing it
+baseline: setup
+	$(BIN)/python -m tests.studies.catalogue
+
+# five BraVa trees and the aorta-to-cranial tree (needs WIREVAL_DATA): errors and statuses frame by frame
+anatomies: setup
+	$(BIN)/python -m tests.studies.anatomies
 
 # a real scan (needs WIREVAL_DATA): segmented, then a wire is simulated from the carotid past the aneurysm
 aneurism: setup

@@ -1,0 +1,135 @@
+"""Every scene of the catalogue through the command line at small size.
+
+``python -m tests.studies.catalogue`` (make baseline) rewrites the golden tables that its test holds a run against.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import pandas as pd
+
+from data_synthetic import catalogue
+from data_synthetic.write import write_study
+from pipeline.case import STAGES
+from pipeline.cli import main as wireval
+from reports.case_files import GOOD
+from reports.tables import read_errors, write_errors
+
+GOLDEN = Path(__file__).resolve().parents[2] / "reports" / "baseline" / "catalogue"
+SEED = 100  # nobody tunes on seeds from 100 up
+FRAMES = 3
+VOXEL_MM = 0.5
+WIDE_VOXEL_MM = 0.6
+WIDE_MM = 70.0  # the circles of Willis are this wide: coarser voxels keep them within 128^3
+TRUTH_STEP_MM = 0.4
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One scene: what was expected of each frame, the case's folder, seconds of making and of running it."""
+
+    name: str
+    expected: tuple[str, ...]
+    folder: Path
+    made_s: float
+    run_s: float
+
+    @property
+    def errors(self) -> pd.DataFrame:
+        return read_errors(self.folder / "errors.csv")
+
+    @property
+    def statuses(self) -> tuple[str, ...]:
+        return tuple(self.errors["status"])
+
+    def unexpected(self) -> list[str]:
+        """One sentence per frame whose status is none of those expected."""
+        pairs = enumerate(zip(self.statuses, self.expected, strict=True))
+        return [
+            f"{self.name} frame {i}: got {s}, expected {e}" for i, (s, e) in pairs if s not in e.split("|")
+        ]
+
+
+def run_scene(name: str, root: Path) -> Outcome:
+    """Make a scene's files, run its manifest, keep its tables under ``root``/out/cases."""
+    scene = catalogue.describe(name)
+    voxel = WIDE_VOXEL_MM if scene.fov_mm > WIDE_MM else VOXEL_MM
+    clock = perf_counter()
+    study = catalogue.build(
+        name, frames=FRAMES, size=round(scene.fov_mm / voxel), seed=SEED, truth_step_mm=TRUTH_STEP_MM
+    )
+    manifest = write_study(study, root / "studies" / name)
+    made, clock = perf_counter() - clock, perf_counter()
+    log = io.StringIO()
+    with redirect_stdout(log), redirect_stderr(log):
+        out = root / "runs" / name
+        code = wireval(["run", str(manifest), "-o", str(out), "-j", "1", "--no-cache", "--until", "compare"])
+    if code not in (0, 1):
+        msg = f"{name}: wireval run ended with {code}: {log.getvalue()[-2000:]}"
+        raise RuntimeError(msg)
+    folder = root / "out" / "cases" / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    (out / "cases" / name).rename(folder)
+    return Outcome(name, study.expected, folder, made, perf_counter() - clock)
+
+
+def run_all(root: Path) -> list[Outcome]:
+    """All scenes, one after the other in this process, so that kernels are compiled once."""
+    return [run_scene(name, root) for name in catalogue.names()]
+
+
+def coverage(outcomes: list[Outcome]) -> str:
+    """Scene x stage: frames that came out of each stage well, of all; a stage that no frame entered is a dash."""
+    lines = [f"{'scene':20s}" + "".join(f"{s:>10s}" for s in STAGES[:-1]) + "   statuses"]
+    for o in outcomes:
+        result = json.loads((o.folder / "result.json").read_text())
+        failed = [f["stage"] for f in result["frames"] if f["status"] != "ok"]
+        cells, left = [], len(o.expected)
+        for stage in STAGES[:-1]:
+            entered = result["seconds"][stage] > 0
+            left -= failed.count(stage)
+            cells.append(f"{left}/{len(o.expected)}" if entered else "-")
+        lines.append(f"{o.name:20s}" + "".join(f"{c:>10s}" for c in cells) + "   " + ", ".join(o.statuses))
+    return "\n".join(lines)
+
+
+def times(outcomes: list[Outcome]) -> str:
+    made, run = (sum(values) for values in zip(*((o.made_s, o.run_s) for o in outcomes), strict=True))
+    return f"{len(outcomes)} scenes of {FRAMES} frames, seed {SEED}: made in {made:.0f} s, run in {run:.0f} s"
+
+
+def golden(errors: pd.DataFrame) -> pd.DataFrame:
+    """What is worth keeping: no times; no numbers of a frame that failed, where only the status is a promise."""
+    kept = errors.copy()
+    kept[[c for c in kept.columns if c.endswith("_s")]] = float("nan")
+    failed = ~kept["status"].isin(GOOD)
+    numbers = [c for c in kept.columns if c not in ("frame", "status", "roll_deg")]
+    kept[numbers] = kept[numbers].astype("Float64").round(4)
+    kept.loc[failed, numbers] = pd.NA
+    return kept
+
+
+def write_golden(outcomes: list[Outcome], folder: Path) -> None:
+    for o in outcomes:
+        rows = golden(o.errors).astype(object)
+        rows = rows.where(rows.notna(), float("nan"))
+        write_errors(folder / "cases" / o.name / "errors.csv", rows.to_dict("records"))
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as scratch:
+        found = run_all(Path(scratch))
+        bad = [line for o in found for line in o.unexpected()]
+        sys.stdout.write("\n".join([coverage(found), times(found), *bad, ""]))
+        if bad:
+            sys.exit("golden tables not written: a scene does not end in its expected status")
+        write_golden(found, GOLDEN)
+        sys.stdout.write(f"golden tables written to {GOLDEN}; look at what changed before you commit them\n")
