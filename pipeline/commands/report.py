@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from reports.html import render_case, render_index
-
 from pipeline.aggregate import aggregate, found_results
 from pipeline.commands.common import complain, say
 from pipeline.commands.run import last_line
+from reports.html import render_case, render_index
 
 
 def main(args: Namespace) -> int:
