@@ -94,20 +94,20 @@ def judge(
     faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
     cnr = attempt.cnr(scene)
     status, note = FrameStatus.OK, ""
-    if outside.mean() > 0.03:
-        status = FrameStatus.TRACE_LEFT_LUMEN
-        got, allowed = (
-            f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
-            "3 % at most",
-        )
-        note = _sentence(got, allowed, "check the lumen, and whether the phantom moved between the scans")
-    elif cnr < LEAST_CNR and (not attempt.from_previous or _weak(share, spread)):
+    if cnr < LEAST_CNR and (not attempt.from_previous or _weak(share, spread)):
         status = FrameStatus.TRACE_LOW_CONTRAST
         got, allowed = (
             f"a wire {cnr:.1f} noises bright",
             f"{LEAST_CNR}, or a previous curve that the frame confirms",
         )
         note = _sentence(got, allowed, "scan with more dose or give the frame before")
+    elif outside.mean() > 0.03:
+        status = FrameStatus.TRACE_LEFT_LUMEN
+        got, allowed = (
+            f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
+            "3 % at most",
+        )
+        note = _sentence(got, allowed, "check the lumen, and whether the phantom moved between the scans")
     elif attempt.leftover_mm > max(LEFTOVER_MM, 0.1 * length_mm):
         status = FrameStatus.TRACE_AMBIGUOUS
         got, allowed = (
