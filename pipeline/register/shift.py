@@ -23,6 +23,9 @@ BORDER_VOXELS = 3.0
 """Points nearer to the edge of a scan have no full Gaussian."""
 TUKEY = 4.685
 """Tukey's constant: 95 % as good as least squares where there is no metal, blind to residuals beyond 4.7 sd."""
+ABOVE_NOISE = 3.0
+"""Steepness along a direction, in what noise alone gives it, from which it shows motion: a tube cut off by the scan's
+ends has none along itself, and fits made of noise were 0.4 voxel off."""
 METAL_SCALES = 5.0
 """Brighter than expected by this many scales is metal."""
 METAL_VOXELS = 4.0
@@ -102,7 +105,9 @@ def _seen(normal: Array, right: Array, scale: float) -> Array:
     a, b, c = normal[:6, :6], normal[:6, 6:], normal[6:, 6:]
     to_grey = np.linalg.solve(c, np.column_stack([b.T, right[6:]]))
     power, axes = np.linalg.eigh(a - b @ to_grey[:, :6])
-    shown = power > max((scale / UNSEEN_VOXELS) ** 2, 1e-9 * power[-1])
+    # the noise of a gradient, per voxel, is half that of the grey in a blur of one voxel, and the misfit has two scans'
+    noise = normal[7, 7] * scale**2 / 4.0
+    shown = power > max((scale / UNSEEN_VOXELS) ** 2, ABOVE_NOISE * noise, 1e-9 * power[-1])
     amounts = np.where(shown, axes.T @ (right[:6] - b @ to_grey[:, 6]) / np.where(shown, power, 1.0), 0.0)
     motion = axes @ amounts
     return np.concatenate([motion, to_grey[:, 6] - to_grey[:, :6] @ motion])

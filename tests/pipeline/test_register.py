@@ -158,3 +158,13 @@ def test_the_record_holds_the_transform() -> None:
     assert written is not None
     assert list(written["shift_mm"]) == [0.1, 0.2, 0.3]
     assert written["applied"]
+
+
+def test_a_tube_without_ends_does_not_show_that_it_slid() -> None:
+    study = catalogue.build("short-wire", frames=2, size=72, seed=101, truth_step_mm=0.4)
+    reference = volume(study, study.reference)
+    to = anchor(reference, segment(reference, [study.setup.entry_mm]))
+    for number in range(2):
+        found = register(volume(study, study.frame(number)), to, SKIP)
+        assert not found.applied
+        assert found.moved_voxels < 0.05
