@@ -143,7 +143,8 @@ def _column(table: pd.DataFrame, column: Column) -> pd.Series[Any]:
     if column.kind == "boolean":
         values = values.map(_boolean)
     typed: pd.Series[Any] = values.astype(dtype)
-    return typed
+    # -0.0 + 0.0 is 0.0: a force of "-0" is no news to a reader and would not survive a spreadsheet
+    return typed + 0.0 if column.kind == "float" else typed
 
 
 def _boolean(value: object) -> bool | None:

@@ -22,7 +22,7 @@ TEXTS = [*SOURCES, *ROOT.glob("*.md"), ROOT / "pyproject.toml", ROOT / "requirem
 
 
 def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             yield node
 
@@ -37,7 +37,7 @@ def label(path: Path) -> str:
 
 @pytest.mark.parametrize("path", SOURCES, ids=label)
 def test_every_module_says_what_it_is_for(path: Path) -> None:
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module starts with a docstring"
 
 
@@ -56,12 +56,12 @@ def test_most_functions_are_small() -> None:
 
 
 def test_most_files_are_small() -> None:
-    assert statistics.median(len(path.read_text().splitlines()) for path in SOURCES) <= 150
+    assert statistics.median(len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES) <= 150
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=label)
 def test_texts_name_no_machine(path: Path) -> None:
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     found = re.findall(r"(?:/work/|/tmp/|/root/|/home/)\S*|(?<!emit-)index-url|pypi\.org/simple", text)
     assert not found, "paths of one machine and registry hosts do not belong into the project"
 

@@ -34,7 +34,11 @@ def _bad(path: Path, got: str, allowed: str, do: str) -> LoadError:
 
 def read_swc(path: Path) -> Branches:
     """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
-    rows = [r.split() for r in path.read_text().splitlines() if r.strip() and not r.lstrip().startswith("#")]
+    rows = [
+        r.split()
+        for r in path.read_text(encoding="utf-8").splitlines()
+        if r.strip() and not r.lstrip().startswith("#")
+    ]
     try:
         table = np.array(rows, dtype=float)
     except ValueError as error:
@@ -54,7 +58,7 @@ def read_swc(path: Path) -> Branches:
 
 def _markups(path: Path) -> list[dict[str, Any]]:
     try:
-        found = json.loads(path.read_text())["markups"]
+        found = json.loads(path.read_text(encoding="utf-8"))["markups"]
         return [m for m in found if m.get("controlPoints")]
     except (ValueError, KeyError, TypeError) as error:
         raise _bad(path, repr(error), "a 3D Slicer markups file", "save the curve as .mrk.json") from error

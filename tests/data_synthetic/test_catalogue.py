@@ -66,13 +66,13 @@ def test_wire_is_where_the_truth_says(study: Study) -> None:
 @pytest.mark.parametrize("format_", FORMATS)
 def test_files_read_back_identically(study: Study, format_: str, tmp_path: Path) -> None:
     manifest_path = write_study(study, tmp_path, format=format_)
-    case = tomllib.loads(manifest_path.read_text())["case"][0]
+    case = tomllib.loads(manifest_path.read_text(encoding="utf-8"))["case"][0]
     for i, image in enumerate(read_frames(tmp_path, case["frames"])):
         np.testing.assert_array_equal(as_array(image), study.frame(i))
         np.testing.assert_allclose(image.GetSpacing(), study.grid.spacing_mm, rtol=1e-6)
         np.testing.assert_allclose(image.GetOrigin(), study.grid.origin_mm, atol=1e-4)
         np.testing.assert_allclose(np.reshape(image.GetDirection(), (3, 3)), study.grid.direction, atol=1e-6)
-    truth = json.loads((tmp_path / case["truth"]).read_text())
+    truth = json.loads((tmp_path / case["truth"]).read_text(encoding="utf-8"))
     assert len(truth["frames"]) == 2
     np.testing.assert_allclose(truth["frames"][1]["points_mm"], study.truth[1].points_mm, atol=1e-6)
 

@@ -22,7 +22,7 @@ def test_lines_elsewhere_and_everything_in_the_log(tmp_path: Path) -> None:
     progress("simulate", 1, 2, "converged")
     progress.say("compiling")
     assert stream.getvalue() == "[a] trace 1/2  ok 12.0 mm\n[a] compiling\n"
-    log = (tmp_path / "log.txt").read_text()
+    log = (tmp_path / "log.txt").read_text(encoding="utf-8")
     assert "simulate 1/2  converged" in log
     assert "compiling" in log
 
@@ -43,4 +43,4 @@ def test_quiet_means_the_log_alone(tmp_path: Path) -> None:
     progress("trace", 1, 1, "ok")
     progress.say("x")
     assert stream.getvalue() == ""
-    assert "trace 1/1" in (tmp_path / "log.txt").read_text()
+    assert "trace 1/1" in (tmp_path / "log.txt").read_text(encoding="utf-8")

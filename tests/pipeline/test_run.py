@@ -143,7 +143,9 @@ def test_another_manifest_into_the_same_folder_is_refused(
     out, other = tmp_path / "out", tmp_path / "study"
     shutil.copytree(finished, out)
     shutil.copytree(study, other)
-    (other / "manifest.toml").write_text((study / "manifest.toml").read_text() + "\n# changed\n")
+    (other / "manifest.toml").write_text(
+        (study / "manifest.toml").read_text(encoding="utf-8") + "\n# changed\n"
+    )
     assert run(other, out) == 2
     assert "--resume" in capsys.readouterr().err
 
@@ -164,10 +166,12 @@ def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
     turned = json.loads(
-        (out / "sweep" / "simulate.roll_offset_deg=60" / "cases" / "bifurcation" / "result.json").read_text()
+        (out / "sweep" / "simulate.roll_offset_deg=60" / "cases" / "bifurcation" / "result.json").read_text(
+            encoding="utf-8"
+        )
     )
     assert turned["counters"]["trace"]["reused"] == FRAMES
-    assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text()
+    assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
 def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> None:
@@ -196,7 +200,7 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
 
 def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     shutil.copytree(study, folder)
-    text = (folder / "manifest.toml").read_text()
+    text = (folder / "manifest.toml").read_text(encoding="utf-8")
     second = text[text.index("[[case]]") :].replace('id = "bifurcation"', 'id = "second"')
     if broken:
         second = second.replace('frames = "frames/*.mha"', 'frames = "broken/*.mha"')
@@ -248,7 +252,7 @@ def test_an_unexpected_error_costs_one_case(
     assert run(both, tmp_path / "out") == 1
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]
-    assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text()
+    assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text(encoding="utf-8")
 
 
 def test_a_folder_of_scans_is_enough(
@@ -257,7 +261,7 @@ def test_a_folder_of_scans_is_enough(
     folder = tmp_path / "scans"
     shutil.copytree(study, folder)
     (folder / "manifest.toml").unlink()
-    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text())
+    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
     entry, direction = case["entry"]["entry_mm"], case["entry"]["entry_direction"]
     words = [f"--entry={','.join(map(str, entry))}", f"--direction={','.join(map(str, direction))}"]
     code = main(["run", str(folder), "-o", str(tmp_path / "out"), *words])
@@ -273,9 +277,11 @@ def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Pa
     shutil.copytree(study, folder)
     (folder / "manifest.toml").unlink()
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), "--until", "segment"]) in (0, 1)
-    text = (tmp_path / "out" / "manifest.inferred.toml").read_text()
+    text = (tmp_path / "out" / "manifest.inferred.toml").read_text(encoding="utf-8")
     found = [json.loads(line.split("=")[1]) for line in text.splitlines() if line.startswith("entry_")]
-    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text())["entry"]
+    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))[
+        "entry"
+    ]
     assert np.linalg.norm(np.subtract(found[0], case["entry_mm"])) < 3.0
     assert np.dot(found[1], case["entry_direction"]) > 0.8
 
@@ -310,7 +316,11 @@ def test_check_lists_problems_of_the_scans(
     sitk.WriteImage(image, str(folder / "reference.mha"))
     assert main(["check", str(folder / "manifest.toml")]) == 2
     assert "geometry differs" in capsys.readouterr().err
-    text = (study / "manifest.toml").read_text().replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
+    text = (
+        (study / "manifest.toml")
+        .read_text(encoding="utf-8")
+        .replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
+    )
     (folder / "manifest.toml").write_text(text)
     shutil.copy(study / "reference.mha", folder / "reference.mha")
     assert main(["check", str(folder / "manifest.toml")]) == 2
@@ -320,7 +330,7 @@ def test_check_lists_problems_of_the_scans(
 def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     shutil.copytree(study, folder)
-    lines = (folder / "manifest.toml").read_text().splitlines()
+    lines = (folder / "manifest.toml").read_text(encoding="utf-8").splitlines()
     kept = [line for line in lines if not line.startswith(("frames", "truth"))]
     (folder / "manifest.toml").write_text("\n".join(kept))
     assert run(folder, tmp_path / "out") == 0

@@ -37,7 +37,7 @@ def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.n
 
 def test_markups_say_lps_mm_and_defined(tmp_path: Path) -> None:
     export.write_markups_curve(tmp_path / "w.mrk.json", np.eye(3), "wire", {"error_mm": [0, 1, 2]})
-    markup = json.loads((tmp_path / "w.mrk.json").read_text())["markups"][0]
+    markup = json.loads((tmp_path / "w.mrk.json").read_text(encoding="utf-8"))["markups"][0]
     assert (markup["type"], markup["coordinateSystem"], markup["coordinateUnits"]) == ("Curve", "LPS", "mm")
     assert {p["positionStatus"] for p in markup["controlPoints"]} == {"defined"}
     assert markup["measurements"][0]["units"] == "mm"
@@ -47,14 +47,14 @@ def test_markups_say_lps_mm_and_defined(tmp_path: Path) -> None:
 def test_ras_markups_are_turned(tmp_path: Path) -> None:
     path = tmp_path / "w.mrk.json"
     export.write_markups_curve(path, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "wire")
-    path.write_text(path.read_text().replace('"LPS"', '"RAS"'))
+    path.write_text(path.read_text(encoding="utf-8").replace('"LPS"', '"RAS"'))
     np.testing.assert_array_equal(export.read_markups_curve(path), [[-1, -2, 3], [-4, -5, 6]])
 
 
 def test_markups_of_another_kind_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "w.mrk.json"
     export.write_markups_curve(path, np.eye(3), "wire")
-    path.write_text(path.read_text().replace('"Curve"', '"Fiducial"'))
+    path.write_text(path.read_text(encoding="utf-8").replace('"Curve"', '"Fiducial"'))
     with pytest.raises(ValueError, match="Fiducial"):
         export.read_markups_curve(path)
 

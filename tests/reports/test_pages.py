@@ -96,7 +96,7 @@ def test_every_picture_has_its_numbers_beside_it(run: Path) -> None:
     assert len(pictures) > 20
     for picture in pictures:
         assert picture.read_bytes().startswith(b"\x89PNG")
-        lines = picture.with_suffix(".csv").read_text().splitlines()
+        lines = picture.with_suffix(".csv").read_text(encoding="utf-8").splitlines()
         assert len(lines) > 1, picture
 
 

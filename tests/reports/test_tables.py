@@ -64,7 +64,7 @@ def test_not_applicable_is_empty_and_zero_stays_zero(tmp_path: Path) -> None:
         {"frame": 1, "status": "no_wire", "rms_mm": math.nan, "branch_ok": None, "joints": math.nan},
     ]
     tables.write_errors(path, rows)
-    first, second = path.read_text().splitlines()[1:]
+    first, second = path.read_text(encoding="utf-8").splitlines()[1:]
     assert first.startswith("0,ok,,,0,")
     assert second.replace(",", "") == "1no_wire"
     back = tables.read_errors(path)
@@ -131,10 +131,10 @@ def test_points_read_back(tmp_path_factory: pytest.TempPathFactory, error: list[
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "errors.csv"
     tables.write_errors(path, [{"frame": 0}])
-    before = path.read_text()
+    before = path.read_text(encoding="utf-8")
     with pytest.raises(RuntimeError):
         _fail_half_way(path)
-    assert path.read_text() == before
+    assert path.read_text(encoding="utf-8") == before
     assert [p.name for p in tmp_path.iterdir()] == ["errors.csv"]
 
 

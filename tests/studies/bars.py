@@ -12,7 +12,10 @@ from reports.tables import read_errors
 def row(out: Path) -> str:
     """Frames ok, tracing in voxels (median frame), simulated against truth, peak memory."""
     case = next((out / "cases").iterdir())
-    table, result = read_errors(case / "errors.csv"), json.loads((case / "result.json").read_text())
+    table, result = (
+        read_errors(case / "errors.csv"),
+        json.loads((case / "result.json").read_text(encoding="utf-8")),
+    )
     voxel = min(result["geometry"]["spacing_mm"])
     numbers = result["statistics"]
     return (
