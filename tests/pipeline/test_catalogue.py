@@ -1,0 +1,59 @@
+"""The whole catalogue through the command line at small size: every scene ends as it should, as well as it used to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from data_synthetic import catalogue
+from pipeline.cli import main
+from reports.diff import diff_folders, load_tolerance
+from tests.studies.catalogue import GOLDEN, Outcome, coverage, golden, run_all, times
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[Outcome]:
+    return run_all(tmp_path_factory.mktemp("catalogue"))
+
+
+def test_every_frame_ends_in_its_expected_status(
+    outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with capsys.disabled():
+        print("\n" + coverage(outcomes))
+        print(times(outcomes))
+    assert [o.name for o in outcomes] == list(catalogue.names())
+    assert not [line for o in outcomes for line in o.unexpected()]
+
+
+def test_every_stage_is_entered_by_every_scene(outcomes: list[Outcome]) -> None:
+    rows = [line.split("   ")[0] for line in coverage(outcomes).splitlines()[1:]]
+    assert len(rows) == len(outcomes)
+    assert not [row for row in rows if row.split()[1:].count("-")]
+
+
+def test_no_error_grew_beyond_its_tolerance(outcomes: list[Outcome]) -> None:
+    out = outcomes[0].folder.parents[1]
+    tolerance = load_tolerance(GOLDEN / "tolerance.toml")
+    bad = diff_folders(GOLDEN, out, tolerance).regressions
+    assert bad.empty, bad.to_string(index=False)
+    assert main(["diff", str(GOLDEN), str(out), "--tolerance", str(GOLDEN / "tolerance.toml")]) == 0
+
+
+def test_the_gate_closes_on_a_worse_run(outcomes: list[Outcome], tmp_path: Path) -> None:
+    for o in outcomes:
+        table = golden(o.errors)
+        if o.name == "bend":
+            table["truth_rms_mm"] += 0.06
+        folder = tmp_path / "cases" / o.name
+        folder.mkdir(parents=True)
+        table.to_csv(folder / "errors.csv", index=False)
+    bad = diff_folders(GOLDEN, tmp_path, {"truth_rms_mm": 0.0}).regressions
+    assert "bend" in set(bad["case"])
+
+
+def test_a_moved_phantom_is_traced_as_well_as_one_at_rest(outcomes: list[Outcome]) -> None:
+    moved, rest = (next(o for o in outcomes if o.name == name) for name in ("moved-phantom", "bend"))
+    more = moved.errors["trace_mean_mm"].mean() - rest.errors["trace_mean_mm"].mean()
+    assert more <= 0.1 * 0.5, "a tenth of a voxel"
