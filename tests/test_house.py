@@ -69,7 +69,9 @@ def test_texts_name_no_machine(path: Path) -> None:
 def test_help_imports_nothing_heavy() -> None:
     """`wireval --help` must be instant: the command line imports a command's modules inside the command."""
     code = "import sys, pipeline.cli; pipeline.cli._parser(); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT
+    )
     assert not {"numpy", "SimpleITK", "numba", "matplotlib", "pandas"} & set(done.stdout.split())
 
 
@@ -78,5 +80,5 @@ def test_help_imports_nothing_heavy() -> None:
 )
 def test_the_arrows_of_the_star() -> None:
     program = Path(sys.executable).parent / "lint-imports"
-    done = subprocess.run([program], capture_output=True, text=True, cwd=ROOT, check=False)
+    done = subprocess.run([program], capture_output=True, encoding="utf-8", cwd=ROOT, check=False)
     assert done.returncode == 0, done.stdout
