@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_splprep
@@ -54,5 +56,8 @@ def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:
     path = np.asarray(path_mm, dtype=np.float64)
     if len(path) < 5:
         return path
-    spline, _ = make_splprep(path.T, s=3.0 * len(path) * sigma_mm**2)
+    with warnings.catch_warnings():
+        # its search for the asked smoothness may stop short on a nearly straight path; what it has is smooth enough
+        warnings.filterwarnings("ignore", message=r"(?s).*smoothing spline", category=RuntimeWarning)
+        spline, _ = make_splprep(path.T, s=3.0 * len(path) * sigma_mm**2)
     return resample(np.asarray(spline(np.linspace(0.0, 1.0, 4 * len(path)))).T, step_mm)
