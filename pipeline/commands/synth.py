@@ -25,6 +25,8 @@ def _problem(args: Namespace, names: tuple[str, ...]) -> str:
         return "give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"
     if args.name is not None and args.name not in names:
         return f"no scene {args.name!r}; {did_you_mean(args.name, names)}"
+    if args.name is None and args.scanner != "psf":
+        return f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"
     for path in (args.anatomy, args.background):
         if path is not None and not path.exists():
             return f"{path}: no such file"
@@ -63,7 +65,7 @@ def main(args: Namespace) -> int:
     clock = perf_counter()
     try:
         study = _study(args)
-    except ValueError as error:
+    except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
     quality = study.quality
     say(

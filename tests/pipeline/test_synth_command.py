@@ -1,0 +1,65 @@
+"""``wireval synth`` on the command line: what is wrong is one line and exit code 2, never a traceback."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from pipeline.cli import main
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["bnd"], "did you mean 'bend'"),
+        ([], "give one of NAME"),
+        (["bend", "--anatomy", "x.swc"], "give one of NAME"),
+        (["--anatomy", "nothing.swc"], "nothing.swc: no such file"),
+        (["--anatomy", "nothing.swc", "--scanner", "conebeam"], "only the catalogue's scenes"),
+    ],
+)
+def test_wrong_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: str
+) -> None:
+    assert main(["synth", *words, "-o", str(tmp_path / "out")]) == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synth", "bend"]) == 2
+    assert "-o DIR is missing" in capsys.readouterr().err
+
+
+def test_the_list_gives_each_scene_its_reason(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synth", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) >= 20
+    assert all(len(line.split(maxsplit=1)[1]) > 10 for line in lines)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("itk") is not None, reason="the extra [conebeam] is installed")
+def test_an_absent_extra_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["synth", "bend", "-o", str(tmp_path), "--frames", "1", "--size", "32", "--scanner", "conebeam"]
+    assert main(words) == 2
+    assert "wireval[conebeam]" in capsys.readouterr().err
+
+
+def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
+    """A straight tube as SWC, radius 2 mm, 60 mm long."""
+    rows = [f"{i + 1} 3 0 0 {i} 2.0 {i if i else -1}" for i in range(61)]
+    (tmp_path / "tube.swc").write_text("\n".join(rows))
+    words = [
+        "--anatomy",
+        str(tmp_path / "tube.swc"),
+        "-o",
+        str(tmp_path / "study"),
+        "--frames",
+        "2",
+        "--size",
+        "64",
+    ]
+    assert main(["synth", *words]) == 0
+    assert main(["check", str(tmp_path / "study" / "manifest.toml")]) == 0
