@@ -140,6 +140,15 @@ def _resolve_case(case: CaseModel, wires: dict[str, WireModel], base: Path) -> C
     problems: list[str] = []
     if case.wire not in wires:
         problems.append(f"wire {case.wire!r} is not among [wires.*]; {did_you_mean(case.wire, wires)}")
+    # part of the manifest's contract, but `wireval calibrate`, which makes sense of both, is not built yet
+    if case.roll_deg == "fit":
+        problems.append(
+            'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame'
+        )
+    if case.parameters is not None:
+        problems.append(
+            "parameters cannot be read in this version; write the values into [wires] and [case.wall]"
+        )
     frames = _sources(case.frames, base, "frames", problems)
     traces = tuple(s.path for s in _sources(case.traces, base, "traces", problems))
     roll = tuple(case.roll_deg) if isinstance(case.roll_deg, list) else case.roll_deg
