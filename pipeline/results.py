@@ -121,7 +121,9 @@ def _write_view(folder: Path, run: CaseRun) -> None:
             folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
         )
         if inside.any() and not inside.all():
-            vertices, triangles, _, _ = marching_cubes(np.asarray(grid.values, dtype=np.float32), 0.0)
+            vertices, triangles, _, _ = marching_cubes(
+                np.array(grid.values, dtype=np.float32), 0.0
+            )  # a copy: it wants to write
             export.write_surface_vtp(folder / "lumen.vtp", grid.to_mm(vertices), triangles)
     for frame in run.frames:
         _write_wires(folder, frame)

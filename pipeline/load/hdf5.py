@@ -1,6 +1,7 @@
-"""Volumes in HDF5: ``study.h5#/frames`` is a dataset (z, y, x) or a sequence (frame, z, y, x).
+"""Volumes in HDF5: ``study.h5#/frames`` is one dataset, a 4-D dataset (a sequence), or a group of 3-D datasets.
 
-The geometry stands in the dataset's attributes spacing_mm, origin_mm (default 0) and direction (default identity).
+A dataset's attributes give spacing_mm (needed), origin_mm (default 0), direction (default identity) and axes: "z,y,x"
+(the default: x fastest, as in other formats) or "x,y,z". A 4-D dataset has the volume's number as its first axis.
 """
 
 from __future__ import annotations
@@ -13,52 +14,71 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import Box, Header, LoadError, Source
 
+AXES = ("z,y,x", "x,y,z")
 
-def _dataset(file: h5py.File, source: Source) -> h5py.Dataset:
+
+def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
+    """The dataset named, or the 3-D datasets of the group named, by name."""
     node = file.get(source.dataset or "/volume")
-    if not isinstance(node, h5py.Dataset) or node.ndim not in (3, 4):
-        found: list[str] = []
-        file.visititems(
-            lambda name, item: (
-                found.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None
-            )
-        )
-        msg = (
-            f"{source.path}: no 3-D or 4-D dataset {source.dataset or '/volume'!r}; the file holds "
-            f"{', '.join(found) or 'none'}. Name one as FILE.h5#/dataset."
-        )
+    if isinstance(node, h5py.Group):
+        inside = [node[name] for name in sorted(node)]
+        found = [item for item in inside if isinstance(item, h5py.Dataset) and item.ndim == 3]
+        if found:
+            return found
+    if isinstance(node, h5py.Dataset) and node.ndim in (3, 4):
+        return [node]
+    held: list[str] = []
+    file.visititems(
+        lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None
+    )
+    msg = (
+        f"{source.path}: no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held) or 'none'}. "
+        "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name."
+    )
+    raise LoadError(msg)
+
+
+def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
+    axes = str(data.attrs.get("axes", AXES[0]))
+    if axes not in AXES:
+        msg = f"{source}: attribute axes is {axes!r}; allowed: {' or '.join(map(repr, AXES))}"
         raise LoadError(msg)
-    return node
+    return axes == AXES[1]
 
 
 def read_hdf5_header(source: Source) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
     with h5py.File(source.path, "r") as file:
-        data = _dataset(file, source)
+        volumes = _volumes(file, source)
+        data = volumes[0]
         if "spacing_mm" not in data.attrs:
             msg = (
-                f"{source}: the dataset lacks the attribute spacing_mm (three lengths in mm, x, y, z); found "
-                f"{sorted(data.attrs)}. Add it, or give spacing_mm in the manifest."
+                f"{source}: {data.name} lacks the attribute spacing_mm (three lengths in mm, x, y, z); found "
+                f"{sorted(data.attrs)}. Add it to every dataset."
             )
             raise LoadError(msg)
-        nz, ny, nx = data.shape[-3:]
+        a, b, c = data.shape[-3:]
         return Header(
             source,
-            (nx, ny, nz),
+            (a, b, c) if _is_xyz(data, source) else (c, b, a),
             np.array(data.attrs["spacing_mm"], float),
             np.array(data.attrs.get("origin_mm", np.zeros(3)), float),
             np.array(data.attrs.get("direction", np.eye(3)), float).reshape(3, 3),
             str(data.dtype),
             (source.path,),
-            item_count=data.shape[0] if data.ndim == 4 else 1,
+            item_count=data.shape[0] if data.ndim == 4 else len(volumes),
         )
 
 
 def read_hdf5(header: Header, box: Box) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z."""
-    (x0, y0, z0), (x1, y1, z1) = box
+    window = tuple(slice(a, b) for a, b in zip(*box, strict=True))
+    item = header.source.item or 0
     with h5py.File(header.source.path, "r") as file:
-        data = _dataset(file, header.source)
-        window = (slice(z0, z1), slice(y0, y1), slice(x0, x1))
-        item = () if data.ndim == 3 else (header.source.item or 0,)
-        return np.asarray(data[(*item, *window)]).T
+        volumes = _volumes(file, header.source)
+        sequence = volumes[0].ndim == 4
+        data = volumes[0] if sequence else volumes[item]
+        leading = (item,) if sequence else ()
+        if _is_xyz(data, header.source):
+            return np.asarray(data[(*leading, *window)])
+        return np.asarray(data[(*leading, *window[::-1])]).T

@@ -66,6 +66,28 @@ def test_an_hdf5_sequence_is_one_header_a_volume(tmp_path: Path) -> None:
     np.testing.assert_array_equal(second.values, (numbered() + 1)[:, 1:3, 2:4])
 
 
+@pytest.mark.parametrize("axes", ["x,y,z", "z,y,x"])
+def test_an_hdf5_group_of_volumes_is_a_sequence_with_either_axis_order(tmp_path: Path, axes: str) -> None:
+    path = tmp_path / "study.h5"
+    with h5py.File(path, "w") as file:
+        for i in range(3):
+            values = numbered() + i
+            data = file.create_dataset(f"frames/{i:03d}", data=values if axes == "x,y,z" else values.T)
+            data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN, axes=axes)
+    header = read_header(Source(path, "/frames"))
+    assert (header.item_count, header.shape) == (3, (5, 7, 9))
+    last = load(_expanded(header)[2], ((0, 1, 2), (5, 3, 4)))
+    np.testing.assert_array_equal(last.values, (numbered() + 2)[:, 1:3, 2:4])
+    np.testing.assert_allclose(last.origin_mm, header.grid.to_mm([0, 1, 2]))
+
+
+def test_an_unknown_axis_order_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "study.h5", "w") as file:
+        file.create_dataset("volume", data=numbered()).attrs.update(spacing_mm=SPACING, axes="y,x,z")
+    with pytest.raises(LoadError, match="allowed: 'z,y,x' or 'x,y,z'"):
+        read_header(tmp_path / "study.h5")
+
+
 def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "study.h5"
     with h5py.File(path, "w") as file:

@@ -63,3 +63,25 @@ def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
     ]
     assert main(["synth", *words]) == 0
     assert main(["check", str(tmp_path / "study" / "manifest.toml")]) == 0
+
+
+@pytest.mark.parametrize("kind", ["nrrd", "nii.gz", "dicom", "h5"])
+def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str) -> None:
+    """An oblique scan, so that a swapped axis or a lost direction would put the entry outside the vessel."""
+    words = [
+        "synth",
+        "oblique",
+        "-o",
+        str(tmp_path / "study"),
+        "--frames",
+        "2",
+        "--size",
+        "64",
+        "--format",
+        kind,
+    ]
+    assert main(words) == 0
+    assert (
+        main(["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"])
+        == 0
+    )
