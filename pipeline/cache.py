@@ -6,6 +6,7 @@ performance settings never enter it, so moving a study or changing -j recomputes
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -35,6 +36,16 @@ def file_hash(path: Path) -> str:
         for item in sorted(p for p in path.rglob("*") if p.is_file()):
             digest.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
         return digest.hexdigest()
+    state = path.stat()
+    return _content_hash(path, state.st_size, state.st_mtime_ns)
+
+
+@functools.cache
+def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
+    """Read a file once a process: the resume check, the stages and every point of a sweep ask for the same gigabyte.
+
+    Size and time only say whether it is still the same file here; the key is its content alone.
+    """
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 

@@ -14,7 +14,7 @@ from skimage.measure import marching_cubes
 from pipeline.case import CaseRun
 from pipeline.frame import Frame
 from pipeline.in_place import record
-from pipeline.model import Lumen, Volume
+from pipeline.model import Lumen, Volume, arc_length
 from pipeline.scans import projections, voxels
 from pipeline.summary import NULLS, skill_of
 from reports import export, frames_file, tables
@@ -60,8 +60,7 @@ def _contact_at(frame: Frame, arc_mm: Any) -> Any:
     """Magnitude of the contact force of the joint nearest to each sample."""
     assert frame.simulated is not None
     force = np.linalg.norm(frame.simulated.contact_force_N, axis=1)
-    steps = np.linalg.norm(np.diff(frame.simulated.joints_mm, axis=0), axis=1)
-    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    arc = arc_length(frame.simulated.joints_mm)
     return force[np.abs(np.asarray(arc_mm)[:, None] - arc[None, :]).argmin(axis=1)]
 
 

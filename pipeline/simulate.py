@@ -17,13 +17,10 @@ from solver import GuideWire, Insertion, VesselWall
 
 
 def _scaled(profile: Profile, factor: float) -> Any:
+    """A profile as the solver takes it, its values times ``factor``."""
     if isinstance(profile, (int, float)):
         return profile * factor
     return np.array(profile, dtype=np.float64) * (1.0, factor)
-
-
-def _profile(profile: Profile) -> Any:
-    return _scaled(profile, 1.0)
 
 
 def guide_wire(wire: Wire, config: SolverConfig, simulate: SimulateConfig) -> GuideWire:
@@ -32,7 +29,7 @@ def guide_wire(wire: Wire, config: SolverConfig, simulate: SimulateConfig) -> Gu
         segment_mm=config.segment_mm,
         radius_mm=wire.radius_mm,
         bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, simulate.bending_scale),
-        rest_curvature_per_mm=_profile(wire.rest_curvature_per_mm),
+        rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),
         torsional_stiffness_N_mm2=wire.torsional_stiffness_N_mm2,
     )
 

@@ -26,7 +26,6 @@ class FrameStatus(Enum):
         "correct the manifest or look for a gap in the trace"
     )
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
-    SCORE_MISSING = "no simulated curve was given for this frame"
 
     @property
     def identifier(self) -> str:

@@ -15,9 +15,6 @@ class Status(Enum):
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
     )
     FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
-    CROSSED_WALL = (
-        "the way on leads through the wall; look for a lumen that is closed or narrower than the wire"
-    )
     FOLDED = (
         "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     )

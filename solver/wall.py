@@ -94,10 +94,3 @@ class VesselWall:
         look_up(self.field, points, jets)
         order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]
         return jets[:, 0], jets[:, 1:4], jets[:, order]
-
-    def beyond_grid(self, points_mm: ArrayLike) -> Array:
-        """How far each point (n, 3) lies outside the grid's voxels (half a voxel beyond their centres), mm."""
-        index = self.distance.to_index(points_mm)
-        last = np.array(self.distance.shape) - 0.5
-        outside = np.maximum(np.maximum(-0.5 - index, index - last), 0.0)
-        return np.asarray(np.linalg.norm(outside * self.distance.spacing_mm, axis=-1))

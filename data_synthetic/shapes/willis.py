@@ -53,7 +53,6 @@ CAROTID = np.array(
         [-12.0, -13.0, 8.6],
     ]
 )
-TERMINUS = CAROTID[-1]
 MIDDLE = np.array(
     [
         [-12.0, -13.0, 8.6],

@@ -9,11 +9,15 @@ from collections.abc import Sequence
 from pipeline.settings import Resolved, Setting, parse_assignment, read_settings, resolve
 
 
-def resolved_settings(args: Namespace, extra: Sequence[Setting] = ()) -> Resolved:
-    """Settings files first, then --set, then ``extra``; raises SettingsError."""
-    settings = [setting for path in args.config for setting in read_settings(path)]
-    settings += [parse_assignment(text) for text in args.settings]
-    return resolve([*settings, *extra])
+def settings_of(args: Namespace) -> list[Setting]:
+    """Settings files first, then --set; raises SettingsError."""
+    read = [setting for path in args.config for setting in read_settings(path)]
+    return read + [parse_assignment(text) for text in args.settings]
+
+
+def resolved_settings(args: Namespace) -> Resolved:
+    """The settings in force; raises SettingsError listing every problem."""
+    return resolve(settings_of(args))
 
 
 def complain(problems: Sequence[str], what: str) -> int:

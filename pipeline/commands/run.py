@@ -17,14 +17,14 @@ from pipeline.batch import run_jobs, shard_of
 from pipeline.cache import default_root, file_hash
 from pipeline.case import STAGES
 from pipeline.check import check
-from pipeline.commands.common import complain, resolved_settings, say
+from pipeline.commands.common import complain, resolved_settings, say, settings_of
 from pipeline.infer import infer_manifest
 from pipeline.junit import write_junit
 from pipeline.load import LoadError
 from pipeline.manifest import Case, Manifest, ManifestError, read_manifest
 from pipeline.provenance import collect
 from pipeline.run_case import Job, finished, job_key
-from pipeline.settings import Resolved, Setting, SettingsError, parse_assignment, read_settings, to_toml
+from pipeline.settings import Resolved, SettingsError, to_toml
 from pipeline.suggest import did_you_mean
 from reports.atomic import write_text
 from reports.html import render_index
@@ -40,7 +40,7 @@ def main(args: Namespace) -> int:
         manifest, assumptions = _manifest(args)
         settings = resolved_settings(args)
         jobs = _jobs(args, manifest, settings)
-        points = sweep.points_of(args.sweep, _settings_of(args))
+        points = sweep.points_of(args.sweep, settings_of(args))
         _guard_out(args, manifest)
     except (ManifestError, SettingsError) as error:
         return complain(error.problems, str(args.manifest))
@@ -109,11 +109,6 @@ def _vector(text: str | None, name: str) -> Any:
         msg = f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"
         raise UsageError(msg)
     return values
-
-
-def _settings_of(args: Namespace) -> list[Setting]:
-    read = [setting for path in args.config for setting in read_settings(path)]
-    return read + [parse_assignment(text) for text in args.settings]
 
 
 def _jobs(args: Namespace, manifest: Manifest, settings: Resolved) -> list[Job]:

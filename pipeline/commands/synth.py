@@ -36,18 +36,14 @@ def _problem(args: Namespace, names: tuple[str, ...]) -> str:
 def _study(args: Namespace) -> Any:
     """The study in memory; its truth is computed here."""
     from data_synthetic import catalogue
-    from data_synthetic.background import background_study
-    from data_synthetic.scenes.from_file import scene_from_file
-    from data_synthetic.study import make_study
 
     wanted = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     given = {k: v for k, v in wanted.items() if v is not None}
     if args.background is not None:
         given.pop("size", None)  # a real scan has its own
-        return background_study(args.background, **given)
-    if args.anatomy is not None:
-        return make_study(scene_from_file(args.anatomy), **given)
-    return catalogue.build(args.name, scanner=args.scanner, **given)
+        return catalogue.from_background(args.background, **given)
+    scene = args.name if args.anatomy is None else catalogue.from_anatomy(args.anatomy)
+    return catalogue.build(scene, scanner=args.scanner, **given)
 
 
 def main(args: Namespace) -> int:

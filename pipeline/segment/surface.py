@@ -27,8 +27,6 @@ LAYERS = 4
 """Layers around the mask in which grey is smoothed: two may still be inside, two more feed the spline."""
 DEEP = 3
 """Mark of the last layer (mask = 1) that may be inside: connectedness is off by up to half a voxel, noise by one."""
-SPLINE_VARIANCE = 1.0 / 3.0
-"""Variance in voxel^2 that reading a lattice as B-spline coefficients adds."""
 
 
 @dataclass(frozen=True, eq=False)
