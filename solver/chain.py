@@ -6,16 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.layout import Chain, Rule, empty_chain, lay_out, tabulate
-from solver._kernels.problem import COUNTERS, Friction, Problem, Scratch, State, Switch
+from solver._kernels.layout import Chain, Cut, Rule, empty_chain, lay_out, tabulate
+from solver._kernels.problem import COUNTERS, REPORT, Friction, Problem, Scratch, State, Switch
 from solver._kernels.spline import Field
 from solver.errors import refuse
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
-
-REPORT = 20
 
 
 def unit(vector: ArrayLike, name: str) -> Array:
@@ -76,6 +74,8 @@ class Buffers:
     """Room for a chain of up to ``capacity`` segments, and the chain of the moment, in state 0."""
 
     problem: Problem
+    cut: Cut
+    force: Array
 
     def __init__(self, wire: GuideWire, wall: VesselWall | None, rule: Rule, switch: Switch) -> None:
         self.wire, self.wall, self.rule, self.switch = wire, wall, rule, switch
@@ -83,7 +83,7 @@ class Buffers:
         self.stiffness = wall.stiffness_N_mm2 if wall is not None else 0.0
         self.friction = wall.friction if wall is not None else 0.0
         self.spacing = float(wall.distance.spacing_mm.min()) if wall is not None else 1.0
-        self.k, self.first_mm, self.capacity = 0, 0.0, 0
+        self.k, self.capacity = 0, 0
         self.counter = np.zeros(COUNTERS, dtype=np.int64)
         self.report = np.zeros(REPORT)
         self.grow(16)
@@ -123,8 +123,10 @@ class Buffers:
             switch=self.switch,
             twisting=self.wire.twists,
         )
-        self.table = np.zeros((capacity + 1, 2))
-        tabulate(self.wire.profile, self.wire.segment_mm, self.table)
+        table = np.zeros((capacity + 1, 2))
+        tabulate(self.wire.profile, self.wire.segment_mm, table)
+        self.cut = Cut(self.wire.profile, self.rule, table, float(self.wire.segment_mm))
+        self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
     @property
@@ -137,23 +139,15 @@ class Buffers:
         """Controls, joints and frames."""
         return self.problem.state
 
+    def reserve(self, depth_mm: float) -> None:
+        """Make sure that there is room for the wire at a depth and one point more."""
+        k, _ = self.wire.segments_at(depth_mm)
+        if k >= self.capacity:
+            self.grow(max(2 * self.capacity, k + 1))
+
     def lay_out(self, depth_mm: float) -> None:
         """Cut the wire at a depth into segments."""
-        k, first = self.wire.segments_at(depth_mm)
-        if k > self.capacity:
-            self.grow(max(2 * self.capacity, k))
-        self.k, self.first_mm = k, first
-        if k:
-            lay_out(self.chain, self.wire.profile, self.rule, self.table, k, first, self.wire.segment_mm)
-
-    @property
-    def points(self) -> int:
-        """Number of look-up points of the current chain."""
-        return int(self.chain.first[self.k + 1])
-
-    def point_arcs(self) -> Array:
-        """Arc length (p,) of each look-up point from the entry, mm."""
-        count = np.diff(self.chain.first[: self.k + 2])
-        node = np.repeat(np.arange(self.k + 1), count)
-        arcs = np.concatenate([[0.0], np.cumsum(self.chain.length[: self.k])])
-        return np.asarray(arcs[node] + self.chain.offset[: self.points, 2])
+        self.reserve(depth_mm)
+        self.k, first = self.wire.segments_at(depth_mm)
+        if self.k:
+            lay_out(self.chain, self.cut, self.k, first)

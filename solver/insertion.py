@@ -12,24 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.follow import follow
-from solver._kernels.forces import copy_state, furthest_outside
-from solver._kernels.passage import free_way
-from solver._kernels.problem import ROLLS, Switch
+from solver._kernels.advance import DEPTH, ENERGY, ROLL, SHRINK, Base, advance
+from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
 from solver.errors import refuse
-from solver.relax import Settings, anchor_friction, buffers_for, relax_buffers, solution_of
+from solver.relax import OUTCOMES, Settings, buffers_for, solution_of
 from solver.solution import Solution
 from solver.status import Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
 Array = NDArray[np.float64]
-
-LAST_GOOD = 2
-"""Where the state before a step is kept."""
-FINAL = (Status.LEFT_GRID, Status.NON_FINITE)
-"""Outcomes that a shorter step cannot help."""
 
 
 class Insertion:
@@ -73,20 +66,38 @@ class Insertion:
         ):
             if not (math.isfinite(value) and value > 0):
                 refuse("insertion", name, value, "a positive number", "leave it out for the default")
-        self.entry = _vector("entry_mm", entry_mm)
-        self.tip_load = _vector("tip_load_N", tip_load_N)
-        self.wire, self.wall, self.initial = wire, wall, initial
-        self.direction = unit(entry_direction, "entry_direction")
-        self.material_axis = material_axis
-        self.step_mm, self.roll_step_deg, self.max_joints = step_mm, roll_step_deg, max_joints
+        self.wire, self.wall, self.max_joints = wire, wall, max_joints
         self.buffers = buffers_for(wire, wall, self.settings)
-        self.depth_mm, self.roll_deg = 0.0, 0.0
-        self._rise = max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing)
-        self._shrink, self._energy, self._started = 1.0, 0.0, False
-        self.buffers.state.x[:, 0] = self.entry
-        self._base_roll, self._base_frame = 0.0, base_frame(self.direction, material_axis, 0.0)
-        self.buffers.state.r[:, 0] = self._base_frame
+        self.orders = self.settings.orders
+        direction = unit(entry_direction, "entry_direction")
+        round_hull = wall is None or wall.samples == 0
+        self.base = Base(
+            entry=_vector("entry_mm", entry_mm),
+            frame=np.ascontiguousarray(base_frame(direction, material_axis, 0.0)),
+            load=_vector("tip_load_N", tip_load_N),
+            translate=initial == "translate",
+            idle_roll=wire.straight and round_hull and self.settings.switch.roll,
+            step=float(step_mm),
+            turn=float(roll_step_deg),
+            rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),
+            margin=float(wire.radius_mm),
+        )
+        self.at = np.zeros(4)
+        self.at[SHRINK] = 1.0
+        self.buffers.state.x[0, 0] = self.base.entry
+        self.buffers.state.r[0, 0] = self.base.frame
+        self._started = False
         self._outside = wall is not None and self._entry_is_outside(wall)
+
+    @property
+    def depth_mm(self) -> float:
+        """Where the tip is, mm of wire beyond the entry."""
+        return float(self.at[DEPTH])
+
+    @property
+    def roll_deg(self) -> float:
+        """Where the base is turned to."""
+        return float(self.at[ROLL])
 
     def to_depths(
         self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0
@@ -112,39 +123,25 @@ class Insertion:
 
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
-        self.buffers.counter[:] = 0
+        b = self.buffers
+        b.counter[:] = 0
         if not self._started:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
-            self.roll_deg, self._started = roll, True
-        status, iterations, shrink = self._refusal(depth), 0, self._shrink
-        budget = self._budget(depth - self.depth_mm, roll - self.roll_deg)
-        while status is Status.CONVERGED:
-            if self._roll_is_idle and self.roll_deg != roll:
-                self.roll_deg = roll
-                self.buffers.counter[ROLLS] += 1
-            ahead, turn = depth - self.depth_mm, roll - self.roll_deg
-            if abs(ahead) < tol.MATCH_DEPTH_MM and turn == 0.0:
-                break
-            outcome, used = self._try(ahead, turn, min(1.0, shrink * self._allowed(ahead, turn)))
-            iterations += used
-            if iterations > budget:
-                status = Status.MAX_ITERATIONS
-            elif outcome is Status.CONVERGED:
-                shrink = min(1.0, 2 * shrink)
-            elif shrink > tol.SMALLEST_STEP and outcome not in FINAL:
-                shrink *= 0.5
-            else:
-                status = outcome
-        self._shrink = max(shrink, 8 * tol.SMALLEST_STEP)
-        return solution_of(self.buffers, status, iterations, self._energy, self.depth_mm, self.roll_deg)
+            self.at[ROLL], self._started = roll, True
+        status, iterations = self._refusal(depth), 0
+        if status is Status.CONVERGED:
+            b.reserve(depth)
+            goal = np.array([depth, roll, self._budget(depth - self.at[DEPTH], roll - self.at[ROLL])])
+            result = advance(b.problem, b.cut, self.base, self.orders, self.at, goal, b.report, b.force)
+            status, iterations = OUTCOMES[result[0]], result[1]
+            b.k = self.wire.segments_at(self.at[DEPTH])[0]
+        energy, depth, roll = float(self.at[ENERGY]), float(self.at[DEPTH]), float(self.at[ROLL])
+        return solution_of(b, status, iterations, energy, depth, roll)
 
     def _budget(self, ahead: float, turn: float) -> float:
         """Iterations that one depth may spend: a cap on the time that a hopeless scene can take."""
-        steps = abs(ahead) / self.step_mm + abs(turn) / self.roll_step_deg
-        each = self.settings.max_iterations
-        if self.settings.method == "closed_form":
-            each *= tol.SWEEPS_PER_ITERATION
-        return each * (tol.BUDGET_STEPS + 4 * steps)
+        steps = abs(ahead) / self.base.step + abs(turn) / self.base.turn
+        return self.orders.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
 
     def _refusal(self, depth: float) -> Status:
         """A status for depths that need not be tried."""
@@ -152,98 +149,10 @@ class Insertion:
             return Status.TOO_LONG
         return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
 
-    @property
-    def _roll_is_idle(self) -> bool:
-        """Rolling a straight wire with one bending stiffness and a round hull changes nothing."""
-        round_hull = self.wall is None or self.wall.samples == 0
-        return self.wire.straight and round_hull and self.settings.switch.roll
-
     def _entry_is_outside(self, wall: VesselWall) -> bool:
         """Whether the entry point lies more than a voxel outside the lumen."""
         diagonal = float(np.linalg.norm(wall.distance.spacing_mm))
-        return bool(wall.look_up(self.entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)
-
-    def _allowed(self, ahead: float, turn: float) -> float:
-        """Fraction of the way that one step may take: step_mm, roll_step_deg, and what the tip can see."""
-        fraction = 1.0
-        if turn:
-            fraction = min(fraction, self.roll_step_deg / abs(turn))
-        if ahead:
-            step = min(self.step_mm, abs(ahead))
-            b = self.buffers
-            if ahead > 0 and b.stiffness:
-                tip, along = b.state.x[0, b.k], b.state.r[0, b.k, :, 2]
-                step = free_way(b.field, tip, along, step, b.spacing, self._rise, b.problem.scratch.weights)
-            fraction = min(fraction, step / abs(ahead))
-        return fraction
-
-    def _try(self, ahead: float, turn: float, fraction: float) -> tuple[Status, int]:
-        """Take a step; on failure put everything back. Returns its status and iterations."""
-        b = self.buffers
-        copy_state(b.problem, 0, LAST_GOOD, b.k)
-        report, kept = b.report.copy(), b.k
-        depth, roll = self.depth_mm + fraction * ahead, self.roll_deg + fraction * turn
-        if fraction == 1.0:
-            depth, roll = self.depth_mm + ahead, self.roll_deg + turn
-        status, iterations, energy = self._relax_at(depth, roll)
-        if status is Status.CONVERGED and b.stiffness:
-            beyond = furthest_outside(b.field, b.state.x[0], b.k)
-            status = Status.LEFT_GRID if beyond > self.wire.radius_mm else status
-        if status is Status.CONVERGED:
-            self.depth_mm, self.roll_deg, self._energy = depth, roll, energy
-        else:
-            b.lay_out(self.depth_mm)
-            copy_state(b.problem, LAST_GOOD, 0, kept)
-            b.report[:] = report
-        return status, iterations
-
-    def _relax_at(self, depth: float, roll: float) -> tuple[Status, int, float]:
-        """Lay the wire along its own curve at a new depth and roll, and relax it there."""
-        b = self.buffers
-        before = b.state.x[0, : b.k + 1].copy()
-        curve, was = self._curve(before, depth - self.depth_mm), b.k
-        b.lay_out(depth)
-        b.state.r[:, 0] = self._base(roll)
-        b.state.x[:, 0] = self.entry
-        if b.k == 0:
-            b.report[:], b.state.parts[:] = 0.0, 0.0
-            return Status.CONVERGED, 0, 0.0
-        if b.problem.twisting:
-            self._keep_twist(was)
-        b.chain.load[: b.k] = 0.0
-        b.chain.load[b.k] = self.tip_load
-        follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
-        anchor_friction(b, before, depth - self.depth_mm)
-        return relax_buffers(b, self.settings)
-
-    def _base(self, roll: float) -> Array:
-        """The base frame at a roll, computed once as long as the roll stays."""
-        if roll != self._base_roll:
-            self._base_roll, self._base_frame = roll, base_frame(self.direction, self.material_axis, roll)
-        return self._base_frame
-
-    def _keep_twist(self, was: int) -> None:
-        """Twist stays with the material, which is counted from the tip."""
-        b = self.buffers
-        twist = b.state.u[0, :was, 2].copy()
-        b.state.u[0, : b.k, 2] = 0.0
-        common = min(was, b.k)
-        if common:
-            b.state.u[0, b.k - common : b.k, 2] = twist[was - common :]
-
-    def _curve(self, joints: Array, ahead: float) -> Array:
-        """The polyline that the wire is laid along before it relaxes."""
-        if len(joints) == 1:
-            return np.array([self.entry, self.entry + self.direction])
-        if self.initial == "slide" or ahead == 0.0:
-            return joints
-        moved = joints + ahead * self.direction
-        kept = moved if ahead > 0 else moved[self.wire.arcs_at(self.depth_mm) > -ahead]
-        return (
-            np.vstack([self.entry, kept])
-            if len(kept)
-            else np.array([self.entry, self.entry + self.direction])
-        )
+        return bool(wall.look_up(self.base.entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)
 
 
 def _vector(name: str, value: ArrayLike) -> Array:

@@ -9,23 +9,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.closed_form import minimise_closed_form
-from solver._kernels.energy import lag_friction, point_at, total_energy
+from solver._kernels.advance import settle_once
 from solver._kernels.follow import follow
-from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Rule
-from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED, minimise
+from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
 from solver._kernels.problem import (
     CHEAP,
     CLEAR,
+    DEEPEST,
     FULL,
     IDLE,
     LEVENBERG,
+    PUSH,
     ROLLOUTS,
     ROLLS,
+    START,
     SWEEPS,
     Switch,
 )
+from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
 from solver.grid import read_only
@@ -41,6 +43,9 @@ OUTCOMES = {
     EXHAUSTED: Status.MAX_ITERATIONS,
     STALLED: Status.STALLED,
     BROKEN: Status.NON_FINITE,
+    UNSETTLED: Status.FRICTION,
+    FOLDED: Status.FOLDED,
+    LEFT_GRID: Status.LEFT_GRID,
 }
 METHODS = ("newton", "closed_form")
 QUADRATURES = ("tip", "joints", "segments")
@@ -76,6 +81,13 @@ class Settings:
         if self.max_iterations < 1:
             refuse("solver", "max_iterations", self.max_iterations, "1 or more", "200 is the default")
 
+    @property
+    def orders(self) -> Orders:
+        """The same for the kernels."""
+        closed = self.method == "closed_form"
+        sweeps = tol.SWEEPS_PER_ITERATION if closed else 1
+        return Orders(closed, float(self.tolerance), int(self.max_iterations * sweeps))
+
 
 def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> Rule:
     """Where a wire's segments look the wall up.
@@ -108,57 +120,9 @@ def buffers_for(wire: GuideWire, wall: VesselWall | None, settings: Settings) ->
 
 
 def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
-    """Relax the current state of a work space in place; return status, iterations and energy.
-
-    With friction the contact loads are taken from the last relaxation until they settle.
-    """
-    if not b.friction:
-        status, iterations, energy = minimised(b, settings)
-    else:
-        iterations = 0
-        b.problem.friction.load[:] = 0.0
-        total_energy(b.problem, 0, b.k)
-        lag_friction(b.problem, 0, b.k)
-        for _ in range(tol.FRICTION_ROUNDS):
-            status, more, energy = minimised(b, settings)
-            iterations += more
-            if status is not Status.CONVERGED:
-                break
-            if lag_friction(b.problem, 0, b.k) < tol.FRICTION_CHANGE:
-                break
-        else:
-            status = Status.FRICTION
-    if status is Status.CONVERGED and least_turn_cosine(b.state.r[0], b.k) < tol.FOLD_COSINE:
-        status = Status.FOLDED
-    return status, iterations, energy
-
-
-def minimised(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
-    """One run of the loop; the result is moved to state 0."""
-    if settings.method == "closed_form":
-        sweeps = settings.max_iterations * tol.SWEEPS_PER_ITERATION
-        result = minimise_closed_form(b.problem, 0, b.k, settings.tolerance, sweeps, b.report)
-    else:
-        result = minimise(b.problem, 0, b.k, settings.tolerance, settings.max_iterations, b.report)
-    outcome, iterations, which, energy = result
-    if which == 1:
-        copy_state(b.problem, 1, 0, b.k)
-    return OUTCOMES[outcome], iterations, energy
-
-
-def anchor_friction(b: Buffers, curve: Array, ahead: float) -> None:
-    """Note where each look-up point was before the step: its material was ``ahead`` mm further back.
-
-    curve : (m, 3) the wire before the step, which continues straight back into the introducer.
-    """
-    if not b.friction or not b.k:
-        return
-    arcs = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    at = b.point_arcs() - ahead
-    start = b.problem.friction.start
-    direction = b.state.r[0, 0, :, 2]
-    for a in range(3):
-        start[: b.points, a] = np.interp(at, arcs, curve[:, a]) + np.minimum(at, 0.0) * direction[a]
+    """Relax the current state of a work space in place; return status, iterations and energy, N mm."""
+    result = settle_once(b.problem, b.cut, b.k, settings.orders, b.report, b.force)
+    return OUTCOMES[result[0]], result[1], result[2]
 
 
 def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, float]:
@@ -184,9 +148,6 @@ def solution_of(
 ) -> Solution:
     """Dress the current state of a work space."""
     n = b.k + 1
-    force = np.zeros((n, 3))
-    deepest = contact_forces(b.problem, b.k, force) if b.stiffness and b.k else 0.0
-    push = push_force(b.problem, b.wire.profile, b.k, max(len(b.rule.hull), 1), b.report) if b.k else 0.0
     parts = b.state.parts[0]
     return Solution(
         joints_mm=read_only(b.state.x[0, :n].copy()),
@@ -197,14 +158,14 @@ def solution_of(
         friction_energy_N_mm=float(parts[3]),
         status=status,
         iterations=iterations,
-        contact_force_N=read_only(force),
+        contact_force_N=read_only(b.force[:n].copy()),
         reaction_force_N=read_only(b.report[6:9].copy()),
         reaction_torque_N_mm=float(b.report[11]),
-        push_force_N=push,
-        max_penetration_mm=deepest,
+        push_force_N=float(b.report[PUSH]),
+        max_penetration_mm=float(b.report[DEEPEST]),
         depth_mm=depth,
         roll_deg=roll,
-        work=work_of(b.counter, float(b.report[18])),
+        work=work_of(b.counter, float(b.report[START])),
     )
 
 
@@ -250,18 +211,8 @@ def relax(
     b.state.x[:, 0] = entry
     b.state.r[:, 0] = base_frame(direction, material_axis, roll_deg)
     follow(curve, len(curve), b.chain, b.state.u[0], b.state.x[0], b.state.r[0], b.k)
-    hold_friction(b)
     status, iterations, energy = relax_buffers(b, settings)
     return solution_of(b, status, iterations, energy, depth_mm, roll_deg)
-
-
-def hold_friction(b: Buffers) -> None:
-    """Friction holds every look-up point where it is now."""
-    if not b.friction or not b.k:
-        return
-    for node in range(1, b.k + 1):
-        for point in range(b.chain.first[node], b.chain.first[node + 1]):
-            point_at(b.problem, 0, node, point, b.problem.friction.start[point])
 
 
 def set_loads(b: Buffers, load_N: ArrayLike | None) -> None:

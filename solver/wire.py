@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.layout import Profile
+from solver._kernels.layout import Profile, segments_at
 from solver.errors import refuse
 from solver.grid import read_only
 
@@ -98,10 +98,8 @@ class GuideWire:
 
     def segments_at(self, depth_mm: float) -> tuple[int, float]:
         """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
-        if depth_mm <= 0.0:
-            return 0, 0.0
-        whole = max(math.floor(depth_mm / self.segment_mm - 0.5 + 1e-12), 0)
-        return whole + 1, depth_mm - whole * self.segment_mm
+        count, first = segments_at(float(depth_mm), float(self.segment_mm))
+        return int(count), float(first)
 
     def arcs_at(self, depth_mm: float) -> Any:
         """Arc lengths (k + 1,) of the joints from the entry, mm, at a depth."""

@@ -40,6 +40,15 @@ class Rule(NamedTuple):
     zone: int
 
 
+class Cut(NamedTuple):
+    """What a wire is cut from at any depth. table : see ``tabulate``.     segment : length of one, mm."""
+
+    profile: Profile
+    rule: Rule
+    table: Any
+    segment: float
+
+
 class Chain(NamedTuple):
     """A wire of k segments; arrays may be longer than k.
 
@@ -108,10 +117,18 @@ def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
 
 
 @kernel
-def lay_out(
-    chain: Chain, profile: Profile, rule: Rule, table: Any, k: int, first_mm: float, segment_mm: float
-) -> int:
+def segments_at(depth_mm: float, segment_mm: float) -> tuple[int, float]:
+    """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
+    if depth_mm <= 0.0:
+        return 0, 0.0
+    whole = max(math.floor(depth_mm / segment_mm - 0.5 + 1e-12), 0)
+    return whole + 1, depth_mm - whole * segment_mm
+
+
+@kernel
+def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
     """Fill a chain of k segments whose first one is ``first_mm`` long; return the number of look-up points."""
+    profile, table, segment_mm = cut.profile, cut.table, cut.segment
     depth = first_mm + (k - 1) * segment_mm
     own = np.empty(2)
     for j in range(k):
@@ -129,7 +146,7 @@ def lay_out(
         chain.bend[j] = 1.0 / own[0]
         chain.rest[j] = own[1]
         chain.twist[j] = profile.twist / (outer - inner)
-    return place_points(chain, rule, k)
+    return place_points(chain, cut.rule, k)
 
 
 @kernel

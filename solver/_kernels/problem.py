@@ -12,6 +12,9 @@ FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS = range(8)
 COUNTERS = 8
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
+# places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``
+START, DEEPEST, PUSH = 18, 20, 21
+REPORT = 22
 
 
 class State(NamedTuple):

@@ -1,0 +1,242 @@
+"""The way to a depth: steps of the base, each laid along the wire's own curve, relaxed, and taken back if it fails.
+
+One compiled loop, because a step costs a few microseconds per joint and entering a kernel costs ten.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver import _tolerances as tol
+from solver._kernels.energy import point_at
+from solver._kernels.flags import kernel
+from solver._kernels.follow import follow
+from solver._kernels.forces import copy_state, furthest_outside
+from solver._kernels.layout import Cut, lay_out, segments_at
+from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED
+from solver._kernels.passage import free_way
+from solver._kernels.problem import ROLLS, Problem
+from solver._kernels.settle import LEFT_GRID, Orders, measure, settle
+
+# what an insertion remembers between depths
+DEPTH, ROLL, ENERGY, SHRINK = range(4)
+NOW, TRIAL, LAST_GOOD = range(3)
+"""States: where the wire is, work space, and where it was before the step."""
+
+SMALLEST = tol.SMALLEST_STEP
+MATCH = tol.MATCH_DEPTH_MM
+
+
+class Base(NamedTuple):
+    """The introducer and how far one step may go.
+
+    entry : (3,) mm.     frame : (3, 3) at roll 0, columns are material axes 1, 2 and the direction.
+    load : (3,) dead force on the tip, N.     translate : the seed's start shape instead of sliding.
+    idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : see ``free_way``.
+    margin : how far a joint may leave the grid, mm.
+    """
+
+    entry: Any
+    frame: Any
+    load: Any
+    translate: bool
+    idle_roll: bool
+    step: float
+    turn: float
+    rise: float
+    margin: float
+
+
+@kernel
+def advance(
+    problem: Problem, cut: Cut, base: Base, orders: Orders, at: Any, goal: Any, report: Any, force: Any
+) -> tuple[int, int]:
+    """Step until the goal is reached or no step succeeds; return the outcome and the iterations spent.
+
+    at : (4,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, updated.     goal : (3,) depth, roll and the iterations allowed.
+    """
+    outcome, iterations, shrink = CONVERGED, 0, at[SHRINK]
+    while True:
+        if base.idle_roll and at[ROLL] != goal[ROLL]:
+            at[ROLL] = goal[ROLL]
+            problem.scratch.counter[ROLLS] += 1
+        ahead, turn = goal[DEPTH] - at[DEPTH], goal[ROLL] - at[ROLL]
+        if abs(ahead) < MATCH and turn == 0.0:
+            break
+        fraction = min(1.0, shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
+        outcome, used = attempt(problem, cut, base, orders, at, ahead, turn, fraction, report)
+        iterations += used
+        if iterations > goal[2]:
+            outcome = EXHAUSTED
+            break
+        if outcome == CONVERGED:
+            shrink = min(1.0, 2 * shrink)
+        elif shrink > SMALLEST and outcome != LEFT_GRID and outcome != BROKEN:
+            shrink *= 0.5
+        else:
+            # outside the grid or without a finite energy a shorter step does not help either
+            break
+    at[SHRINK] = max(shrink, 8 * SMALLEST)
+    k, _ = segments_at(at[DEPTH], cut.segment)
+    measure(problem, cut.profile, k, max(cut.rule.hull.shape[0], 1), report, force)
+    return outcome, iterations
+
+
+@kernel
+def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, turn: float) -> float:
+    """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
+    fraction = 1.0
+    if turn != 0.0:
+        fraction = min(fraction, base.turn / abs(turn))
+    if ahead != 0.0:
+        step = min(base.step, abs(ahead))
+        if ahead > 0.0 and problem.stiffness > 0.0:
+            k, _ = segments_at(depth, cut.segment)
+            tip, along, weights = (
+                problem.state.x[NOW, k],
+                problem.state.r[NOW, k, :, 2],
+                problem.scratch.weights,
+            )
+            step = free_way(problem.field, tip, along, step, problem.spacing, base.rise, weights)
+        fraction = min(fraction, step / abs(ahead))
+    return fraction
+
+
+@kernel
+def attempt(
+    problem: Problem, cut: Cut, base: Base, orders: Orders, at: Any, ahead: float, turn: float, fraction: float,
+    report: Any,
+) -> tuple[int, int]:  # fmt: skip
+    """Take a fraction of the way; on failure put everything back. Returns the outcome and the iterations."""
+    now = 0 * orders.max_iterations + NOW
+    was, _ = segments_at(at[DEPTH], cut.segment)
+    copy_state(problem, now, LAST_GOOD, was)
+    kept = report.copy()
+    depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
+    k, first = segments_at(depth, cut.segment)
+    outcome, iterations, energy = CONVERGED, 0, 0.0
+    clamp(problem, base, roll)
+    if k == 0:
+        report[:] = 0.0
+        problem.state.parts[:] = 0.0
+    else:
+        lay_along(problem, cut, base, was, k, first, fraction * ahead)
+        outcome, iterations, energy = settle(problem, now, k, orders, report)
+        walled = outcome == CONVERGED and problem.stiffness > 0.0
+        if walled and furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin:
+            outcome = LEFT_GRID
+    if outcome == CONVERGED:
+        at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
+        return outcome, iterations
+    _, first = segments_at(at[DEPTH], cut.segment)
+    if was > 0:
+        lay_out(problem.chain, cut, was, first)
+    copy_state(problem, LAST_GOOD, now, was)
+    report[:] = kept
+    return outcome, iterations
+
+
+@kernel
+def clamp(problem: Problem, base: Base, roll: float) -> None:
+    """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
+    angle = math.radians(roll)
+    c, s = math.cos(angle), math.sin(angle)
+    x, r = problem.state.x[NOW], problem.state.r[NOW]
+    for a in range(3):
+        one, two = base.frame[a, 0], base.frame[a, 1]
+        x[0, a] = base.entry[a]
+        r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, base.frame[a, 2]
+
+
+@kernel
+def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: float, ahead: float) -> None:
+    """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
+    chain, state = problem.chain, problem.state
+    before = chain.length[0]
+    lay_out(chain, cut, k, first)
+    if problem.twisting:
+        keep_twist(state.u, was, k)
+    chain.load[:k] = 0.0
+    chain.load[k] = base.load
+    source, count = LAST_GOOD, was + 1
+    if was == 0:
+        source, count = TRIAL, begin(base, state.x[TRIAL])
+    elif base.translate and ahead != 0.0:
+        source, count = TRIAL, moved(base, cut, state.x, was, before, ahead)
+    follow(state.x[source], count, chain, state.u[NOW], state.x[NOW], state.r[NOW], k)
+    if problem.friction.coefficient > 0.0:
+        anchor_friction(problem, state.x[LAST_GOOD], was, k, ahead)
+
+
+@kernel
+def begin(base: Base, curve: Any) -> int:
+    """Straight on from the entry, as two points."""
+    for a in range(3):
+        curve[0, a] = base.entry[a]
+        curve[1, a] = base.entry[a] + base.frame[a, 2]
+    return 2
+
+
+@kernel
+def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) -> int:
+    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
+    curve, count = x[TRIAL], begin(base, x[TRIAL]) - 1
+    for n in range(was + 1):
+        arc = first + (n - 1) * cut.segment if n > 0 else 0.0
+        if ahead > 0.0 or arc > -ahead:
+            for a in range(3):
+                curve[count, a] = x[LAST_GOOD, n, a] + ahead * base.frame[a, 2]
+            count += 1
+    return max(count, 2)
+
+
+@kernel
+def keep_twist(u: Any, was: int, k: int) -> None:
+    """Twist stays with the material, which is counted from the tip."""
+    common = min(was, k)
+    for j in range(k):
+        u[NOW, j, 2] = u[LAST_GOOD, was - k + j, 2] if j >= k - common else 0.0
+
+
+@kernel
+def anchor_friction(problem: Problem, curve: Any, was: int, k: int, ahead: float) -> None:
+    """Note where each look-up point was before the step: its material was ``ahead`` mm further back.
+
+    curve : (was + 1, 3), the wire before the step, which continues straight back into the introducer.
+    """
+    chain, start, back = problem.chain, problem.friction.start, problem.state.r[NOW, 0, :, 2]
+    arcs = np.zeros(was + 1)
+    for n in range(was):
+        square = 0.0
+        for a in range(3):
+            square += (curve[n + 1, a] - curve[n, a]) ** 2
+        arcs[n + 1] = arcs[n] + math.sqrt(square)
+    arc = 0.0
+    for n in range(1, k + 1):
+        arc += chain.length[n - 1]
+        for p in range(chain.first[n], chain.first[n + 1]):
+            s = arc + chain.offset[p, 2] - ahead
+            m = min(max(np.searchsorted(arcs, s, side="right") - 1, 0), max(was - 1, 0))
+            span = arcs[m + 1] - arcs[m] if was > 0 else 0.0
+            t = min(max((s - arcs[m]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+            for a in range(3):
+                along = t * (curve[m + 1, a] - curve[m, a]) if was > 0 else 0.0
+                start[p, a] = curve[m, a] + along + min(s, 0.0) * back[a]
+
+
+@kernel
+def settle_once(
+    problem: Problem, cut: Cut, k: int, orders: Orders, report: Any, force: Any
+) -> tuple[int, int, float]:
+    """One relaxation of state 0 and its forces; friction holds every look-up point where it is now."""
+    now = 0 * k + NOW
+    if problem.friction.coefficient > 0.0:
+        for n in range(1, k + 1):
+            for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
+                point_at(problem, now, n, p, problem.friction.start[p])
+    outcome, iterations, energy = settle(problem, now, k, orders, report)
+    measure(problem, cut.profile, k, max(cut.rule.hull.shape[0], 1), report, force)
+    return outcome, iterations, energy

@@ -1,0 +1,87 @@
+"""One relaxation to its end: the chosen method, friction's rounds around it, and what the result is worth."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from solver import _tolerances as tol
+from solver._kernels.closed_form import minimise_closed_form
+from solver._kernels.energy import lag_friction, total_energy
+from solver._kernels.flags import kernel
+from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
+from solver._kernels.layout import Profile
+from solver._kernels.minimise import BROKEN, CONVERGED, minimise
+from solver._kernels.problem import DEEPEST, PUSH, Problem
+
+# how a relaxation ends, beyond the ways of ``minimise``
+UNSETTLED, FOLDED, LEFT_GRID = range(BROKEN + 1, BROKEN + 4)
+
+ROUNDS = tol.FRICTION_ROUNDS
+CHANGE = tol.FRICTION_CHANGE
+FOLD = tol.FOLD_COSINE
+
+
+class Orders(NamedTuple):
+    """How to relax. max_iterations : of Newton, or sweeps of the closed form."""
+
+    closed_form: bool
+    tolerance: float
+    max_iterations: int
+
+
+@kernel
+def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
+    """Relax state ``which`` in place; return the outcome, iterations and the energy, N mm.
+
+    With friction the contact loads are taken from the last relaxation until they settle.
+    """
+    if problem.friction.coefficient == 0.0:
+        outcome, iterations, energy = minimised(problem, which, k, orders, report)
+    else:
+        outcome, iterations, energy = rubbed(problem, which, k, orders, report)
+    if outcome == CONVERGED and least_turn_cosine(problem.state.r[which], k) < FOLD:
+        outcome = FOLDED
+    return outcome, iterations, energy
+
+
+@kernel
+def minimised(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
+    """One run of the loop; the result is moved to state ``which``."""
+    if orders.closed_form:
+        result = minimise_closed_form(problem, which, k, orders.tolerance, orders.max_iterations, report)
+    else:
+        result = minimise(problem, which, k, orders.tolerance, orders.max_iterations, report)
+    outcome, iterations, ended, energy = result
+    if ended != which:
+        copy_state(problem, ended, which, k)
+    return outcome, iterations, energy
+
+
+@kernel
+def rubbed(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
+    """Runs of the loop until the contact loads, and so the friction, settle."""
+    outcome, iterations, energy = UNSETTLED, 0, 0.0
+    problem.friction.load[:] = 0.0
+    total_energy(problem, which, k)
+    lag_friction(problem, which, k)
+    for _ in range(ROUNDS):
+        ended, more, energy = minimised(problem, which, k, orders, report)
+        iterations += more
+        if ended != CONVERGED:
+            return ended, iterations, energy
+        if lag_friction(problem, which, k) < CHANGE:
+            outcome = CONVERGED
+            break
+    return outcome, iterations, energy
+
+
+@kernel
+def measure(problem: Problem, profile: Profile, k: int, hulls: int, report: Any, force: Any) -> None:
+    """Forces of the wire at rest in state 0: force (capacity + 1, 3) N per joint; deepest contact and push force."""
+    force[: k + 1] = 0.0
+    report[DEEPEST] = report[PUSH] = 0.0
+    if k == 0:
+        return
+    if problem.stiffness > 0.0:
+        report[DEEPEST] = contact_forces(problem, k, force)
+    report[PUSH] = push_force(problem, profile, k, hulls, report)
