@@ -17,7 +17,7 @@ from pipeline.model import Lumen
 from pipeline.own_input.centreline import RAS_TO_LPS, Branches, read_markups_branches, read_swc
 from pipeline.own_input.polydata import Shapes, read_stl, read_vtp
 from pipeline.segment.affinity import Levels
-from pipeline.segment.surface import signed_distance
+from pipeline.segment.surface import prepare, signed_distance
 from solver.grid import Grid
 
 VOXEL_MM = 0.3
@@ -81,7 +81,7 @@ def lumen_from_surface(shapes: Shapes, path: Path, config: SegmentConfig) -> Lum
     feet, normal, flat = foot[: len(voxels)], np.zeros((len(voxels), 3)), np.zeros(len(voxels))
     propagate(owner, inside, spacing, voxels, feet, config.outer_mm)
     distance = owner.view(np.float32)
-    distances(owner, inside, spacing, feet, normal, flat, config.outer_mm, distance)
+    distances(owner, inside, spacing, feet, normal, flat, config.outer_mm, 0, distance)
     return _lumen(
         grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)"
     )
@@ -97,10 +97,10 @@ def lumen_from_labels(path: Path, config: SegmentConfig) -> Lumen:
         msg = f"{path}: got {len(order)} labelled voxels; expected {allowed}; check the label map"
         raise LoadError(msg)
     binary = grid.with_values((grid.values != 0).astype(np.uint8))
-    distance, _ = signed_distance(
-        binary, order, Levels(1.0, 0.0, 0.0), LABEL_TAPS, config.margin_mm, config.outer_mm
-    )
-    return _lumen(reorder(distance, axes), "the lumen is the given label map, its staircase smoothed")
+    site = prepare(binary, order, LABEL_TAPS, config.margin_mm)
+    values, _ = signed_distance(site, Levels(1.0, 0.0, 0.0), config.outer_mm)
+    distance = reorder(site.grid.with_values(values), axes)
+    return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 
 
 def read_lumen(path: Path, case: Any = None, config: Any = None) -> Lumen:

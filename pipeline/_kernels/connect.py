@@ -1,8 +1,8 @@
 """Fuzzy connectedness: strength of a voxel = the best path from a seed, a path being as strong as its weakest link.
 
-Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246. The grey values are smoothed and quantised
-only at voxels that are reached (``levels`` is 0 where nothing was read), so cost follows the object, not the volume:
-both arrays that hold state come from ``np.zeros``, whose untouched pages cost nothing.
+Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246. Grey values are smoothed and quantised in tiles of
+8^3 voxels as the search comes to them, and all state lives in those tiles: cost and memory follow the object, not the
+volume. A cell is a voxel's place in the pool of tiles: tile * CELLS + place within the tile.
 """
 
 from __future__ import annotations
@@ -13,77 +13,103 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-LEVELS = 1024
-"""Grey steps of the affinity tables; 256 to 1024 change fewer than ten voxels of a vessel tree."""
+from pipeline._kernels.tiles import CELLS, INNER, LEVELS, SEEN, SHIFT, SIDE, grown, open_tile, scratch
+
 FULL = 255
 """Quantised strength of a seed: strengths are 0 to 255."""
+OUTSIDE = ~INNER
+"""Bits that an index within a tile never has; one step out of it, either way, sets some."""
+GREY = LEVELS - 1
+"""Bits of a cell that hold its grey level."""
 
 
 @njit(cache=True, inline="always")
-def _clamped(i: int, n: int) -> int:
-    return 0 if i < 0 else (n - 1 if i >= n else i)
+def _cell(slot: int, x: int, y: int, z: int) -> int:
+    """The cell in the tile at position ``slot`` - 1 of a voxel with these indices, of which the last bits count."""
+    return (slot - 1) * CELLS + (((x & INNER) << (2 * SHIFT)) | ((y & INNER) << SHIFT) | (z & INNER))
 
 
 @njit(cache=True)
-def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -> float:
-    """The separable kernel ``taps`` (2r+1) applied at one voxel; the border voxel is repeated outside."""
-    reach = taps.shape[0] // 2
-    ni, nj, nk = volume.shape
-    total = 0.0
-    for a in range(-reach, reach + 1):
-        ia = _clamped(i + a, ni)
-        plane = 0.0
-        for b in range(-reach, reach + 1):
-            jb = _clamped(j + b, nj)
-            row = 0.0
-            for c in range(-reach, reach + 1):
-                row += taps[c + reach] * volume[ia, jb, _clamped(k + c, nk)]
-            plane += taps[b + reach] * row
-        total += taps[a + reach] * plane
-    return total
+def _steps(offsets: NDArray[Any]) -> NDArray[Any]:
+    """From a cell to its neighbours in the same tile."""
+    out = np.empty(offsets.shape[0], np.int64)
+    for m in range(offsets.shape[0]):
+        out[m] = (offsets[m, 0] * SIDE + offsets[m, 1]) * SIDE + offsets[m, 2]
+    return out
 
 
 @njit(cache=True)
-def _level(
+def _append_tile(
     volume: NDArray[Any],
-    levels: NDArray[Any],
     taps: NDArray[Any],
     low: float,
     scale: float,
-    i: int,
-    j: int,
-    k: int,
+    table: NDArray[Any],
+    at: tuple[int, int, int],
+    work: NDArray[Any],
+    pool: NDArray[Any],
+    tiles: NDArray[Any],
+    used: int,
 ) -> int:
-    """Quantised grey 0..LEVELS-1 of one voxel, read from the volume the first time only."""
-    known = levels[i, j, k]
-    if known:
-        return int(known) - 1
-    value = smoothed(volume, taps, i, j, k) if taps.shape[0] > 1 else float(volume[i, j, k])
-    step = int((value - low) * scale + 0.5) if value > low else 0
-    step = min(step, LEVELS - 1)
-    levels[i, j, k] = step + 1
-    return step
-
-
-@njit(cache=True)
-def _grown(array: NDArray[Any]) -> NDArray[Any]:
-    larger = np.empty(2 * array.shape[0], array.dtype)
-    larger[: array.shape[0]] = array
-    return larger
+    """Read the tile with these three indices into the pool; returns how many tiles there are now, which is its slot."""
+    tiles[used, 0], tiles[used, 1], tiles[used, 2] = at
+    open_tile(volume, taps, low, scale, tiles[used], work, pool[used * CELLS : (used + 1) * CELLS])
+    table[at] = used + 1
+    return used + 1
 
 
 @njit(cache=True, inline="always")
-def _plain_level(volume: NDArray[Any], low: float, scale: float, i: int, j: int, k: int) -> int:
-    """Quantised grey of one voxel as it is."""
-    value = float(volume[i, j, k])
-    return min(int((value - low) * scale + 0.5) if value > low else 0, LEVELS - 1)
+def _neighbour(tiles: NDArray[Any], tile: int, x: int, y: int, z: int) -> tuple[int, int, int]:
+    """Indices of the tile that holds a voxel with these indices, counted from the first voxel of ``tile``."""
+    return tiles[tile, 0] + (x >> SHIFT), tiles[tile, 1] + (y >> SHIFT), tiles[tile, 2] + (z >> SHIFT)
+
+
+@njit(cache=True, inline="always")
+def _beyond(at: tuple[int, int, int], shape: tuple[int, int, int]) -> bool:
+    """Whether a tile lies outside the table."""
+    return min(at) < 0 or at[0] >= shape[0] or at[1] >= shape[1] or at[2] >= shape[2]
+
+
+@njit(cache=True)
+def _with_room(
+    pool: NDArray[Any], tiles: NDArray[Any], used: int, more: int
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The pool and its tiles' indices, with room for some more tiles."""
+    while (used + more) * CELLS > pool.shape[0]:
+        pool = grown(pool)
+        larger = np.empty((2 * tiles.shape[0], 3), tiles.dtype)
+        larger[:used] = tiles[:used]
+        tiles = larger
+    return pool, tiles
+
+
+@njit(cache=True)
+def _as_long(array: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
+    """The array itself, or zeros as long as ``other`` that begin with it."""
+    if array.shape[0] == other.shape[0]:
+        return array
+    longer = np.zeros(other.shape[0], array.dtype)
+    longer[: array.shape[0]] = array
+    return longer
+
+
+@njit(cache=True)
+def _flat(cells: NDArray[Any], tiles: NDArray[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
+    """Cells as flat indices of the volume."""
+    out = np.empty(cells.shape[0], np.int64)
+    for n in range(cells.shape[0]):
+        cell = cells[n]
+        tile = cell // CELLS
+        i = tiles[tile, 0] * SIDE + ((cell >> (2 * SHIFT)) & INNER)
+        j = tiles[tile, 1] * SIDE + ((cell >> SHIFT) & INNER)
+        out[n] = (i * shape[1] + j) * shape[2] + tiles[tile, 2] * SIDE + (cell & INNER)
+    return out
 
 
 @njit(cache=True)
 def flood(
     volume: NDArray[Any],
-    levels: NDArray[Any],
-    reached: NDArray[Any],
+    table: NDArray[Any],
     seeds: NDArray[Any],
     offsets: NDArray[Any],
     taps: NDArray[Any],
@@ -92,64 +118,65 @@ def flood(
     homogeneity: NDArray[Any],
     feature: NDArray[Any],
     threshold: int,
-) -> NDArray[Any]:
+) -> tuple[NDArray[Any], int]:
     """Voxels whose strength of connectedness is at least ``threshold``: an alpha cut needs no queue.
 
-    Any order of visiting links of at least the threshold reaches exactly that set, so a stack does, which is
-    several times faster than ordering by strength. ``reached`` (uint8 zeros) is marked 1; the flat indices of
-    the voxels are returned in the order in which they were reached.
+    Any order of visiting links of at least the threshold reaches exactly that set, so first come first served does,
+    which is several times faster than ordering by strength. ``table`` (int32 zeros, one per tile of the volume) gets
+    the tiles' slots. Returns flat indices in the order in which they were reached, and the number of tiles read.
     """
-    ni, nj, nk = volume.shape
-    plain = taps.shape[0] == 1
+    work = scratch(taps)
+    pool, tiles, used = np.empty(64 * CELLS, np.uint16), np.empty((64, 3), np.int64), 0
     cut = np.float32(threshold - 0.5)
-    order = np.empty(65536, np.int64)
-    stack = np.empty(65536, np.int64)
+    links, step = offsets.shape[0], _steps(offsets)
+    order = np.empty(65536, np.int32)
     count = 0
-    top = 0
     for s in range(seeds.shape[0]):
         i, j, k = seeds[s, 0], seeds[s, 1], seeds[s, 2]
-        if not reached[i, j, k]:
-            reached[i, j, k] = 1
-            order[count] = (i * nj + j) * nk + k
-            stack[top] = (i << 42) | (j << 21) | k
+        pool, tiles = _with_room(pool, tiles, used, 1)
+        slot = table[i >> SHIFT, j >> SHIFT, k >> SHIFT]
+        if slot == 0:
+            at = (i >> SHIFT, j >> SHIFT, k >> SHIFT)
+            slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
+        start = _cell(slot, i, j, k)
+        if pool[start] < SEEN:
+            pool[start] |= SEEN
+            order[count] = start
             count += 1
-            top += 1
-    while top:
-        top -= 1
-        packed = stack[top]
-        i, j, k = packed >> 42, (packed >> 21) & 0x1FFFFF, packed & 0x1FFFFF
-        here = (
-            _plain_level(volume, low, scale, i, j, k)
-            if plain
-            else _level(volume, levels, taps, low, scale, i, j, k)
-        )
-        if count + offsets.shape[0] >= order.shape[0]:
-            order = _grown(order)
-        if top + offsets.shape[0] >= stack.shape[0]:
-            stack = _grown(stack)
-        for m in range(offsets.shape[0]):
-            a, b, c = i + offsets[m, 0], j + offsets[m, 1], k + offsets[m, 2]
-            if a < 0 or b < 0 or c < 0 or a >= ni or b >= nj or c >= nk or reached[a, b, c]:
+    done = 0
+    while done < count:
+        cell = np.int64(order[done])
+        done += 1
+        if count + links > order.shape[0]:
+            order = grown(order)
+        if (used + links) * CELLS > pool.shape[0]:
+            pool, tiles = _with_room(pool, tiles, used, links)
+        here = np.int64(pool[cell]) & GREY
+        x, y, z = (cell >> (2 * SHIFT)) & INNER, (cell >> SHIFT) & INNER, cell & INNER
+        for m in range(links):
+            a, b, c = x + offsets[m, 0], y + offsets[m, 1], z + offsets[m, 2]
+            to = cell + step[m]
+            if (a | b | c) & OUTSIDE:
+                at = _neighbour(tiles, int(cell) // CELLS, a, b, c)
+                if _beyond(at, table.shape):
+                    continue
+                slot = table[at]
+                if slot == 0:
+                    slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
+                to = _cell(slot, a, b, c)
+            there = np.int64(pool[to])
+            if there >= SEEN or homogeneity[abs(here - there)] * feature[here + there] < cut:
                 continue
-            if plain:
-                there = _plain_level(volume, low, scale, a, b, c)
-            else:
-                there = _level(volume, levels, taps, low, scale, a, b, c)
-            if homogeneity[abs(here - there)] * feature[here + there] < cut:
-                continue
-            reached[a, b, c] = 1
-            order[count] = (a * nj + b) * nk + c
-            stack[top] = (a << 42) | (b << 21) | c
+            pool[to] = there | SEEN
+            order[count] = to
             count += 1
-            top += 1
-    return order[:count]
+    return _flat(order[:count], tiles, volume.shape), used
 
 
 @njit(cache=True)
 def strengths(
     volume: NDArray[Any],
-    levels: NDArray[Any],
-    strength: NDArray[Any],
+    table: NDArray[Any],
     seeds: NDArray[Any],
     offsets: NDArray[Any],
     taps: NDArray[Any],
@@ -158,30 +185,36 @@ def strengths(
     homogeneity: NDArray[Any],
     feature: NDArray[Any],
     threshold: int,
-) -> NDArray[Any]:
-    """Strength of connectedness 0..255 of every voxel that has at least ``threshold``, written to ``strength``.
+) -> tuple[NDArray[Any], NDArray[Any], int]:
+    """Strength of connectedness 0..255 of every voxel that has at least ``threshold``.
 
     Dijkstra's algorithm for max-min paths with one bucket per quantised strength (linked lists in two growing
     arrays). A voxel is pushed only when its strength rises, so an entry is stale exactly when its bucket differs
-    from the voxel's strength. Returns the flat indices reached.
+    from the voxel's strength. Returns flat indices, their strengths (uint8), and the number of tiles read.
     """
-    ni, nj, nk = volume.shape
-    head = np.full(FULL + 1, -1, np.int64)
-    voxel = np.empty(4096, np.int64)
-    after = np.empty(4096, np.int64)
-    order = np.empty(4096, np.int64)
-    count = 0
-    pushed = 0
+    work = scratch(taps)
+    pool, tiles, used = np.empty(64 * CELLS, np.uint16), np.empty((64, 3), np.int64), 0
+    strength = np.zeros(pool.shape[0], np.uint8)
+    links, step = offsets.shape[0], _steps(offsets)
+    head = np.full(FULL + 1, -1, np.int32)
+    queue, after, order = np.empty(4096, np.int32), np.empty(4096, np.int32), np.empty(4096, np.int32)
+    count = pushed = 0
     for s in range(seeds.shape[0]):
         i, j, k = seeds[s, 0], seeds[s, 1], seeds[s, 2]
-        if strength[i, j, k] == FULL:
-            continue
-        strength[i, j, k] = FULL
-        order[count] = voxel[pushed] = (i * nj + j) * nk + k
-        after[pushed] = head[FULL]
-        head[FULL] = pushed
-        count += 1
-        pushed += 1
+        pool, tiles = _with_room(pool, tiles, used, 1)
+        strength = _as_long(strength, pool)
+        slot = table[i >> SHIFT, j >> SHIFT, k >> SHIFT]
+        if slot == 0:
+            at = (i >> SHIFT, j >> SHIFT, k >> SHIFT)
+            slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
+        start = _cell(slot, i, j, k)
+        if strength[start] < FULL:
+            strength[start] = FULL
+            order[count] = queue[pushed] = start
+            after[pushed] = head[FULL]
+            head[FULL] = pushed
+            count += 1
+            pushed += 1
     bucket = FULL
     while bucket >= threshold:
         entry = head[bucket]
@@ -189,34 +222,44 @@ def strengths(
             bucket -= 1
             continue
         head[bucket] = after[entry]
-        flat = voxel[entry]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
-        if strength[i, j, k] != bucket:
+        cell = np.int64(queue[entry])
+        if strength[cell] != bucket:
             continue
-        here = _level(volume, levels, taps, low, scale, i, j, k)
-        for m in range(offsets.shape[0]):
-            a, b, c = i + offsets[m, 0], j + offsets[m, 1], k + offsets[m, 2]
-            if a < 0 or b < 0 or c < 0 or a >= ni or b >= nj or c >= nk or strength[a, b, c] >= bucket:
+        if count + links > order.shape[0]:
+            order = grown(order)
+        if pushed + links > queue.shape[0]:
+            queue, after = grown(queue), grown(after)
+        if (used + links) * CELLS > pool.shape[0]:
+            pool, tiles = _with_room(pool, tiles, used, links)
+            strength = _as_long(strength, pool)
+        here = np.int64(pool[cell])
+        x, y, z = (cell >> (2 * SHIFT)) & INNER, (cell >> SHIFT) & INNER, cell & INNER
+        for m in range(links):
+            a, b, c = x + offsets[m, 0], y + offsets[m, 1], z + offsets[m, 2]
+            to = cell + step[m]
+            if (a | b | c) & OUTSIDE:
+                at = _neighbour(tiles, int(cell) // CELLS, a, b, c)
+                if _beyond(at, table.shape):
+                    continue
+                slot = table[at]
+                if slot == 0:
+                    slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
+                to = _cell(slot, a, b, c)
+            there = np.int64(pool[to])
+            if there >= SEEN or strength[to] >= bucket:
                 continue
-            there = _level(volume, levels, taps, low, scale, a, b, c)
             link = min(bucket, int(homogeneity[abs(here - there)] * feature[here + there] + 0.5))
-            if link < threshold or link <= strength[a, b, c]:
+            if link < threshold or link <= strength[to]:
                 continue
-            if count + 1 >= order.shape[0]:
-                order = _grown(order)
-            if pushed + 1 >= voxel.shape[0]:
-                voxel = _grown(voxel)
-                after = _grown(after)
-            to = (a * nj + b) * nk + c
-            if strength[a, b, c] == 0:
+            if strength[to] == 0:
                 order[count] = to
                 count += 1
-            strength[a, b, c] = link
-            voxel[pushed] = to
+            strength[to] = link
+            queue[pushed] = to
             after[pushed] = head[link]
             head[link] = pushed
             pushed += 1
-    return order[:count]
+    out = np.empty(count, np.uint8)
+    for n in range(count):
+        out[n] = strength[order[n]]
+    return _flat(order[:count], tiles, volume.shape), out, used

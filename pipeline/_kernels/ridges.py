@@ -8,8 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline._kernels.connect import _grown, smoothed
 from pipeline._kernels.jets import jet, ridge_frame, ridge_step
+from pipeline._kernels.tiles import grown as _grown
+from pipeline._kernels.tiles import smoothed
 
 
 @njit(cache=True)

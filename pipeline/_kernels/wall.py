@@ -12,13 +12,47 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline._kernels.connect import _clamped, _grown, smoothed
 from pipeline._kernels.spline import hessian, value_gradient
+from pipeline._kernels.tiles import (
+    INNER,
+    SHIFT,
+    SIDE,
+    clamped,
+    grown,
+    scratch,
+    smooth_tile,
+    smoothed,
+    unravelled,
+)
 
 PAD = 4
 """Voxels around the box that only feed the spline: a foot moves up to 2 voxels and its spline reaches 2 more."""
 FOOT_STEPS = 4
 """Newton steps to a closest point; from 1.5 voxels at a radius of 2 voxels the fourth moves it by < 0.005 voxel."""
+
+
+@njit(cache=True)
+def ends(order: NDArray[Any], shape: tuple[int, int, int]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """First and last index (3,) along each axis of the voxels at flat indices."""
+    low, high = np.array(shape, np.int64), np.full(3, -1, np.int64)
+    for n in range(order.shape[0]):
+        i, j, k = unravelled(order[n], shape)
+        low[0], low[1], low[2] = min(low[0], i), min(low[1], j), min(low[2], k)
+        high[0], high[1], high[2] = max(high[0], i), max(high[1], j), max(high[2], k)
+    return low, high
+
+
+@njit(cache=True)
+def into_box(
+    order: NDArray[Any], shape: tuple[int, int, int], corner: NDArray[Any], box: tuple[int, int, int]
+) -> NDArray[Any]:
+    """Flat indices in a padded box, whose voxel (PAD, PAD, PAD) is ``corner``, of flat indices in the volume."""
+    out = np.empty(order.shape[0], np.int64)
+    for n in range(order.shape[0]):
+        i, j, k = unravelled(order[n], shape)
+        a, b, c = i - corner[0] + PAD, j - corner[1] + PAD, k - corner[2] + PAD
+        out[n] = (a * box[1] + b) * box[2] + c
+    return out
 
 
 @njit(cache=True)
@@ -34,18 +68,14 @@ def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> 
         start = 0 if layer == 0 else begin
         begin = count
         for n in range(start, stop):
-            flat = front[n] if layer == 0 else found[n]
-            k = flat % nk
-            rest = flat // nk
-            j = rest % nj
-            i = rest // nj
+            i, j, k = unravelled(front[n] if layer == 0 else found[n], mask.shape)
             for a in range(max(0, i - 1), min(ni, i + 2)):
                 for b in range(max(0, j - 1), min(nj, j + 2)):
                     for c in range(max(0, k - 1), min(nk, k + 2)):
                         if mask[a, b, c] == 0:
                             mask[a, b, c] = first + layer
                             if count + 1 >= found.shape[0]:
-                                found = _grown(found)
+                                found = grown(found)
                             found[count] = (a * nj + b) * nk + c
                             count += 1
     return found[:count]
@@ -56,25 +86,41 @@ def smooth_lattice(
     volume: NDArray[Any],
     corner: NDArray[Any],
     taps: NDArray[Any],
+    state: NDArray[Any],
     voxels: NDArray[Any],
     lattice: NDArray[Any],
 ) -> None:
-    """Fill ``lattice`` at the flat box indices ``voxels``.
+    """Fill ``lattice`` where ``state`` is not 0, which is at the flat box indices ``voxels``.
 
-    Its box is padded: voxel (PAD, PAD, PAD) is ``corner`` of the volume.
+    Its box is padded: voxel (PAD, PAD, PAD) is ``corner`` of the volume. In the padding outside the volume the
+    border's smoothed value is repeated.
     """
-    _, mj, mk = lattice.shape
-    ni, nj, nk = volume.shape
+    work = scratch(taps)
+    w = SIDE + 2 * (taps.shape[0] // 2)
+    rows = work[1].reshape((w, w, w))
+    start = corner - PAD
+    ni, nj, nk = lattice.shape
+    needed = np.zeros(((ni + INNER) >> SHIFT, (nj + INNER) >> SHIFT, (nk + INNER) >> SHIFT), np.uint8)
     for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % mk
-        rest = flat // mk
-        j = rest % mj
-        i = rest // mj
-        a = _clamped(i - PAD + corner[0], ni)
-        b = _clamped(j - PAD + corner[1], nj)
-        c = _clamped(k - PAD + corner[2], nk)
-        lattice[i, j, k] = smoothed(volume, taps, a, b, c)
+        i, j, k = unravelled(voxels[n], lattice.shape)
+        needed[i >> SHIFT, j >> SHIFT, k >> SHIFT] = 1
+        a, b, c = i + start[0], j + start[1], k + start[2]
+        if min(a, b, c) < 0 or a >= volume.shape[0] or b >= volume.shape[1] or c >= volume.shape[2]:
+            a, b, c = clamped(a, volume.shape[0]), clamped(b, volume.shape[1]), clamped(c, volume.shape[2])
+            lattice[i, j, k] = smoothed(volume, taps, a, b, c)
+    low = np.maximum(-start, 0)
+    high = np.minimum(np.array(volume.shape) - start, np.array(lattice.shape))
+    for tile in range(needed.size):
+        if needed.flat[tile] == 0:
+            continue
+        ti, tj, tk = unravelled(tile, needed.shape)
+        i0, j0, k0 = ti * SIDE, tj * SIDE, tk * SIDE
+        smooth_tile(volume, taps, i0 + start[0], j0 + start[1], k0 + start[2], work[0], work[1])
+        for i in range(max(i0, low[0]), min(i0 + SIDE, high[0])):
+            for j in range(max(j0, low[1]), min(j0 + SIDE, high[1])):
+                for k in range(max(k0, low[2]), min(k0 + SIDE, high[2])):
+                    if state[i, j, k]:
+                        lattice[i, j, k] = rows[i - i0, j - j0, k - k0]
 
 
 @njit(cache=True)
@@ -101,18 +147,12 @@ def surface_voxels(
     """
     ni, nj, nk = state.shape
     for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        inside[rest // nj, rest % nj, k] = _is_side(state, lattice, level, rest // nj, rest % nj, k, deep)
+        i, j, k = unravelled(voxels[n], state.shape)
+        inside[i, j, k] = _is_side(state, lattice, level, i, j, k, deep)
     found = np.empty(voxels.shape[0], np.int64)
     count = 0
     for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
+        i, j, k = unravelled(voxels[n], state.shape)
         if i < PAD or j < PAD or k < PAD or i >= ni - PAD or j >= nj - PAD or k >= nk - PAD:
             continue
         here = inside[i, j, k]
@@ -122,7 +162,7 @@ def surface_voxels(
                 for c in range(k - 1, k + 2):
                     near = near or inside[a, b, c] != here
         if near:
-            found[count] = flat
+            found[count] = voxels[n]
             count += 1
     return found[:count]
 
@@ -145,16 +185,11 @@ def feet(
     a vessel.  steepness : (n,) fall of grey per mm along the normal. Returns distances (n,), mm, negative inside;
     NaN where no closest point was found within two voxels (0.1 voxel off after the last step, say).
     """
-    _, nj, nk = lattice.shape
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
     reach = 2.0 * max(hx, hy, hz)
     distance = np.empty(voxels.shape[0])
     for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
+        i, j, k = unravelled(voxels[n], lattice.shape)
         qx, qy, qz = i * hx, j * hy, k * hz
         px, py, pz = qx, qy, qz
         gx = gy = gz = gg = 0.0
@@ -205,11 +240,7 @@ def mean_around(
     ni, nj, nk = owner.shape
     out = np.empty(voxels.shape[0])
     for n in range(voxels.shape[0]):
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
+        i, j, k = unravelled(voxels[n], owner.shape)
         total = 0.0
         count = 0
         for a in range(max(0, i - reach), min(ni, i + reach + 1)):
@@ -273,11 +304,7 @@ def propagate(
     while count:
         fresh = 0
         for n in range(count):
-            flat = front[n]
-            k = flat % nk
-            rest = flat // nk
-            j = rest % nj
-            i = rest // nj
+            i, j, k = unravelled(front[n], owner.shape)
             inside[i, j, k] &= 1
             m = owner[i, j, k] - 1
             p = foot[m]
@@ -299,7 +326,7 @@ def propagate(
                             continue
                         inside[a, b, c] |= 2
                         if fresh + 1 >= following.shape[0]:
-                            following = _grown(following)
+                            following = grown(following)
                         following[fresh] = (a * nj + b) * nk + c
                         fresh += 1
         visits += fresh
@@ -317,18 +344,13 @@ def lost_feet(
     A branch as thin as that has its peak at the level of the wall: the wall is put through the voxel itself.
     Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
     """
-    _, nj, nk = owner.shape
     limit = (2.0 * max(spacing[0], spacing[1], spacing[2])) ** 2
     lost = np.empty(voxels.shape[0], np.int64)
     count = 0
     for n in range(voxels.shape[0]):
         if good[n]:
             continue
-        flat = voxels[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
+        i, j, k = unravelled(voxels[n], owner.shape)
         x, y, z = i * spacing[0], j * spacing[1], k * spacing[2]
         m = owner[i, j, k] - 1
         if m >= 0 and _square(x, y, z, foot[m]) < limit:
@@ -349,20 +371,24 @@ def distances(
     normal: NDArray[Any],
     bend: NDArray[Any],
     outer: float,
+    skip: int,
     out: NDArray[Any],
 ) -> None:
     """Signed distance (float32) of every voxel from its owner's foot; ``outer`` where it has none.
 
-    ``out`` may be ``owner``'s own memory seen as float32: one box instead of two is held.
+    ``out`` has ``skip`` voxels less on every side than ``owner``. It may be the beginning of its memory seen as
+    float32: a voxel is written after it is read, and never further on.
     """
-    ni, nj, nk = owner.shape
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
-    for i in range(ni):
-        for j in range(nj):
-            for k in range(nk):
+    for a in range(out.shape[0]):
+        i = a + skip
+        for b in range(out.shape[1]):
+            j = b + skip
+            for c in range(out.shape[2]):
+                k = c + skip
                 m = owner[i, j, k] - 1
                 if m < 0:
-                    out[i, j, k] = -outer if inside[i, j, k] & 1 else outer
+                    out[a, b, c] = -outer if inside[i, j, k] & 1 else outer
                     continue
                 d = abs(_from_foot(i * hx, j * hy, k * hz, foot[m], normal[m], bend[m]))
-                out[i, j, k] = -d if inside[i, j, k] & 1 else min(d, outer)
+                out[a, b, c] = -d if inside[i, j, k] & 1 else min(d, outer)

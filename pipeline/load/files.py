@@ -17,9 +17,20 @@ ORTHONORMAL = 1e-3
 """Largest departure of a direction matrix from orthonormal: header rounding is below 1e-4, a shear far above."""
 
 
+class _Pixels:
+    """A SimpleITK image as numpy sees it; an array made from this keeps the image, whose memory it shares."""
+
+    def __init__(self, image: sitk.Image) -> None:
+        self.image = image
+        self.__array_interface__ = sitk.GetArrayViewFromImage(image).__array_interface__
+
+
 def to_xyz(image: sitk.Image) -> NDArray[Any]:
-    """Voxels of a SimpleITK image indexed x, y, z (x fastest in memory, as in the file)."""
-    return np.asarray(sitk.GetArrayFromImage(image)).T
+    """Voxels of a SimpleITK image indexed x, y, z (x fastest in memory, as in the file); read only.
+
+    They stay in the image's own memory: a copy would hold every frame twice.
+    """
+    return np.asarray(_Pixels(image)).T
 
 
 def _reader(source: Source) -> sitk.ImageFileReader:

@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 from pipeline.config import SegmentConfig
 from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment.affinity import Levels, estimate_affinity
+from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
 from pipeline.segment.connect import connect, connect_relative, neighbours
 from pipeline.segment.levels import deepest, levels_at, scanner_blur
-from pipeline.segment.surface import signed_distance
+from pipeline.segment.surface import Site, prepare, signed_distance
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
@@ -55,10 +55,38 @@ def _start(grid: Grid, seeds: NDArray[np.int64]) -> tuple[Levels, NDArray[np.int
     return levels, np.array([f[1] for f in found], np.int64)
 
 
-def at_level(distance: Grid, change: float, contrast: float, blur_mm: float) -> tuple[Grid, Grid]:
-    """The distance and its mask for a wall's level changed by a little: the wall moves by change over steepness."""
-    moved = distance.values + np.float32(change * np.sqrt(2 * np.pi) * blur_mm / contrast)
-    return distance.with_values(moved), distance.with_values((moved < 0).astype(np.uint8))
+def _connected(
+    grid: Grid, seeds: NDArray[np.int64], affinity: Affinity, config: SegmentConfig
+) -> tuple[NDArray[np.int64], float]:
+    """Flat indices of the vessel's voxels and the number of voxels read; too few of them are no vessel."""
+    offsets = neighbours(config.adjacency)
+    if len(config.other_seeds_mm):
+        others = _seed_voxels(grid, np.array(config.other_seeds_mm))
+        order, read = connect_relative(grid, seeds, others, affinity, config.threshold, offsets)
+    else:
+        order, read = connect(grid, seeds, affinity, config.threshold, offsets)
+    if len(order) < config.least_voxels:
+        allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
+        got = f"connected voxels: got {len(order)}"
+        raise _failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
+    return order, read
+
+
+def _wall(site: Site, levels: Levels, outer_mm: float) -> tuple[NDArray[np.float32], float, dict[str, float]]:
+    """Signed distance, the wall's level and counters: the level is taken again from the surface it leads to."""
+    values, counters = signed_distance(site, levels, outer_mm)
+    for _ in range(SURFACE_ROUNDS):
+        again = deepest(site.volume, site.grid.with_values(values), levels, site.taps, counters["blur_mm"])
+        thin = -float(values.min()) < 4 * counters["blur_mm"]
+        if abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast:
+            break
+        levels = again
+        del values  # before the next takes its place in memory
+        values, counters = signed_distance(site, levels, outer_mm)
+    # what is left of the change moves the wall by change over steepness
+    steepness = levels.contrast / (np.sqrt(2 * np.pi) * counters["blur_mm"])
+    values += np.float32((again.half - levels.half) / steepness)
+    return values, again.half, counters
 
 
 def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None) -> Lumen:
@@ -73,31 +101,16 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     grid, axes = in_memory_order(volume)
     levels, seeds = _start(grid, _seed_voxels(grid, seeds_mm))
     affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma, config.scale)
-    offsets = neighbours(config.adjacency)
-    if len(config.other_seeds_mm):
-        others = _seed_voxels(grid, np.array(config.other_seeds_mm))
-        order, read = connect_relative(grid, seeds, others, affinity, config.threshold, offsets)
-    else:
-        order, read = connect(grid, seeds, affinity, config.threshold, offsets)
-    if len(order) < config.least_voxels:
-        allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
-        got = f"connected voxels: got {len(order)}"
-        raise _failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
-    distance, counters = signed_distance(
-        grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
-    )
-    for _ in range(SURFACE_ROUNDS):
-        again = deepest(grid, distance, levels, affinity.taps, counters["blur_mm"])
-        thin = -float(distance.values.min()) < 4 * counters["blur_mm"]
-        if abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast:
-            break
-        levels = again
-        distance, counters = signed_distance(
-            grid, order, levels, affinity.taps, config.margin_mm, config.outer_mm
-        )
-    distance, mask = at_level(distance, again.half - levels.half, levels.contrast, counters["blur_mm"])
+    order, read = _connected(grid, seeds, affinity, config)
+    site = prepare(grid, order, affinity.taps, config.margin_mm)
+    values, level, counters = _wall(site, levels, config.outer_mm)
     counters["scanner_blur_mm"] = scanner_blur(
         counters["blur_mm"], affinity.taps, float(np.min(grid.spacing_mm))
     )
-    counters |= {"voxels_read": read, "voxels_total": float(np.prod(grid.shape)), "noise": levels.noise}
-    return Lumen(reorder(distance, axes), reorder(mask, axes), again.half, (), counters)
+    total = float(np.prod(grid.shape))
+    counters |= {
+        "voxels_total": total, "voxels_read": read, "voxels_skipped": total - read,
+        "voxels_visited": float(len(order)), "noise": levels.noise,
+    }  # fmt: skip
+    distance, mask = site.grid.with_values(values), site.grid.with_values((values < 0).view(np.uint8))
+    return Lumen(reorder(distance, axes), reorder(mask, axes), level, (), counters)

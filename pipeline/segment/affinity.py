@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.connect import FULL, LEVELS
+from pipeline._kernels.connect import FULL
+from pipeline._kernels.tiles import LEVELS
 
 HALF_HEIGHT_SPREAD = 0.42
 """sigma of the object feature over the contrast: the feature is 0.5 half way down to the background."""

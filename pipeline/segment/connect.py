@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline._kernels.connect import FULL, flood, strengths
+from pipeline._kernels.tiles import CELLS, SIDE
 from pipeline.segment.affinity import Affinity
 from solver.grid import Grid
 
@@ -29,32 +28,43 @@ def cut_level(threshold: float) -> int:
     return min(FULL, max(1, round(threshold * FULL)))
 
 
+def _table(grid: Grid) -> NDArray[np.int32]:
+    """One entry a tile of the grid, 0: not read yet."""
+    return np.zeros([-(-n // SIDE) for n in grid.shape], np.int32)
+
+
 def connect(
     grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
 ) -> tuple[Index, float]:
     """Flat indices of the voxels connected to the seeds at ``threshold``, and the number of voxels read."""
-    levels = np.zeros(grid.shape, np.uint16)
-    reached = np.zeros(grid.shape, np.uint8)
     a = affinity
-    order = flood(
-        grid.values, levels, reached, seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
+    order, tiles = flood(
+        grid.values, _table(grid), seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
         cut_level(threshold),
     )  # fmt: skip
-    return order, float(len(order))
+    return order, float(tiles * CELLS)
+
+
+def strength_list(
+    grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
+) -> tuple[Index, NDArray[np.uint8], float]:
+    """Flat indices of the voxels connected at ``threshold``, how strongly (0..255), and the number of voxels read."""
+    a = affinity
+    order, strength, tiles = strengths(
+        grid.values, _table(grid), seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
+        cut_level(threshold),
+    )  # fmt: skip
+    return order, strength, float(tiles * CELLS)
 
 
 def strength_map(
     grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
 ) -> tuple[NDArray[np.uint8], Index]:
     """Strength of connectedness 0..255 (0 below ``threshold``) and the flat indices of the voxels that have one."""
-    levels = np.zeros(grid.shape, np.uint16)
-    strength = np.zeros(grid.shape, np.uint8)
-    a = affinity
-    order: Any = strengths(
-        grid.values, levels, strength, seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
-        cut_level(threshold),
-    )  # fmt: skip
-    return strength, order
+    order, strength, _ = strength_list(grid, seeds, affinity, threshold, offsets)
+    out = np.zeros(grid.shape, np.uint8)
+    out.reshape(-1)[order] = strength
+    return out, order
 
 
 def connect_relative(
@@ -65,7 +75,12 @@ def connect_relative(
     Both strengths are taken in the same affinity, so that they can be compared: a rival that touches the object is
     cut off at the weakest link between them (Saha and Udupa, relative fuzzy connectedness, CVIU 82 (2001) 42).
     """
-    own, order = strength_map(grid, seeds, affinity, threshold, offsets)
-    other, rival_order = strength_map(grid, rivals, affinity, threshold, offsets)
-    kept = own.reshape(-1)[order] > other.reshape(-1)[order]
-    return order[kept], float(len(order) + len(rival_order))
+    order, own, read = strength_list(grid, seeds, affinity, threshold, offsets)
+    others, other, more = strength_list(grid, rivals, affinity, threshold, offsets)
+    if len(others) == 0:
+        return order, read + more
+    rank = np.argsort(others)
+    at = np.minimum(np.searchsorted(others, order, sorter=rank), len(others) - 1)
+    shared = others[rank[at]] == order
+    kept = own > np.where(shared, other[rank[at]], 0)
+    return order[kept], read + more

@@ -12,7 +12,9 @@ from pipeline._kernels.wall import (
     PAD,
     dilate,
     distances,
+    ends,
     feet,
+    into_box,
     lost_feet,
     mean_around,
     propagate,
@@ -21,6 +23,7 @@ from pipeline._kernels.wall import (
 )
 from pipeline.segment.affinity import Levels
 from pipeline.segment.blur import blur_of_wall, half_level_offset
+from pipeline.sparse import sparse_zeros
 from solver.grid import Array, Grid
 
 LAYERS = 4
@@ -36,17 +39,13 @@ class Box:
     corner: NDArray[np.int64]
     shape: tuple[int, int, int]
 
-    def flat(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Flat box indices of volume indices (n, 3)."""
-        i, j, k = (index - self.corner + PAD).T
-        return np.asarray((i * self.shape[1] + j) * self.shape[2] + k)
 
-
-def box_of(index: NDArray[np.int64], grid: Grid, margin_mm: float) -> Box:
-    """The box that holds the voxels (n, 3) and ``margin_mm`` around them, clipped to the grid, then padded."""
+def box_of(order: NDArray[np.int64], grid: Grid, margin_mm: float) -> Box:
+    """The box that holds the voxels (flat indices) and ``margin_mm`` around them, clipped to the grid, then padded."""
     margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
-    low = np.maximum(index.min(axis=0) - margin, 0)
-    high = np.minimum(index.max(axis=0) + margin + 1, grid.shape)
+    first, last = ends(order, grid.shape)
+    low = np.maximum(first - margin, 0)
+    high = np.minimum(last + margin + 1, grid.shape)
     a, b, c = (int(n) + 2 * PAD for n in high - low)
     return Box(low, (a, b, c))
 
@@ -87,35 +86,58 @@ def corrected(wall: Wall, owner: NDArray[np.int32], sigma_mm: float, spacing: Ar
     return Wall(wall.voxels, wall.distance - offset, moved, wall.normal, bend, wall.steepness), bend
 
 
-def signed_distance(
-    volume: Grid,
-    order: NDArray[np.int64],
-    levels: Levels,
-    taps: NDArray[np.float32],
-    margin_mm: float,
-    outer_mm: float,
-) -> tuple[Grid, dict[str, float]]:
-    """Signed distance (float32, mm, negative inside) on the vessel's box.
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A connected region about to get a surface: its padded box, and its mask with layers around it.
 
-    volume : C-contiguous.  order : flat indices of the connected voxels.  Outside, beyond ``outer_mm``, the distance
-    stays at ``outer_mm``. Returns also counters: visits, surface voxels, blur_mm.
+    volume : C-contiguous grey.  near : flat indices in the box where ``state`` (mask 1, layers 2, 3, ...) is set.
     """
-    index = np.stack(np.unravel_index(order, volume.shape), axis=1)
-    box = box_of(index, volume, margin_mm)
-    state = np.zeros(box.shape, np.uint8)
-    flat = box.flat(index)
+
+    volume: Grid
+    taps: NDArray[np.float32]
+    box: Box
+    state: NDArray[np.uint8]
+    near: NDArray[np.int64]
+
+    @property
+    def grid(self) -> Grid:
+        """The box without its padding, holding nothing yet."""
+        a, b, c = (n - 2 * PAD for n in self.box.shape)
+        empty = np.broadcast_to(np.float32(0), (a, b, c))
+        return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.box.corner), self.volume.direction)
+
+
+def prepare(volume: Grid, order: NDArray[np.int64], taps: NDArray[np.float32], margin_mm: float) -> Site:
+    """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them."""
+    box = box_of(order, volume, margin_mm)
+    state = sparse_zeros(box.shape, np.uint8)
+    flat = into_box(order, volume.shape, box.corner, box.shape)
     state.reshape(-1)[flat] = 1
     dilate(state, flat, LAYERS, 2)
-    near = np.flatnonzero(state)
-    lattice = np.zeros(box.shape, np.float32)
-    smooth_lattice(volume.values, box.corner, taps, near, lattice)
-    inside = np.zeros(box.shape, np.uint8)
-    voxels = surface_voxels(state, lattice, levels.half, DEEP, near, inside)
-    spacing = np.asarray(volume.spacing_mm)
-    wall = find_wall(lattice, levels.half, spacing, voxels, inside)
-    del lattice
-    owner = np.zeros(box.shape, np.int32)
-    good = np.isfinite(wall.distance)
+    return Site(volume, taps, box, state, np.flatnonzero(state))
+
+
+def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> Wall:
+    """Closest points on the surface where smoothed grey is ``level``; marks ``inside``."""
+    lattice = sparse_zeros(site.box.shape, np.float32)
+    smooth_lattice(site.volume.values, site.box.corner, site.taps, site.state, site.near, lattice)
+    voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
+    return find_wall(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
+
+
+def signed_distance(
+    site: Site, levels: Levels, outer_mm: float
+) -> tuple[NDArray[np.float32], dict[str, float]]:
+    """Signed distance (float32, mm, negative inside) on ``site.grid``.
+
+    Outside, beyond ``outer_mm``, the distance stays at ``outer_mm``. Returns also counters: visits, surface voxels,
+    blur_mm.
+    """
+    shape, spacing = site.box.shape, np.asarray(site.volume.spacing_mm)
+    inside = sparse_zeros(shape, np.uint8)
+    wall = _half_level_wall(site, levels.half, inside)
+    voxels, good = wall.voxels, np.isfinite(wall.distance)
+    owner = np.zeros(shape, np.int32)
     owner.reshape(-1)[voxels[good]] = np.flatnonzero(good) + 1
     blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
     wall, bend = corrected(wall, owner, blur, spacing)
@@ -125,10 +147,7 @@ def signed_distance(
     if len(stray):
         bend[stray] = 0.0
         visits += propagate(owner, inside, spacing, voxels[stray], wall.foot, outer_mm)
-    distance = owner.view(np.float32)
-    distances(owner, inside, spacing, wall.foot, wall.normal, bend, outer_mm, distance)
-    keep = tuple(slice(PAD, n - PAD) for n in box.shape)
-    origin = volume.to_mm(box.corner)
-    values = np.ascontiguousarray(distance[keep])
-    counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits), "blur_mm": blur}
-    return Grid(values, volume.spacing_mm, origin, volume.direction), counters
+    # the distances overwrite the feet's numbers they are read from: one box is held instead of two
+    values = owner.reshape(-1).view(np.float32)[: site.grid.values.size].reshape(site.grid.shape)
+    distances(owner, inside, spacing, wall.foot, wall.normal, bend, outer_mm, PAD, values)
+    return values, {"surface_voxels": float(len(voxels)), "distance_visits": float(visits), "blur_mm": blur}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
+from scipy import ndimage
 
 
 def affinity(one: int, other: int, tables) -> int:
@@ -17,6 +18,14 @@ def affinity(one: int, other: int, tables) -> int:
 def quantised(values, tables):
     """Grey levels 0..1023 of values that are not smoothed (one tap)."""
     return np.clip(np.floor((values.astype(float) - tables.low) * tables.scale + 0.5), 0, 1023).astype(int)
+
+
+def smoothed(values, taps):
+    """Every voxel smoothed by the separable kernel, last axis first, the border voxel repeated outside."""
+    out = values.astype(float)
+    for axis in (2, 1, 0):
+        out = ndimage.correlate1d(out, taps.astype(float), axis=axis, mode="nearest")
+    return out
 
 
 def strengths(values, seeds, tables, offsets, threshold: int):

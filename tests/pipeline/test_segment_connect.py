@@ -56,6 +56,32 @@ def test_the_flood_is_the_alpha_cut_of_the_strengths(adjacency):
         np.testing.assert_array_equal(reached.reshape(values.shape), strength >= cut_level(threshold))
 
 
+@pytest.mark.parametrize("scale", [1, 2, 3])
+@pytest.mark.parametrize("shape", [(9, 10, 11), (25, 16, 30), (3, 2, 40)])
+def test_smoothing_tile_by_tile_is_smoothing_everything_first(scale, shape):
+    values = noisy(scale, shape)
+    tables = estimate_affinity(LEVELS, scale=scale)
+    whole = naive.smoothed(values, tables.taps)
+    seeds = np.argwhere(whole == whole.max())[:1]
+    offsets = neighbours(6)
+    got, order = strength_map(Grid(values), seeds, tables, 0.2, offsets)
+    expected = naive.strengths(whole, seeds, tables, offsets, cut_level(0.2))
+    np.testing.assert_array_equal(got, expected)
+    flooded, _ = connect(Grid(values), seeds, tables, 0.2, offsets)
+    assert sorted(flooded) == sorted(order)
+    assert len(order) > 20
+
+
+def test_only_tiles_that_the_object_touches_are_read():
+    values = np.zeros((64, 64, 64), np.int16)
+    values[29:35, 29:35, :] = 800
+    order, read = connect(
+        Grid(values), np.array([[31, 31, 5]]), estimate_affinity(LEVELS), 0.5, neighbours(6)
+    )
+    assert len(order) == 4 * 4 * 64
+    assert read == 4 * 8 * 8**3  # a bar about the corner of four columns of eight tiles of 8^3
+
+
 def test_per_voxel_affinity_is_morphological_reconstruction():
     """With homogeneity 1 and an affinity that is the smaller of two voxel values, FC is reconstruction by dilation."""
     rng = np.random.default_rng(5)
