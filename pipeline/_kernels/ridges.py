@@ -219,6 +219,7 @@ def _walk(
 def tracklets(
     grey: NDArray[Any],
     allowed: NDArray[Any],
+    stamp: NDArray[Any],
     spacing: NDArray[Any],
     sigma: float,
     seeds: NDArray[Any],
@@ -232,11 +233,10 @@ def tracklets(
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Crests through the seeds (flat box indices, strongest first), each walked both ways with step ``length`` mm.
 
-    Returns points (n, 3), tangents (n, 3), crest values (n,), and the first point of every tracklet (m + 1,).
+    stamp : int32 zeros on the box, working memory.  Returns points (n, 3), tangents (n, 3), crest values (n,), and the first point of every tracklet (m + 1,).
     """
     _, nj, nk = grey.shape
     size = min(spacing[0], spacing[1], spacing[2])
-    stamp = np.zeros(grey.shape, np.int32)
     w = np.empty((3, 3, 64))
     out = np.empty(10)
     step = np.empty(3)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline._kernels.ridges import above, smooth_voxels, tracklets
 from pipeline.model import Array, arc_length
+from pipeline.sparse import sparse_zeros
 from pipeline.trace.region import MAD
 from pipeline.trace.scene import Scene
 
@@ -81,8 +82,9 @@ def find_crests(
     high, low = seed_sigmas * noise, KEEP_SIGMAS * noise
     # a crest of height low in a blur of sigma_voxel bends by about low / sigma^2
     sharp = 0.15 * low / (sigma_voxel * h) ** 2
+    stamp = sparse_zeros(scene.grey.shape, np.int32)
     points, tangents, values, first = tracklets(
-        scene.grey, scene.region.allowed, scene.spacing, sigma_voxel * h, seeds,
+        scene.grey, scene.region.allowed, stamp, scene.spacing, sigma_voxel * h, seeds,
         high, low, sharp, TURN, bend, 0.7 * h, LONGEST,
     )  # fmt: skip
     pieces = [Tracklet(points[a:b], tangents[a:b], values[a:b]) for a, b in pairwise(first)]

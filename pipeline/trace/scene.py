@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline._kernels.ridges import subtract
 from pipeline.memory_order import in_memory_order
 from pipeline.model import Lumen, Volume
+from pipeline.sparse import sparse_zeros
 from pipeline.trace.background import modelled, smoothed
 from pipeline.trace.region import MAD, Region, region_of
 from solver.grid import Array
@@ -65,7 +66,7 @@ def build_scene(frame: Volume, lumen: Lumen, reference: Volume | None) -> Scene:
     background = (
         modelled(grid, region, lumen) if reference is None else smoothed(reference, region, lumen, axes)
     )
-    grey = np.zeros(region.box.shape, np.float32)
+    grey = sparse_zeros(region.box.shape, np.float32)
     read = subtract(grid.values, background, region.corner, region.runs, grey)
     sample = grey.reshape(-1)[region.within]
     noise = MAD * float(np.median(np.abs(sample - np.median(sample))))

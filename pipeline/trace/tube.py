@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline._kernels.skyline import factorise, inverse, substitute
 from pipeline._kernels.tube import active_voxels, normal_equations, render
 from pipeline.model import Array, arc_length
+from pipeline.sparse import sparse_zeros
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
@@ -243,7 +244,7 @@ def fit_tube(
     columns = 3 * len(tube.controls) + len(tube.tint) + 2
     prior = _prior(len(tube.controls), columns, data.noise, voxel)
     held = [columns - 2] if not fit_sigma else []
-    slot = np.zeros(data.grey.shape, np.int32)
+    slot = sparse_zeros(data.grey.shape, np.int32)
     done = 0
     for done in range(1, iterations + 1):
         normal, right, _, _ = _step(data, tube, samples, prior, slot)
@@ -285,7 +286,7 @@ def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     samples = sampling(tube.intervals, per)
     curve, velocity = _sampled(tube.controls, samples)
     radius = WINDOW * max(tube.sigma, 0.5 * voxel)
-    slot = np.zeros(data.grey.shape, np.int32)
+    slot = sparse_zeros(data.grey.shape, np.int32)
     voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
     amplitude = tube.tint[samples.tint_first] * (1 - samples.tint_share)
     amplitude = amplitude + tube.tint[samples.tint_first + 1] * samples.tint_share
