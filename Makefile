@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study baseline anatomies bench stress peers aneurism clean
+.PHONY: setup validate test lint study baseline anatomies bench stress peers aneurism conebeam truth clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -40,6 +40,16 @@ baseline: setup
 # five BraVa trees and the aorta-to-cranial tree (needs WIREVAL_DATA): errors and statuses frame by frame
 anatomies: setup
 	$(BIN)/python -m tests.studies.anatomies
+
+# one study by the ideal scanner and as 3D rotational X-ray (needs the network once, 1.6 GB): errors beside each other
+conebeam:
+	test -x $(OUT)/rtk/bin/python || $(PYTHON) -m venv $(OUT)/rtk
+	$(OUT)/rtk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[conebeam]'
+	$(OUT)/rtk/bin/python -m tests.studies.conebeam $(OUT)/conebeam --seed $(SEED)
+
+# the truth against itself, every scene replayed on nodes half as far apart
+truth: setup
+	$(BIN)/python -m tests.studies.truth
 
 # a real scan (needs WIREVAL_DATA): segmented, then a wire is simulated from the carotid past the aneurysm
 aneurism: setup

@@ -11,6 +11,7 @@ TRIED: Mapping[str, tuple[str, ...]] = {
     "bend": ("segment", "trace", "simulate", "compare", "report"),
     "s-curve": ("simulate",),
     "helix": ("trace", "simulate"),
+    "rough-wall": ("simulate",),
     "bifurcation": ("segment", "simulate", "compare"),
     "bifurcation-left": ("simulate", "compare"),
     "rolled": ("simulate",),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 
 from data_synthetic import _rod_kernels as kernels
+from data_synthetic.rod_contact import Wall, add_wall, wall_energy
 from data_synthetic.wire import RIGID_TORSION_N_MM2, TrueWire, cell_means
 
 Array = NDArray[np.float64]
@@ -20,15 +21,16 @@ LONGEST_MOVE_MM = 0.15
 TIP_REFINEMENT, TIP_EDGES = 8, 2
 """The last two edges are cut into eight each, to resolve the run over which a pushed tip touches."""
 
-CURVATURE_STEP_MM = 1e-4
-"""Step of the central difference of the wall's gradient; its Hessian is only needed to a few digits."""
 
+class Extra(Protocol):
+    """A further energy of the nodes: friction's sliders."""
 
-class Wall(Protocol):
-    """Anything that gives a signed distance (n,) and its gradient (n, 3) at points (n, 3), negative inside."""
+    def energy(self, points: Array) -> float:
+        """N mm."""
+        ...
 
-    def distance_and_gradient(self, points_mm: Array) -> tuple[Array, Array]:
-        """Signed distance and gradient."""
+    def add(self, points: Array, gradient: Array, bands: Array) -> None:
+        """Add gradient (4n,) and lower-band Hessian."""
         ...
 
 
@@ -49,6 +51,7 @@ class Rod:
     wall: Wall | None = None
     stiffness_N_mm2: float = 0.0
     loads_N: Array | None = None
+    sliders: Extra | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,8 +168,9 @@ def _elastic(rod: Rod, shape: Shape) -> tuple[Array, Array, Array, Array, Array,
 def _energy(rod: Rod, shape: Shape, points: Array, angles: Array) -> float:
     total = float(kernels.elastic_energy(points, angles, *_elastic(rod, shape)))
     if rod.wall is not None:
-        depth = np.maximum(rod.wall.distance_and_gradient(points[1:])[0] + rod.radius_mm, 0.0)
-        total += 0.5 * rod.stiffness_N_mm2 * float(rod.cells @ depth**2)
+        total += wall_energy(rod, rod.wall, points)
+    if rod.sliders is not None:
+        total += rod.sliders.energy(points)
     if rod.loads_N is not None:
         total -= float(np.sum(rod.loads_N * points))
     return total
@@ -178,37 +182,11 @@ def _system(rod: Rod, shape: Shape, gradient: Array, bands: Array) -> Array:
     kernels.elastic_system(shape.points, angles, *_elastic(rod, shape), gradient, bands)
     if rod.loads_N is not None:
         gradient.reshape(-1, 4)[:, 1:] -= rod.loads_N[1:]
-    contact = np.zeros_like(shape.points)
-    if rod.wall is not None:
-        contact[1:] = -_add_wall(rod, rod.wall, shape.points, gradient, bands)
-    return contact
-
-
-def _add_wall(rod: Rod, wall: Wall, points: Array, gradient: Array, bands: Array) -> Array:
-    """Add the wall's gradient (n, 3), which is returned, and Hessian k w (n n' + d grad grad phi)."""
-    phi, normal = wall.distance_and_gradient(points[1:])
-    depth = np.maximum(phi + rod.radius_mm, 0.0)
-    weight = rod.stiffness_N_mm2 * rod.cells
-    force = (weight * depth)[:, None] * normal
-    gradient.reshape(-1, 4)[:, 1:] += force
-    touching = np.flatnonzero(depth > 0)
-    if len(touching):
-        block = np.einsum("na,nb->nab", normal[touching], normal[touching])
-        block += depth[touching, None, None] * _wall_curvature(wall, points[1:][touching])
-        block *= weight[touching, None, None]
-        for a in range(3):
-            for b in range(a + 1):
-                bands[a - b, 4 * touching + 1 + b] += block[:, a, b]
-    return force
-
-
-def _wall_curvature(wall: Wall, points: Array) -> Array:
-    """Hessian (n, 3, 3) of the signed distance."""
-    offsets = CURVATURE_STEP_MM * np.concatenate([np.eye(3), -np.eye(3)])
-    stencil = (points[None] + offsets[:, None]).reshape(-1, 3)
-    g = wall.distance_and_gradient(stencil)[1].reshape(6, len(points), 3)
-    hessian = np.moveaxis((g[:3] - g[3:]) / (2.0 * CURVATURE_STEP_MM), 0, 1)
-    return np.asarray(0.5 * (hessian + np.swapaxes(hessian, 1, 2)))
+    if rod.sliders is not None:
+        rod.sliders.add(shape.points, gradient, bands)
+    if rod.wall is None:
+        return np.zeros_like(shape.points)
+    return add_wall(rod, rod.wall, shape.points, gradient, bands)
 
 
 def _newton_step(gradient: Array, bands: Array, shift: float) -> tuple[Array, float]:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from data_synthetic.rod import Wall
+from data_synthetic.rod_contact import Wall
 from data_synthetic.scan_grid import ScanGrid
 from data_synthetic.scanner import Greys
 from data_synthetic.tubes import Anatomy, Tube
@@ -36,6 +36,7 @@ class Setup:
     bone_gap_mm : what bone keeps from the lumen.     spacing_ratio : voxel edges relative to the voxel size.
     axes : direction matrix of the scan.     visible : which frames show the wire.     others : more wires, always.
     motion_mm : (frames, 3) shift of the phantom against the reference scan.     wall : when it is not the anatomy.
+    friction : Coulomb's coefficient of wire and wall.
     """
 
     anatomy: Anatomy
@@ -56,6 +57,7 @@ class Setup:
     others: Wires = ()
     motion_mm: Array | None = None
     wall: Wall | None = None
+    friction: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def conebeam_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
     """3D rotational X-ray; needs the extra [conebeam]."""
     from data_synthetic.scanner.conebeam import ConeBeamScanner
 
-    return ConeBeamScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid)
+    return ConeBeamScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, greys=setup.greys)
 
 
 def make_study(
@@ -90,6 +90,7 @@ def planned_insertion(setup: Setup, step_mm: float) -> Insertion:
         setup.material_axis,
         step_mm,
         max(step_mm, LONGEST_ADVANCE_MM),
+        setup.friction,
     )
 
 
@@ -153,6 +154,6 @@ def describe_case(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Genera
             "wire": "wire",
             "insertion_mm": depths.round(3).tolist(),
             "roll_deg": list(setup.rolls_deg) if len(set(setup.rolls_deg)) > 1 else setup.rolls_deg[0],
-            "wall": {"stiffness_N_mm2": setup.stiffness_N_mm2, "friction": 0.0},
+            "wall": {"stiffness_N_mm2": setup.stiffness_N_mm2, "friction": setup.friction},
         },
     }

@@ -18,6 +18,8 @@ SOURCES = (
     "_rod_kernels.py",
     "_tube_kernels.py",
     "rod.py",
+    "rod_contact.py",
+    "rod_friction.py",
     "tubes.py",
     "wire.py",
     "wire_truth.py",
@@ -63,7 +65,14 @@ def _key(insertion: Insertion, wall: Anatomy, depths: Sequence[float], rolls: Se
     )
     for values in numbers:
         digest.update(np.asarray(values, dtype=np.float64).tobytes())
-    rest = (astuple(insertion.wire), insertion.stiffness_N_mm2, insertion.step_mm, insertion.advance_mm)
+    rest = (
+        astuple(insertion.wire),
+        insertion.stiffness_N_mm2,
+        insertion.step_mm,
+        insertion.advance_mm,
+        insertion.friction,
+        None if insertion.tip_load_N is None else tuple(insertion.tip_load_N),
+    )
     digest.update(repr(rest).encode())
     return digest.hexdigest()[:32]
 
@@ -71,6 +80,7 @@ def _key(insertion: Insertion, wall: Anatomy, depths: Sequence[float], rolls: Se
 def _write(path: Path, frames: Sequence[TrueFrame]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"points{i}": f.points_mm for i, f in enumerate(frames)}
+    arrays |= {f"anchor{i}": f.anchor_mm for i, f in enumerate(frames)}
     arrays |= {f"contact{i}": f.contact_N for i, f in enumerate(frames)}
     arrays["table"] = np.array([[getattr(f, name) for name in FIELDS] for f in frames], dtype=np.float64)
     partial = path.with_suffix(f".{os.getpid()}.npz")
@@ -81,6 +91,6 @@ def _write(path: Path, frames: Sequence[TrueFrame]) -> None:
 def _read(path: Path) -> tuple[TrueFrame, ...]:
     with np.load(path) as data:
         return tuple(
-            TrueFrame(d, r, data[f"points{i}"], data[f"contact{i}"], res, jump, int(its))
+            TrueFrame(d, r, data[f"points{i}"], data[f"contact{i}"], data[f"anchor{i}"], res, jump, int(its))
             for i, (d, r, res, jump, its) in enumerate(data["table"].tolist())
         )

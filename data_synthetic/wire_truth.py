@@ -18,15 +18,15 @@ from scipy.interpolate import CubicSpline
 from data_synthetic._tolerances import NEWTON_FORCE_N, REPLAY_FORCE_N
 from data_synthetic.rod import (
     TIP_EDGES,
-    Equilibrium,
     Rod,
     Shape,
-    Wall,
     edge_lengths,
     make_rod,
     relax,
     shape_from_points,
 )
+from data_synthetic.rod_contact import Wall
+from data_synthetic.rod_friction import Held, by_tip, relax_held
 from data_synthetic.wire import TrueWire
 
 Array = NDArray[np.float64]
@@ -40,6 +40,7 @@ class Insertion:
     """What is done to the wire: where it enters, what it meets, and how finely that is computed.
 
     step_mm : node spacing.     advance_mm : insertion between two equilibria (defaults to the node spacing).
+    friction : Coulomb's coefficient at the wall; 0 computes nothing.     tip_load_N : a dead load, for closed forms.
     """
 
     wire: TrueWire
@@ -50,12 +51,15 @@ class Insertion:
     material_axis: Array
     step_mm: float = 0.2
     advance_mm: float | None = None
+    friction: float = 0.0
+    tip_load_N: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class TrueFrame:
     """The wire at one depth. points_mm (n + 1, 3) from the entry to the tip, contact_N (n + 1, 3).
 
+    anchor_mm (n + 1, 3) : the points of the wall that friction holds the nodes by (the nodes themselves without it).
     residual_N : largest unbalanced nodal force.     jump_mm : largest sideways move of the tip in one advance since the
     last frame, which tells a quiet insertion from one that snapped.
     """
@@ -64,6 +68,7 @@ class TrueFrame:
     roll_deg: float
     points_mm: Array
     contact_N: Array
+    anchor_mm: Array
     residual_N: float
     jump_mm: float
     iterations: int
@@ -100,29 +105,39 @@ def replay(
         [float(roll_deg)] * len(depths) if isinstance(roll_deg, int | float) else [float(r) for r in roll_deg]
     )
     depth, roll = min((TIP_EDGES + 2) * insertion.step_mm, depths[0]), rolls[0]
-    rod = _rod(insertion, depth, roll)
-    straight = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    state = relax(
-        rod, shape_from_points(rod, insertion.entry_mm + straight[:, None] * rod.direction), REPLAY_FORCE_N
-    )
+    held = _begin(insertion, depth, roll)
     for target, target_roll in zip(depths, rolls, strict=True):
         jump, effort = 0.0, 0
         for depth_next, roll_next in _path(insertion, depth, target, roll, target_roll):
-            before = state.shape.points[-1]
-            state = _advance(insertion, state, depth, depth_next, roll_next)
-            moved = state.shape.points[-1] - before
+            before = held.equilibrium.shape.points[-1]
+            held = _advance(insertion, held, depth, depth_next, roll_next)
+            moved = held.equilibrium.shape.points[-1] - before
             jump = max(jump, float(np.linalg.norm(moved)) - abs(depth_next - depth))
-            depth, roll, effort = depth_next, roll_next, effort + state.iterations
-        state = relax(_rod(insertion, depth, roll), state.shape, NEWTON_FORCE_N)
+            depth, roll, effort = depth_next, roll_next, effort + held.equilibrium.iterations
+        state = held.equilibrium
+        held = _settle(
+            insertion, _rod(insertion, depth, roll), state.shape, held.anchor, state.contact_N, NEWTON_FORCE_N
+        )
+        state = held.equilibrium
         yield TrueFrame(
             depth,
             roll,
             state.shape.points,
             state.contact_N,
+            held.anchor if insertion.friction else state.shape.points,
             state.residual_N,
             jump,
             effort + state.iterations,
         )
+
+
+def _begin(insertion: Insertion, depth: float, roll: float) -> Held:
+    """The first few edges, straight, relaxed."""
+    rod = _rod(insertion, depth, roll)
+    straight = np.concatenate([[0.0], np.cumsum(rod.lengths)])
+    points = insertion.entry_mm + straight[:, None] * rod.direction
+    state = relax(rod, shape_from_points(rod, points), REPLAY_FORCE_N)
+    return Held(state, state.shape.points, 0.0)
 
 
 def _path(
@@ -140,7 +155,7 @@ def _path(
 def _rod(insertion: Insertion, depth: float, roll_deg: float) -> Rod:
     direction = unit(insertion.direction)
     director = rotate(normal_to(insertion.material_axis, direction), direction, np.radians(roll_deg))
-    return make_rod(
+    rod = make_rod(
         insertion.wire,
         np.asarray(insertion.entry_mm, dtype=np.float64),
         direction,
@@ -150,24 +165,45 @@ def _rod(insertion: Insertion, depth: float, roll_deg: float) -> Rod:
         wall=insertion.wall,
         stiffness_N_mm2=insertion.stiffness_N_mm2,
     )
+    if insertion.tip_load_N is None:
+        return rod
+    loads = np.zeros((len(rod.lengths) + 1, 3))
+    loads[-1] = insertion.tip_load_N
+    return replace(rod, loads_N=loads)
 
 
-def _advance(
-    insertion: Insertion, state: Equilibrium, old: float, new: float, roll_deg: float
-) -> Equilibrium:
+def _advance(insertion: Insertion, held: Held, old: float, new: float, roll_deg: float) -> Held:
     """Push (or pull) and roll a little, then relax: the guess is the wire slid along its own curve."""
     rod = _rod(insertion, new, roll_deg)
+    shape = held.equilibrium.shape
     ends = np.concatenate([[0.0], np.cumsum(edge_lengths(old, insertion.step_mm))])
     arcs = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    return relax(rod, _slide(rod, state.shape, ends, arcs), REPLAY_FORCE_N)
+    start = _slide(rod, shape, ends, arcs)
+    if not insertion.friction:
+        return _settle(insertion, rod, start, start.points, np.zeros_like(start.points), REPLAY_FORCE_N)
+    # where the same material was before, and what it held on to there
+    was = _slide(rod, shape, ends, arcs - (new - old)).points
+    anchor = was - by_tip(held.offsets(insertion.friction), len(was))
+    contact = by_tip(held.equilibrium.contact_N, len(was))
+    return _settle(insertion, rod, start, anchor, contact, REPLAY_FORCE_N)
+
+
+def _settle(
+    insertion: Insertion, rod: Rod, start: Shape, anchor: Array, contact_N: Array, force_N: float
+) -> Held:
+    """The equilibrium under the anchors' friction, where there is any."""
+    if insertion.friction:
+        return relax_held(rod, start, anchor, contact_N, insertion.friction, force_N)
+    return Held(relax(rod, start, force_N), anchor, 0.0)
 
 
 def _slide(rod: Rod, shape: Shape, ends: Array, arcs: Array) -> Shape:
     """Nodes at new arc lengths on the present curve; beyond its tip straight on."""
     curve = CubicSpline(ends, shape.points, bc_type=((1, rod.direction), (2, np.zeros(3))))
-    inside = np.minimum(arcs, ends[-1])
+    inside = np.clip(arcs, 0.0, ends[-1])
     tip = unit(curve(ends[-1], 1))
-    return shape_from_points(rod, curve(inside) + (arcs - inside)[:, None] * tip)
+    straight = np.where(arcs[:, None] > 0, tip, rod.direction)  # before the entry it lies in the introducer
+    return shape_from_points(rod, curve(inside) + (arcs - inside)[:, None] * straight)
 
 
 def halving_moves(insertion: Insertion, frame: TrueFrame) -> float:
@@ -177,5 +213,13 @@ def halving_moves(insertion: Insertion, frame: TrueFrame) -> float:
     ends = np.concatenate([[0.0], np.cumsum(edge_lengths(frame.depth_mm, insertion.step_mm))])
     arcs = np.concatenate([[0.0], np.cumsum(rod.lengths)])
     coarse = _slide(rod, shape_from_points(rod, frame.points_mm), ends, arcs)
-    again = relax(rod, coarse, NEWTON_FORCE_N)
+    # forces belong to cells: half the spacing, half the force
+    anchor = coarse.points + _between(arcs, ends, frame.anchor_mm - frame.points_mm)
+    contact = 0.5 * _between(arcs, ends, frame.contact_N)
+    again = _settle(fine, rod, coarse, anchor, contact, NEWTON_FORCE_N).equilibrium
     return float(np.max(np.linalg.norm(again.shape.points - coarse.points, axis=1)))
+
+
+def _between(arcs: Array, ends: Array, values: Array) -> Array:
+    """Values (n, 3) given at ``ends``, linear between, at ``arcs``."""
+    return np.column_stack([np.interp(arcs, ends, values[:, a]) for a in range(3)])

@@ -26,7 +26,8 @@ class Greys:
     voxel^-2, as a thin wire's peak does, so that a small study differs in sampling, not in contrast to noise.
 
     psf_voxels : sd of the point spread.     correlation_voxels : sd of the noise's own smoothing.
-    drift : sd of a frame's gain.     wire : with 0.36 mm of wire in 0.3 mm voxels 6000 gives a contrast-to-noise of 12.
+    drift : sd of a frame's gain.     washout : share of the contrast that is lost while a cone-beam scan turns; the
+    ideal scanner sees the mean.     wire : with 0.36 mm of wire in 0.3 mm voxels 6000 gives a contrast-to-noise of 12.
     """
 
     background: float = 100.0
@@ -37,6 +38,7 @@ class Greys:
     psf_voxels: float = 0.8
     correlation_voxels: float = 0.5
     drift: float = 0.005
+    washout: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,7 @@ class PsfScanner:
     def of(anatomy: Anatomy, bone: Anatomy | None, gap_mm: float, grid: ScanGrid, greys: Greys) -> PsfScanner:
         """Voxelise the phantom once."""
         sharp = lumen_coverage(anatomy, grid)
-        sharp *= greys.contrast - greys.background
+        sharp *= (1.0 - 0.5 * greys.washout) * (greys.contrast - greys.background)
         sharp += greys.background
         if bone is not None:
             share = bone_coverage(bone, anatomy, gap_mm, grid)

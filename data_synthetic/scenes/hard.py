@@ -64,7 +64,7 @@ def _low_dose(_rng: np.random.Generator, frames: int) -> Setup:
 
 
 def _washed_out(_rng: np.random.Generator, frames: int) -> Setup:
-    return _bend(frames, greys=Greys(contrast=500.0, drift=0.03))
+    return _bend(frames, greys=Greys(contrast=500.0, drift=0.03, washout=0.1))
 
 
 HARD = (

@@ -88,11 +88,23 @@ def _kissing(_rng: np.random.Generator, frames: int) -> Setup:
     return plain_setup(shapes.kissing(), frames, 36.0)
 
 
+def _rough(rng: np.random.Generator, frames: int) -> Setup:
+    return replace(_helix(rng, frames), friction=0.1)
+
+
 PLAIN = (
     Scene("straight", "a curved tip in a straight vessel: contact without any turn", 57.6, 192, 6, _straight),
     Scene("bend", "one bend in one plane: bending and wall alone decide", 48.0, 160, 6, _bend),
     Scene("s-curve", "two opposite bends: the wire cuts both corners", 48.0, 160, 6, _s_curve),
     Scene("helix", "a curve that no plane holds: roll and torsion of the path matter", 48.0, 160, 6, _helix),
+    Scene(
+        "rough-wall",
+        "the same helix with friction: the wire is left nearly a millimetre from where it would slide to",
+        48.0,
+        160,
+        6,
+        _rough,
+    ),
     Scene("bifurcation", "the tip takes the branch that it points at", 48.0, 160, 6, _fork_right),
     Scene(
         "bifurcation-left", "the same fork, rolled by half a turn: the other branch", 48.0, 160, 6, _fork_left

@@ -110,7 +110,9 @@ def test_wall_forces_and_clamp_balance(bend: Anatomy) -> None:
     touching = np.linalg.norm(frame.contact_N, axis=1) > 0
     phi = bend.distance(frame.points_mm)
     assert touching.any()
-    assert np.all(phi[touching] + 0.18 > 0)
+    # a node carries its share of an edge that touches, be it the other end that does
+    assert np.all(phi[touching] + 0.18 > -0.02)
+    assert np.all(touching[phi + 0.18 > 0])
     assert frame.depth_mm == 30.0
     length = np.linalg.norm(np.diff(frame.points_mm, axis=0), axis=1).sum()
     assert length == pytest.approx(30.0, abs=1e-3)  # stretch of 2e4 N of axial stiffness
