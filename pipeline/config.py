@@ -51,6 +51,10 @@ class TraceConfig:
     """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
     longest_gap_mm: float = 5.0
     """Longest gap between two pieces of wire that is bridged."""
+    rotation_axis: tuple[float, ...] = ()
+    """Axis (LPS) about which the scanner turned; empty: the scan's third axis, as rotational scans are stored."""
+    in_plane_deg: float = 10.0
+    """Points whose tangent is nearer than this to the plane of rotation are flagged: the cone's half angle."""
     register: Literal["auto", "off"] = "auto"
     """auto (frames are registered to the reference scan where the phantom moved) or off."""
     register_skip_voxels: float = 0.1

@@ -56,6 +56,7 @@ class Curve:
     sigma_mm : (n,) standard deviation of each point across the wire, per axis, mm.
     tip_sigma_mm : standard deviation of the tip along the wire, mm.
     flagged : (n,) bool, points not to be trusted at that sigma (gap bridged, streak, strands in contact).
+    in_plane : (n,) bool, points where the wire runs nearly in the plane of the scanner's rotation.
     """
 
     points_mm: Array
@@ -65,13 +66,16 @@ class Curve:
     status: FrameStatus = FrameStatus.OK
     note: str = ""
     counters: Counters = field(default_factory=dict)
+    in_plane: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
         object.__setattr__(self, "points_mm", read_only(self.points_mm, np.float64))
         object.__setattr__(self, "sigma_mm", read_only(self.sigma_mm, np.float64))
-        flagged = np.zeros(len(self.points_mm), bool) if self.flagged is None else self.flagged
-        object.__setattr__(self, "flagged", read_only(flagged, bool))
+        for name in ("flagged", "in_plane"):
+            marks = getattr(self, name)
+            marks = np.zeros(len(self.points_mm), bool) if marks is None else marks
+            object.__setattr__(self, name, read_only(marks, bool))
 
     @property
     def arc_mm(self) -> Array:

@@ -49,6 +49,8 @@ def error_row(frame: Frame) -> dict[str, Any]:
         row["skill"] = skill_of(c.rms_mm, frame.nulls_rms_mm.get("centreline", NAN))
     if frame.curve is not None and len(frame.curve.sigma_mm):
         row["trace_sigma_mm"] = float(np.sqrt(np.mean(np.asarray(frame.curve.sigma_mm) ** 2)))
+        row["trace_flagged"] = float(np.mean(np.asarray(frame.curve.flagged)))
+        row["trace_in_plane"] = float(np.mean(np.asarray(frame.curve.in_plane)))
     if frame.simulated is not None:
         s = frame.simulated
         row |= {"max_penetration_mm": s.max_penetration_mm, "push_force_N": s.push_force_N}
@@ -102,6 +104,7 @@ def _arrays_of(frame: Frame) -> frames_file.Frame:
         frame.index,
         traced_mm=None if curve is None else curve.points_mm,
         trace_sigma_mm=None if curve is None else curve.sigma_mm,
+        trace_flags=None if curve is None else np.asarray(curve.flagged) + 2.0 * np.asarray(curve.in_plane),
         simulated_mm=None if wire is None else wire.joints_mm,
         contact_force_N=None if wire is None else wire.contact_force_N,
         error_mm=None if errors is None else errors.error_mm,

@@ -37,8 +37,13 @@ def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
 
 def pack_curve(curve: Curve) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and JSON part of a traced curve."""
-    flagged = np.zeros(0, bool) if curve.flagged is None else curve.flagged
-    arrays = {"points": curve.points_mm, "sigma": curve.sigma_mm, "flagged": flagged}
+    none = np.zeros(0, bool)
+    arrays = {
+        "points": curve.points_mm,
+        "sigma": curve.sigma_mm,
+        "flagged": none if curve.flagged is None else curve.flagged,
+        "in_plane": none if curve.in_plane is None else curve.in_plane,
+    }
     meta = {
         "tip_sigma_mm": curve.tip_sigma_mm,
         "status": curve.status.name,
@@ -58,4 +63,5 @@ def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
         FrameStatus[meta["status"]],
         meta["note"],
         meta["counters"],
+        arrays["in_plane"],
     )

@@ -45,6 +45,7 @@ class Frame:
     """Arrays of one frame; what does not apply is None.
 
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
+    trace_flags (n,): 1 bridged, streaky or in contact, 2 nearly parallel to the plane of rotation, 3 both, 0 neither.
     error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
     """
 
@@ -57,6 +58,7 @@ class Frame:
     truth_mm: Array | None = None
     trace_sigma_mm: Array | None = None
     mips: Pictures = field(default_factory=dict)
+    trace_flags: Array | None = None
 
 
 _ARRAYS = tuple(f.name for f in fields(Frame) if f.name not in ("frame", "mips"))

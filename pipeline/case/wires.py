@@ -50,9 +50,23 @@ def trace_frames(run: CaseRun) -> None:
         run.progress(
             "trace", frame.index + 1, len(run.frames), f"{frame.status} {frame.curve.length_mm:.1f} mm"
         )
+    run.warnings += _in_plane(run)
     assumed, doubtful = said(place, run.frames)
     run.assumptions += assumed
     run.warnings += doubtful
+
+
+def _in_plane(run: CaseRun) -> list[str]:
+    """A warning where traced wire runs in the plane of the scanner's rotation, with how much of it does."""
+    curves = [f.curve for f in run.frames if f.curve is not None and len(f.curve.points_mm)]
+    marks = np.concatenate([np.asarray(c.in_plane) for c in curves]) if curves else np.zeros(0, bool)
+    if not marks.any():
+        return []
+    limit = run.config.trace.in_plane_deg
+    return [
+        f"{100 * marks.mean():.0f} % of the traced points run within {limit:g} degrees of the plane of rotation, "
+        "where cone-beam scans streak and resolve the rotation axis least (trace_flags 2 in frames.h5)"
+    ]
 
 
 def _given_traces(run: CaseRun) -> list[Curve]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +13,7 @@ from scipy.spatial import cKDTree
 from pipeline._kernels.jets import values_at
 from pipeline._kernels.tube import active_voxels
 from pipeline.model import Array, Curve, arc_length
+from pipeline.sparse import sparse_zeros
 from pipeline.trace.crests import BEND, Crests, Tracklet, find_crests
 from pipeline.trace.link import Path, link, with_doubles
 from pipeline.trace.scene import Scene
@@ -38,7 +41,10 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain."""
+    """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain.
+
+    cut : wire goes on before the path's first point.
+    """
 
     tube: Tube
     path: Array
@@ -47,6 +53,7 @@ class Attempt:
     leftover_mm: float
     pieces: int
     from_previous: bool = False
+    cut: bool = False
 
     def cnr(self, scene: Scene) -> float:
         """Median peak above the background over the noise of one voxel."""
@@ -141,15 +148,27 @@ def cold(
     if tube is None:
         return None
     left = unexplained_mm(pieces, np.concatenate([path.points, dense(tube, h)]), NEAR_VOXELS * h)
-    return Attempt(tube, points, bridged, path.bridges, left, len(pieces))
+    return Attempt(tube, points, bridged, path.bridges, left, len(pieces), cut=cut)
 
 
-def _without(scene: Scene, tube: Tube) -> Scene:
-    """The scene with the tube's grey taken away."""
-    grey = scene.grey.copy()
+def again(scene: Scene, attempt: Attempt, direction: Array) -> Attempt:
+    """The attempt fitted anew, tip and all, to another scene of the same frame; itself where that has no solution."""
+    points = dense(attempt.tube, 0.5 * float(scene.spacing.min()))
+    tube = _fitted(scene, points, attempt.cut, direction)
+    return attempt if tube is None else replace(attempt, tube=tube)
+
+
+@contextmanager
+def _without(scene: Scene, tube: Tube) -> Iterator[Scene]:
+    """The scene with the tube's grey taken away for the length of the block: in place, as a copy holds a whole box."""
+    grey = scene.grey.reshape(-1)
     voxels, model = predicted(TubeData(scene.grey, scene.spacing, scene.noise), tube)
-    grey.reshape(-1)[voxels] -= model.astype(np.float32)
-    return replace(scene, grey=grey)
+    kept = grey[voxels]
+    grey[voxels] -= model.astype(np.float32)
+    try:
+        yield scene
+    finally:
+        grey[voxels] = kept
 
 
 def warm(scene: Scene, entry: Entry, previous: Curve, crests_voxel: float, gap_mm: float) -> Attempt | None:
@@ -163,7 +182,8 @@ def warm(scene: Scene, entry: Entry, previous: Curve, crests_voxel: float, gap_m
         return None
     tube = fit_path(scene, old, False, entry.direction, find_tip=False)
     line = dense(tube, 0.5 * h)
-    rest: Crests = find_crests(_without(scene, tube), crests_voxel)
+    with _without(scene, tube) as others:
+        rest: Crests = find_crests(others, crests_voxel)
     heading = line[-1] - line[-max(2, min(8, len(line) // 2))]
     onward = link(rest.pieces, line[-1], heading / np.linalg.norm(heading), gap_mm, 5.0 * h)
     points, bridged, bridges = line, np.zeros(len(line), bool), 0
@@ -185,7 +205,7 @@ def misfit(scene: Scene, attempts: list[Attempt]) -> list[float]:
     data = TubeData(scene.grey, scene.spacing, scene.noise)
     radius = 3.0 * max(a.tube.sigma for a in attempts)
     h = float(scene.spacing.min())
-    slot = np.zeros(scene.grey.shape, np.int32)
+    slot = sparse_zeros(scene.grey.shape, np.int32)
     curve = np.ascontiguousarray(np.concatenate([dense(a.tube, h) for a in attempts]))
     voxels = active_voxels(scene.grey.shape, scene.spacing, curve, radius, slot)
     out = []

@@ -12,6 +12,7 @@ from scipy.special import ndtr
 from pipeline._kernels.background import denoised, model, residual
 from pipeline.memory_order import contiguous, integer_offset, reorder
 from pipeline.model import Lumen, Volume
+from pipeline.sparse import sparse_zeros
 from pipeline.trace.region import HALO_VOXELS, MAD, Region, sampled
 from solver.grid import Grid
 
@@ -22,7 +23,7 @@ SMOOTH_VOXELS = 1.0
 _backgrounds: weakref.WeakKeyDictionary[Grid, tuple[Any, NDArray[Any]]] = weakref.WeakKeyDictionary()
 
 
-def _blur(lumen: Lumen, voxel: float) -> float:
+def wall_blur(lumen: Lumen, voxel: float) -> float:
     """The scanner's blur as segment found it, else 0.9 voxel."""
     found = float(lumen.counters.get("scanner_blur_mm", float("nan")))
     return found if np.isfinite(found) and found > 0.3 * voxel else 0.9 * voxel
@@ -50,8 +51,8 @@ def _sample(scan: Grid, corner: NDArray[np.int64], region: Region) -> tuple[NDAr
 def modelled(frame: Grid, region: Region, lumen: Lumen) -> NDArray[np.float32]:
     """A background without a reference: two grey levels of the frame itself, joined by the blurred wall."""
     voxel = float(np.min(frame.spacing_mm))
-    table = _profile(*_sample(frame, region.corner, region), voxel, _blur(lumen, voxel))
-    out = np.zeros(region.box.shape, np.float32)
+    table = _profile(*_sample(frame, region.corner, region), voxel, wall_blur(lumen, voxel))
+    out = sparse_zeros(region.box.shape, np.float32)
     model(region.box.values, region.runs, table, 0.05 * voxel, out)
     return out
 
@@ -74,16 +75,16 @@ def smoothed(reference: Volume, region: Region, lumen: Lumen, axes: tuple[int, i
         return known[1]
     scan, corner = _on_box(reference, region, axes)
     voxel = float(np.min(scan.spacing_mm))
-    table = _profile(*_sample(scan, corner, region), voxel, _blur(lumen, voxel))
+    table = _profile(*_sample(scan, corner, region), voxel, wall_blur(lumen, voxel))
     kind = np.int16 if scan.values.dtype.kind in "iu" and scan.values.dtype.itemsize <= 2 else np.float32
-    rough = np.zeros(region.box.shape, kind)
+    rough = sparse_zeros(region.box.shape, kind)
     distance = region.box.values
     residual(scan.values, corner, distance, region.runs, table, 0.05 * voxel, rough)
     values = rough.reshape(-1)[region.within].astype(float)
     variance = (MAD * float(np.median(np.abs(values - np.median(values))))) ** 2
     x = np.arange(-2, 3)
     taps = np.exp(-0.5 * (x / SMOOTH_VOXELS) ** 2)
-    out = np.zeros(region.box.shape, kind)
+    out = sparse_zeros(region.box.shape, kind)
     limit = HALO_VOXELS * voxel
     denoised(rough, distance, region.runs, table, 0.05 * voxel, taps, limit, variance, out)
     _backgrounds[reference] = (region, out)

@@ -11,9 +11,12 @@ from pipeline._kernels.ridges import smooth_voxels
 from pipeline.config import TraceConfig
 from pipeline.model import Array, Curve, Lumen, Volume, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, Entry, cold, misfit, warm
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, Entry, again, cold, dense, misfit, warm
+from pipeline.trace.background import wall_blur
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
-from pipeline.trace.judge import SURE_CNR, Verdict, judge
+from pipeline.trace.in_plane import near_rotation_plane
+from pipeline.trace.judge import LEAST_SEEN, SURE_CNR, Verdict, depth_at, judge
+from pipeline.trace.level import levelled
 from pipeline.trace.noise import inflation
 from pipeline.trace.region import MAD
 from pipeline.trace.scene import Scene, build_scene
@@ -29,8 +32,6 @@ WIDE_SIGMAS = 4.0
 """and the height at which they start there: noise gives some, which are too short to matter."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
-MODEL_SIGMA_VOXELS = 0.07
-"""What a modelled background adds (in quadrature) to the standard deviation: the wall drags the crest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,17 @@ def explain(scene: Scene, entry: Entry, previous: Curve | None, config: TraceCon
     return _best(scene, found, entry, config) if found else None
 
 
+def _levelled(
+    scene: Scene, best: Candidate, entry: Entry, lumen: Lumen, config: TraceConfig
+) -> tuple[Scene, Candidate]:
+    """Without a reference: the lumen's own grey under the wire taken from beside it, and the fit done again."""
+    voxel = float(np.min(scene.region.box.spacing_mm))
+    tube = best.attempt.tube
+    even = levelled(scene, dense(tube, float(scene.spacing.min())), tube.sigma, wall_blur(lumen, voxel))
+    found = _read_off(even, again(even, best.attempt, entry.direction), entry, config)
+    return even, found[0]
+
+
 def _none(status: FrameStatus, got: str, allowed: str, do: str, counters: dict[str, float]) -> Curve:
     note = f"trace: wire: got {got}; expected {allowed}; {do}"
     return Curve(np.zeros((0, 3)), np.zeros(0), status=status, note=note, counters=counters)
@@ -164,25 +176,37 @@ def _no_wire(scene: Scene) -> Curve:
     )  # fmt: skip
 
 
-def _curve(scene: Scene, best: Candidate) -> Curve:
+def _curve(scene: Scene, best: Candidate, axis: Array, config: TraceConfig) -> Curve:
     """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
     h = float(scene.spacing.min())
-    more = inflation(scene, best.points, best.attempt.tube.sigma)
-    sigma = more.across * best.sigma
-    if scene.modelled:
-        sigma = np.hypot(sigma, MODEL_SIGMA_VOXELS * h)
+    more = inflation(scene, best.points, best.attempt.tube)
+    across, along = more.at(depth_at(scene, best.points))
+    sigma = across * best.sigma
     sigma = np.where(best.verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * h), sigma)
+    points = scene.world(best.points)
+    in_plane = near_rotation_plane(points, axis, config.in_plane_deg)
     a = best.attempt
     counters = scene.counters | {
         "pieces": float(a.pieces), "bridges": float(a.bridges), "leftover_mm": a.leftover_mm,
         "iterations": float(a.tube.iterations), "residual_rms": a.tube.residual_rms, "blur_mm": a.tube.sigma,
-        "cnr": a.cnr(scene), "inflation": more.across, "inflation_tip": more.along,
+        "cnr": a.cnr(scene), "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
         "from_previous": float(a.from_previous), "faint_mm": best.verdict.faint_mm, "double_mm": best.verdict.double_mm,
+        "in_plane_mm": float(in_plane.mean()) * best.length_mm,
     }  # fmt: skip
     return Curve(
-        scene.world(best.points), sigma, more.along * best.tip_sigma, best.verdict.flagged, best.verdict.status,
-        best.verdict.note, counters,
+        points, sigma, float(along[-1]) * best.tip_sigma, best.verdict.flagged, best.verdict.status,
+        best.verdict.note, counters, in_plane,
     )  # fmt: skip
+
+
+def _faint_for_its_noise(curve: Curve) -> Curve:
+    """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
+    seen = curve.counters["cnr"] / max(1.0, curve.counters["inflation"])
+    if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
+        return curve
+    note = f"trace: wire: got a wire {seen:.1f} noises bright, noise counted as it is correlated; expected {LEAST_SEEN}"
+    note += " at least; scan with more dose or a smoother reconstruction kernel"
+    return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
 
 
 def trace(
@@ -210,7 +234,10 @@ def trace(
     best = explain(scene, entry, previous, config)
     if best is None:
         return _no_wire(scene)
-    curve = _curve(scene, best)
+    if scene.modelled:
+        scene, best = _levelled(scene, best, entry, lumen, config)
+    axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
+    curve = _faint_for_its_noise(_curve(scene, best, axis, config))
     if curve.status is FrameStatus.OK and _missed(best, entry, config) > 0:
         note = f"trace: length: got {best.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
         note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest"

@@ -3,32 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.special import ndtr
 
 from pipeline.model import Array
+from pipeline.sparse import sparse_zeros
 from pipeline.trace.scene import Scene
+from pipeline.trace.tube import Tube, TubeData, predicted
 
-CLEAR_VOXELS = 7.0
-"""Distance from the wire from which grey is taken for noise alone."""
-PLACES = 300
-"""Places at which the templates are tried: a standard deviation to 4 per cent."""
+CLEAR_VOXELS = 3.5
+"""Distance from the wire's axis from which grey less the fitted wire is taken for noise alone: nearer, the fit has
+taken some of it away."""
+BESIDE_VOXELS = 12.0
+"""and up to which: noise and background are those of the wire's own surroundings."""
+PLACES = 400
+"""Places at which the templates are tried, in DEPTHS groups: a standard deviation to 5 per cent in each."""
+DEPTHS = 4
+"""Groups of places by their depth in the lumen: near the wall the background is known less well."""
+LEAST = 50
+"""Places below which nothing is measured."""
 HALF = 4
 """Half width of the templates in voxels."""
 
 
 @dataclass(frozen=True)
 class Inflation:
-    """Factors on standard deviations of a fit that took the noise for white: across the wire, and at its tip."""
+    """Factors on standard deviations of a fit that took the noise for white: across the wire, and at its tip.
 
-    across: float = 1.0
-    along: float = 1.0
+    depth : (g,) signed distances to the wall (mm, ascending) at which ``across`` and ``along`` (g,) were measured.
+    """
+
+    depth: Array
+    across: Array
+    along: Array
+
+    def at(self, depth: NDArray[Any]) -> tuple[Array, Array]:
+        """Both factors (n,) at signed distances to the wall (n,)."""
+        return np.interp(depth, self.depth, self.across), np.interp(depth, self.depth, self.along)
+
+
+NO_INFLATION = Inflation(np.zeros(1), np.ones(1), np.ones(1))
 
 
 def _templates(sigma: float) -> tuple[list[Array], list[Array]]:
-    """What the fit multiplies noise with: a sideways step of a piece of wire (three runs of the axes), and an end's."""
+    """What the fit multiplies noise with: a sideways step of a piece of wire (three runs of the axes), and an end's.
+
+    An end's is a blob less what amplitude and offset, which are fitted too, take of it.
+    """
     x = np.arange(-HALF, HALF + 1) / sigma
     bell, side = np.exp(-0.5 * x**2), x * np.exp(-0.5 * x**2)
     long = np.ones(2 * HALF + 1)
@@ -36,42 +61,76 @@ def _templates(sigma: float) -> tuple[list[Array], list[Array]]:
         np.einsum("i,j,k->ijk", *rows)
         for rows in ((side, bell, long), (long, side, bell), (bell, long, side), (side, long, bell))
     ]
-    return sideways, [np.einsum("i,j,k->ijk", bell, bell, bell)]
+    half = ndtr(x)
+    blob = np.einsum("i,j,k->ijk", bell, bell, bell)
+    ends = [_orthogonal(blob, np.einsum("i,j,k->ijk", h, bell, bell)) for h in (half, half[::-1])]
+    return sideways, [np.moveaxis(e, 0, axis) for e in ends for axis in range(3)]
 
 
-def _spread(patches: NDArray[np.float32], templates: list[Array]) -> float:
-    """Root mean square response of unit-norm templates."""
+def _orthogonal(template: Array, taken: Array) -> Array:
+    """What is left of a template beside a multiple of another one and a constant."""
+    basis = np.linalg.qr(np.stack([taken.ravel(), np.ones(taken.size)], axis=1))[0]
+    flat = template.ravel()
+    return np.asarray((flat - basis @ (basis.T @ flat)).reshape(template.shape))
+
+
+def _responses(patches: NDArray[np.float32], templates: list[Array]) -> Array:
+    """Squared responses (places, templates) of unit-norm templates."""
     shapes = np.stack([t.ravel() / np.linalg.norm(t) for t in templates])
-    response = patches.reshape(len(patches), -1) @ shapes.T
-    return float(np.sqrt(np.mean(np.minimum(response**2, 9 * np.median(response**2) / 0.4549))))
+    return np.asarray((patches.reshape(len(patches), -1) @ shapes.T) ** 2, float)
 
 
-def inflation(scene: Scene, curve: Array, sigma_mm: float) -> Inflation:
-    """Measured at places of the lumen away from the wire; 1 where there is no room to measure.
+def _spread(square: Array) -> float:
+    """Root mean square, what lies three standard deviations out cut off."""
+    return float(np.sqrt(np.mean(np.minimum(square, 9 * np.median(square) / 0.4549))))
 
-    curve : (n, 3) kernel coordinates.  sigma_mm : blur of the wire. White noise gives 1 by construction.
-    """
+
+def _places(scene: Scene, curve: Array) -> NDArray[np.int64]:
+    """Voxels of the lumen (n, 3) away from the curve, with room for a template around them."""
     box = scene.region.box
-    h = float(scene.spacing.min())
-    if scene.spacing.max() > 1.5 * h:
-        return Inflation()
     index = np.stack(np.unravel_index(scene.region.within[::7], box.shape), axis=1)
     inner = np.all((index >= HALF) & (index < np.array(box.shape) - HALF), axis=1)
     index = index[inner]
     if len(index) and len(curve):
-        far = cKDTree(curve).query(index * scene.spacing, distance_upper_bound=CLEAR_VOXELS * h)[0]
-        index = index[~np.isfinite(far)]
+        h = float(scene.spacing.min())
+        far = cKDTree(curve).query(index * scene.spacing, distance_upper_bound=BESIDE_VOXELS * h)[0]
+        index = index[(far > CLEAR_VOXELS * h) & np.isfinite(far)]
+    index = index[box.values[tuple(index.T)] < 0]
+    return np.asarray(index[:: max(1, len(index) // PLACES)])
+
+
+def _patches(scene: Scene, tube: Tube, index: NDArray[np.int64]) -> tuple[NDArray[np.float32], Array]:
+    """Grey less the tube's around places (n, 3), and the share of it (n,) that was read: the rest is 0."""
+    voxels, model = predicted(TubeData(scene.grey, scene.spacing, scene.noise), tube)
     offset = np.arange(-HALF, HALF + 1)
-    known = box.values[tuple(index.T)] < 0
-    index = index[known][:: max(1, int(known.sum()) // PLACES)]
-    if len(index) < 50:
-        return Inflation()
     i, j, k = (index[:, axis, None] + offset for axis in range(3))
-    patches = scene.grey[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
-    read = np.mean(patches != 0, axis=(1, 2, 3)) > 0.8
-    if read.sum() < 50:
-        return Inflation()
+    at = (i[:, :, None, None], j[:, None, :, None], k[:, None, None, :])
+    grey = scene.grey[at]
+    light = sparse_zeros(scene.grey.shape, np.float32)
+    light.reshape(-1)[voxels] = model
+    return np.asarray(grey - light[at]), np.asarray(np.mean(grey != 0, axis=(1, 2, 3)))
+
+
+def inflation(scene: Scene, curve: Array, tube: Tube) -> Inflation:
+    """Measured at places of the lumen beside the wire; 1 where there is no room to measure.
+
+    curve : (n, 3) kernel coordinates of the ``tube`` that was fitted. White noise gives 1 by construction.
+    """
+    h = float(scene.spacing.min())
+    index = _places(scene, curve)
+    if scene.spacing.max() > 1.5 * h or len(index) < LEAST:
+        return NO_INFLATION
+    patches, read = _patches(scene, tube, index)
+    known = read > 0.8
+    if known.sum() < LEAST:
+        return NO_INFLATION
     # voxels outside the halo were not read and are 0: the response is put on the scale of those that were
-    share = np.sqrt(np.mean(patches[read] != 0))
-    across, along = (_spread(patches[read], t) for t in _templates(sigma_mm / h))
-    return Inflation(max(0.8, across / share / scene.noise), max(0.8, along / share / scene.noise))
+    scale = scene.noise**2 * read[known, None]
+    across, along = (_responses(patches[known], t) / scale for t in _templates(tube.sigma / h))
+    depth = scene.region.box.values[tuple(index[known].T)]
+    groups = np.array_split(np.argsort(depth), max(1, min(DEPTHS, len(depth) // LEAST)))
+    return Inflation(
+        np.array([np.mean(depth[g]) for g in groups]),
+        np.array([max(0.8, _spread(across[g])) for g in groups]),
+        np.array([max(0.8, _spread(along[g])) for g in groups]),
+    )

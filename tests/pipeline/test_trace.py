@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.compare import point_to_curve
@@ -14,6 +15,10 @@ from pipeline.model import Curve, Lumen, Volume
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import trace, trace_region
+from pipeline.trace.background import wall_blur
+from pipeline.trace.in_plane import near_rotation_plane
+from pipeline.trace.level import levelled
+from pipeline.trace.scene import build_scene
 from solver.grid import Grid
 from tests.pipeline import phantoms, tangles
 
@@ -95,13 +100,83 @@ def test_the_curve_turns_with_the_volume():
     assert point_to_curve(other.points_mm, plain.points_mm)[0].max() < 0.1 * VOXEL
 
 
-def test_without_a_reference_the_curve_is_wider_stated_and_still_on_the_wire():
+def fading(shape, origin, wire):
+    """Share of the contrast at every voxel: it falls by a third along z and is lowest at the tip."""
+    z = origin[2] + VOXEL * np.arange(shape[2])
+    share = np.clip((z - wire[0, 2]) / (wire[-1, 2] - wire[0, 2]), 0, 1)
+    return np.broadcast_to(1 - 0.33 * share, shape)
+
+
+def test_without_a_reference_uneven_contrast_neither_moves_the_tip_nor_goes_unstated():
+    origin, empty, wired, wire, entry, direction = vessel()
+    faded = phantoms.BACKGROUND + (empty - phantoms.BACKGROUND) * fading(empty.shape, origin, wire)
+    spread = {}
+    for name, clean in (("even", wired), ("fading", faded + wired - empty)):
+        frame = Volume(np.asfortranarray(phantoms.scan(clean, 0.8, PEAK / 16, 5)), [VOXEL] * 3, origin)
+        curve = trace(frame, segment(frame, entry[None]), entry, direction)
+        assert curve.status is FrameStatus.OK
+        assert point_to_curve(curve.points_mm, wire)[0].mean() < 0.06 * VOXEL
+        assert np.linalg.norm(curve.points_mm[-1] - wire[-1]) < 0.35 * VOXEL
+        near = cKDTree(wire).query(curve.points_mm)[1]
+        t = np.gradient(wire, axis=0)[near]
+        side = np.cross(t, [0.0, 0.0, 1.0])
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        pull = (np.sum((curve.points_mm - wire[near]) * side, axis=1) / curve.sigma_mm)[2:-6]
+        assert 0.5 < pull.std() < 1.5
+        spread[name] = curve.sigma_mm.mean()
+    assert spread["fading"] > spread["even"]
+
+
+def test_the_lumens_level_is_found_under_the_wire_and_leaves_an_even_lumen_alone():
+    origin, empty, _, wire, *_ = vessel()
+    lumen = scans(16)[2]
+    faded = phantoms.BACKGROUND + (empty - phantoms.BACKGROUND) * fading(empty.shape, origin, wire)
+    left = []
+    for clean in (empty, faded):
+        frame = Volume(ndimage.gaussian_filter(clean.astype(np.float32), 0.8), [VOXEL] * 3, origin)
+        scene = build_scene(frame, lumen, None)
+        even = levelled(scene, scene.local(wire[::50]), 0.27, wall_blur(lumen, VOXEL))
+        deep = (scene.region.box.values < -0.6) & (scene.region.box.values > -1.5)
+        left.append([float(np.sqrt(np.mean(s.grey[deep] ** 2))) for s in (scene, even)])
+    (_, untouched), (before, after) = left
+    assert untouched < 6.0
+    assert after < 25.0
+    assert before > 3 * after
+
+
+def test_correlated_noise_that_hides_the_wire_is_a_named_status():
+    for seed in range(3):
+        curve, outcome = tangles.run(seed, cnr=4.0, kind=0, correlation=0.8)
+        assert outcome.right or curve.status is not FrameStatus.OK
+
+
+def test_points_nearly_parallel_to_the_rotation_plane_are_marked():
     frame, reference, lumen = scans(8)
     _, _, _, wire, entry, direction = vessel()
-    alone = trace(frame, lumen, entry, direction)
-    both = trace(frame, lumen, entry, direction, reference=reference)
-    assert point_to_curve(alone.points_mm, wire)[0].mean() < 0.15 * VOXEL
-    assert alone.sigma_mm.mean() > 1.2 * both.sigma_mm.mean()
+    plain = trace(frame, lumen, entry, direction, reference=reference)
+    near = cKDTree(wire).query(plain.points_mm)[1]
+    t = np.gradient(wire, axis=0)[near]
+    t /= np.linalg.norm(t, axis=1)[:, None]
+    for axis, config in ((2, TraceConfig()), (0, TraceConfig(rotation_axis=(1.0, 0.0, 0.0)))):
+        curve = trace(frame, lumen, entry, direction, reference=reference, config=config)
+        climb = np.degrees(np.arcsin(np.abs(t[:, axis])))
+        assert curve.in_plane[climb < 7].all()
+        assert not curve.in_plane[climb > 13].any()
+        np.testing.assert_array_equal(curve.points_mm, plain.points_mm)
+        assert curve.counters["in_plane_mm"] == pytest.approx(curve.in_plane.mean() * curve.length_mm)
+    assert 0 < curve.in_plane.sum() < len(t)
+
+
+def test_the_rotation_plane_of_a_ring_and_of_a_line():
+    a = np.linspace(0, 2 * np.pi, 200)
+    ring = np.stack([10 * np.cos(a), 10 * np.sin(a), 0 * a], axis=1)
+    assert near_rotation_plane(ring, [0, 0, 2], 10).all()
+    # a ring about x lies in the x-y plane only where it runs along y: within 10 degrees of it, a ninth of it
+    assert near_rotation_plane(ring[:, [2, 0, 1]], [0, 0, 1], 10).mean() == pytest.approx(1 / 9, abs=0.03)
+    line = np.linspace(0, 5, 30)[:, None] * [np.cos(0.2), 0, np.sin(0.2)]
+    assert near_rotation_plane(line, [0, 0, 1], 11.6).all()
+    assert not near_rotation_plane(line, [0, 0, 1], 11.3).any()
+    assert near_rotation_plane(line[:1], [0, 0, 1], 10).tolist() == [False]
 
 
 def test_a_crop_of_the_frame_and_a_lumen_on_another_lattice_do():
@@ -166,8 +241,6 @@ def test_a_straight_wire_in_thick_slices():
         weight = np.prod(1 - np.abs(index - cell), axis=1)
         keep = np.all((cell >= 0) & (cell < fine.shape), axis=1)
         np.add.at(fine, tuple(cell[keep].T), weight[keep])
-    from scipy import ndimage
-
     blurred = ndimage.gaussian_filter(fine, 0.8).reshape(100, 30, 14, 4).mean(axis=3)
     grey = 400 * blurred / blurred.max() + np.random.default_rng(0).normal(0, 12, shape)
     volume = Volume(grey.astype(np.float32), size, [0.25, 0.25, 0.25 + 0.75])
