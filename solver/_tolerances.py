@@ -59,3 +59,6 @@ BUDGET_STEPS = 20
 """Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
+FORETOLD = 100.0
+"""A step that fell by D + T where the model said D leaves a decrement of about 2 to 10 T²/D (from the third and
+fourth order of the energy): below a tenth of the tolerance the next sweep would only confirm it."""

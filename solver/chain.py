@@ -122,6 +122,7 @@ class Buffers:
             scratch=scratch,
             switch=self.switch,
             twisting=self.wire.twists,
+            straight=self.rollable and self.switch.direction and not self.wire.twists,
         )
         table = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, self.wire.segment_mm, table)
@@ -138,6 +139,11 @@ class Buffers:
     def state(self) -> State:
         """Controls, joints and frames."""
         return self.problem.state
+
+    @property
+    def rollable(self) -> bool:
+        """Rolling a straight wire with one bending stiffness and a round hull changes nothing."""
+        return self.wire.straight and (self.wall is None or self.wall.samples == 0)
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""

@@ -70,13 +70,12 @@ class Insertion:
         self.buffers = buffers_for(wire, wall, self.settings)
         self.orders = self.settings.orders
         direction = unit(entry_direction, "entry_direction")
-        round_hull = wall is None or wall.samples == 0
         self.base = Base(
             entry=_vector("entry_mm", entry_mm),
             frame=np.ascontiguousarray(base_frame(direction, material_axis, 0.0)),
             load=_vector("tip_load_N", tip_load_N),
             translate=initial == "translate",
-            idle_roll=wire.straight and round_hull and self.settings.switch.roll,
+            idle_roll=self.buffers.rollable and self.settings.switch.roll,
             step=float(step_mm),
             turn=float(roll_step_deg),
             rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),

@@ -24,6 +24,7 @@ from solver._kernels.problem import (
     ROLLOUTS,
     ROLLS,
     START,
+    STRAIGHT,
     SWEEPS,
     Switch,
 )
@@ -139,6 +140,7 @@ def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, flo
         "levenberg": float(counter[LEVENBERG]),
         "rest_shapes": float(counter[IDLE]),
         "rolls_proven_idle": float(counter[ROLLS]),
+        "sweeps_without_roll": float(counter[STRAIGHT]),
         "start_energy_N_mm": start_energy,
     }
 

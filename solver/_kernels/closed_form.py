@@ -19,8 +19,10 @@ from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.follow import aim
+from solver._kernels.joint import jacobian
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, ROUND_OFF, STALLED, admissible, scale_of
-from solver._kernels.newton import costate, jacobian, node_gradient, sweep
+from solver._kernels.newton import costate, sweep
+from solver._kernels.node import node_gradient
 from solver._kernels.problem import ROLLOUTS, SWEEPS, Problem
 from solver._kernels.rotation import turn
 from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9

@@ -9,9 +9,10 @@ from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
-from solver._kernels.newton import costate, place, rollout, sweep
+from solver._kernels.newton import costate, sweep
 from solver._kernels.passage import crossed
 from solver._kernels.problem import BENDING, IDLE, LEVENBERG, LOAD, ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
+from solver._kernels.rollout import place, rollout
 
 # how a relaxation ends
 CONVERGED, EXHAUSTED, STALLED, BROKEN = range(4)
@@ -25,6 +26,7 @@ FIRST_DAMPING = tol.FIRST_DAMPING
 LEAST_DAMPING = tol.LEAST_DAMPING
 WORST_DAMPING = tol.WORST_DAMPING
 SEARCHES = tol.SEARCHES
+FORETOLD = tol.FORETOLD
 
 
 @kernel
@@ -183,7 +185,13 @@ def minimise(
                 if trial == math.inf:
                     return STALLED, iteration, which, energy
         if trial <= energy:
+            missed = energy - trial - report[0]
+            foretold = FORETOLD * missed * missed <= tolerance * scale_of(problem, which, k) * report[0]
             which, energy = 1 - which, trial
+            if foretold and definite and damping == 0.0:
+                costate(problem, which, k, report)
+                if at_rest(problem, which, k, report):
+                    return CONVERGED, iteration + 1, which, energy
             last, patience = max(damping, LEAST_DAMPING), patience - 1
             if patience <= 0:
                 damping = 0.2 * damping if damping > LEAST_DAMPING else 0.0

@@ -95,7 +95,7 @@ def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float, weigh
     top = 0.0
     for i in range(1, 2 + math.ceil(2 * (step + LOOK_AHEAD) / spacing)):
         here = distance_at(field, a, 0.5 * i * spacing / step, b, weights)
-        if here < top - HOP * spacing:
+        if top > 0.0 and here < top - HOP * spacing:
             return True
         top = max(top, here)
     return False

@@ -8,8 +8,8 @@ from solver._kernels.layout import Chain
 from solver._kernels.spline import Field
 
 # places in the work counters
-FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS = range(8)
-COUNTERS = 8
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT = range(9)
+COUNTERS = 9
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 # places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``
@@ -47,12 +47,14 @@ class Switch(NamedTuple):
 
     clearance : no look-up for a point that moved less than its clearance.     cheap : trilinear look-up first.
     idle : the rest shape is the answer where it touches nothing.     roll : of a straight round wire is no step.
+    direction : of a straight round wire is its state, without the roll of its frames.
     """
 
     clearance: bool = True
     cheap: bool = True
     idle: bool = True
     roll: bool = True
+    direction: bool = True
 
 
 class Friction(NamedTuple):
@@ -70,7 +72,10 @@ class Friction(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """A wire in a wall. stiffness : wall, N/mm per mm, 0 is no wall.  spacing : of the grid, mm."""
+    """A wire in a wall. stiffness : wall, N/mm per mm, 0 is no wall.  spacing : of the grid, mm.
+
+    straight : no rest bend, one bending stiffness, a round hull and no twist: a direction is all of a frame.
+    """
 
     field: Field
     stiffness: float
@@ -81,3 +86,4 @@ class Problem(NamedTuple):
     scratch: Scratch
     switch: Switch
     twisting: bool
+    straight: bool

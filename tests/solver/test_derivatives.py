@@ -14,7 +14,8 @@ from solver import Grid, GuideWire, Status, VesselWall
 from solver._kernels.closed_form import gradients
 from solver._kernels.energy import total_energy
 from solver._kernels.follow import aim
-from solver._kernels.newton import costate, place, sweep
+from solver._kernels.newton import costate, sweep
+from solver._kernels.rollout import place
 from solver._kernels.rotation import jacobian_terms, sine_terms
 from solver.chain import Buffers, base_frame
 from solver.relax import Settings, buffers_for, relax_buffers, set_loads

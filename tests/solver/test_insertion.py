@@ -112,6 +112,7 @@ SWITCHES = {
     "cheap": (Switch(cheap=False), "wall_look_ups_cheap"),
     "idle": (Switch(idle=False), "rest_shapes"),
     "roll": (Switch(roll=False), "rolls_proven_idle"),
+    "direction": (Switch(direction=False), "sweeps_without_roll"),
 }
 
 

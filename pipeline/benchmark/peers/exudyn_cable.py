@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 NAME = "Exudyn"
 PACKAGE = "exudyn"
 LOAD_STEPS = 10
+SMALLEST_STEP_MM = 0.05
+"""A push that has no answer even in steps of this length is given up."""
 DENSITY = 1e-6
 """kg/mm of wire; a static answer does not depend on it."""
 
@@ -42,8 +44,8 @@ def _settings(load_steps: int, sparse: bool) -> Any:
     settings.staticSolver.verboseMode = 0
     settings.staticSolver.verboseModeFile = 0
     settings.staticSolver.numberOfLoadSteps = load_steps
-    settings.staticSolver.newton.relativeTolerance = 1e-9
-    settings.staticSolver.newton.absoluteTolerance = 1e-10
+    settings.staticSolver.newton.relativeTolerance = 1e-8
+    settings.staticSolver.newton.absoluteTolerance = 1e-9
     settings.staticSolver.newton.maxIterations = 50
     settings.staticSolver.adaptiveStep = True
     settings.linearSolverSettings.ignoreSingularJacobian = False
@@ -92,6 +94,7 @@ def bend(n: int, steps: int = STEPS_B, pushes: int | None = None) -> Answer:
         model.push(DEPTH_B_MM * (i + 1) / steps, DEPTH_B_MM / steps)
         seconds.append(process_time() - start)
     note = "ANCFCable (3D), static Newton, wall through GenericODE2 callbacks (force and sparse Jacobian)"
+    note += f", {model.halved} steps halved"
     return Answer(model.points(), np.array(seconds), note, wall.seconds / sum(seconds))
 
 
@@ -99,7 +102,7 @@ class _Model:
     """The wire, its wall and its moving clamp."""
 
     def __init__(self, n: int, wall: WallAtNodes) -> None:
-        self.n, self.wall = n, wall
+        self.n, self.wall, self.halved = n, wall, 0
         self.element = DEPTH_B_MM / n
         self.mbs = exu.SystemContainer().AddSystem()
         self.start = np.zeros((n + 1, 6))
@@ -164,20 +167,33 @@ class _Model:
         return container
 
     def push(self, depth_mm: float, step_mm: float) -> None:
+        """Push to a depth; a step that finds no answer is taken back and halved, as its user would."""
+        before = np.asarray(self.mbs.systemData.GetODE2Coordinates()).copy()
+        if self._step(before, depth_mm, step_mm):
+            return
+        self.halved += 1
+        if step_mm < SMALLEST_STEP_MM:
+            msg = f"Exudyn: no static solution at {depth_mm:g} mm"
+            raise RuntimeError(msg)
+        self.mbs.systemData.SetODE2Coordinates(before, configuration=exu.ConfigurationType.Initial)
+        self.mbs.systemData.SetODE2Coordinates(before)
+        self.push(depth_mm - 0.5 * step_mm, 0.5 * step_mm)
+        self.push(depth_mm, 0.5 * step_mm)
+
+    def _step(self, before: Array, depth_mm: float, step_mm: float) -> bool:
         """One static step: the material slides along the wire's own curve, then Newton."""
         self.mbs.SetObjectParameter(self.clamp, "offset", depth_mm)
-        data = self.mbs.systemData
-        state = np.asarray(data.GetODE2Coordinates()).copy()
-        count = 6 * (self.n + 1)
+        state, count = before.copy(), 6 * (self.n + 1)
         now = state[:count].reshape(-1, 6) + self.start
         tangent = now[:, 3:] / np.linalg.norm(now[:, 3:], axis=1)[:, None]
         moved = now.copy()
         moved[:, :3] += step_mm * tangent
         state[:count] = (moved - self.start).ravel()
-        data.SetODE2Coordinates(state, configuration=exu.ConfigurationType.Initial)
-        if not self.mbs.SolveStatic(self.settings, updateInitialValues=True):
-            msg = f"Exudyn: no static solution at {depth_mm:g} mm"
-            raise RuntimeError(msg)
+        self.mbs.systemData.SetODE2Coordinates(state, configuration=exu.ConfigurationType.Initial)
+        try:
+            return bool(self.mbs.SolveStatic(self.settings, updateInitialValues=True))
+        except exu.SolverError:
+            return False
 
     def points(self) -> Array:
         """Nodes (n + 1, 3) mm."""
