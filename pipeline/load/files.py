@@ -12,6 +12,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import Box, Header, LoadError, Source
+from pipeline.load.raw import read_mha_box
 
 ORTHONORMAL = 1e-3
 """Largest departure of a direction matrix from orthonormal: header rounding is below 1e-4, a shear far above."""
@@ -87,6 +88,9 @@ def read_file_header(source: Source) -> Header:
 
 def read_file(header: Header, box: Box) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z; only that region is read where the format can stream."""
+    part = None if box == header.box else read_mha_box(header.source.path, box)
+    if part is not None:
+        return part
     reader = _reader(header.source)
     (start, stop) = box
     index = list(start)

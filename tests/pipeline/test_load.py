@@ -12,6 +12,7 @@ import SimpleITK as sitk
 
 from pipeline.config import LoadConfig
 from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
+from pipeline.load.raw import read_mha_box
 from pipeline.scans import _expanded
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
@@ -53,6 +54,42 @@ def test_a_crop_is_the_same_voxels_at_the_same_place(tmp_path: Path, suffix: str
     crop = load(header, ((1, 2, 3), (4, 6, 8)))
     np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
     np.testing.assert_allclose(crop.to_mm([0, 0, 0]), header.grid.to_mm([1, 2, 3]), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.float32, np.float64])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_crop_of_an_mha_is_the_crop_of_all_of_it(tmp_path: Path, kind: type, compressed: bool) -> None:
+    path = tmp_path / "scan.mha"
+    values = (numbered() % 120).astype(kind)
+    sitk.WriteImage(image_of(values), str(path), useCompression=compressed)
+    box = ((1, 0, 2), (5, 6, 9))
+    crop = load(read_header(path), box)
+    assert crop.values.dtype == kind
+    np.testing.assert_array_equal(crop.values, values[1:5, 0:6, 2:9])
+    assert (read_mha_box(path, box) is None) == compressed
+
+
+def test_big_endian_and_detached_data_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "scan.mha"
+    sitk.WriteImage(image_of(numbered()), str(path), useCompression=False)
+    raw = path.read_bytes()
+    at = raw.index(b"LOCAL\n") + 6
+    head = raw[:at].replace(b"BinaryDataByteOrderMSB = False", b"BinaryDataByteOrderMSB = True")
+    path.write_bytes(head + np.frombuffer(raw[at:], "<i2").astype(">i2").tobytes())
+    box = ((1, 2, 3), (4, 6, 8))
+    np.testing.assert_array_equal(load(read_header(path), box).values, numbered()[1:4, 2:6, 3:8])
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mhd"), useCompression=False)
+    crop = load(read_header(tmp_path / "scan.mhd"), box)
+    np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
+
+
+def test_loaded_voxels_outlive_the_image_that_holds_them(tmp_path: Path) -> None:
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
+    volumes = [load(read_header(tmp_path / "scan.mha")) for _ in range(3)]
+    others = [sitk.Image(5, 7, 9, sitk.sitkInt16) + 77 for _ in range(20)]  # would land in freed memory
+    for volume in volumes:
+        np.testing.assert_array_equal(volume.values, numbered())
+    assert len(others) == 20
 
 
 def test_an_hdf5_sequence_is_one_header_a_volume(tmp_path: Path) -> None:
