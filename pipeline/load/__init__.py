@@ -13,6 +13,7 @@ from pipeline.load.dicom import read_dicom, read_dicom_header
 from pipeline.load.files import read_file, read_file_header
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry
 from pipeline.load.hdf5 import read_hdf5, read_hdf5_header
+from pipeline.load.multiframe import frames_of
 from pipeline.model import Volume
 
 __all__ = ["Box", "Header", "LoadError", "Source", "load", "read_header", "require_same_geometry"]
@@ -22,12 +23,20 @@ def _is_hdf5(path: Path) -> bool:
     return path.suffix.lower() in {".h5", ".hdf5"}
 
 
+def _is_dicom_stack(path: Path) -> bool:
+    """A folder of slices, or one enhanced multi-frame file."""
+    if path.is_dir():
+        return True
+    return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
+
+
 def read_header(
     source: Source | str | Path, config: LoadConfig = LoadConfig(), spacing_mm: ArrayLike | None = None
 ) -> Header:
     """Geometry of a scan without its voxels.
 
-    source : a file (.mha .mhd .nrrd .nhdr .nii .nii.gz .dcm .h5) or a folder with one DICOM series.
+    source : a file (.mha .mhd .nrrd .nhdr .nii .nii.gz .dcm .h5) or a folder with one DICOM series (an
+    enhanced multi-frame .dcm counts as one).
     spacing_mm : (3,) overrides what the file says; the header then lists it as assumed.
     Raises LoadError: unreadable, not 3-D, sheared, tilted, missing slices, mixed series.
     """
@@ -35,7 +44,7 @@ def read_header(
     if not source.path.exists():
         msg = f"{source.path}: no such file or folder; check the path in the manifest (relative to the manifest itself)"
         raise LoadError(msg)
-    if source.path.is_dir():
+    if _is_dicom_stack(source.path):
         header, _ = read_dicom_header(source, config.resample)
     elif _is_hdf5(source.path):
         header = read_hdf5_header(source)
@@ -52,7 +61,7 @@ def read_header(
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
-    if header.source.path.is_dir():
+    if _is_dicom_stack(header.source.path):
         _, stack = read_dicom_header(header.source, config.resample)
         values = read_dicom(header, stack, (start, stop))
     elif _is_hdf5(header.source.path):

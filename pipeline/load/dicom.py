@@ -18,6 +18,7 @@ from scipy.ndimage import shift as shift_slice
 
 from pipeline.load.files import to_xyz
 from pipeline.load.geometry import Box, Header, LoadError, Source
+from pipeline.load.multiframe import Frames, frames_of
 
 GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
 TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
@@ -26,7 +27,10 @@ POSITION, ORIENTATION, PIXEL_SPACING = "0020|0032", "0020|0037", "0028|0030"
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """Slices of one series in order: files, positions (n, 3) in mm, in-plane axes (3, 2), pixel (2,) mm, size (2,)."""
+    """Slices of one series in order: files, positions (n, 3) in mm, in-plane axes (3, 2), pixel (2,) mm, size (2,).
+
+    frames : which frame of the one file each slice is, where a multi-frame file holds them all.
+    """
 
     files: tuple[Path, ...]
     positions: NDArray[np.float64]
@@ -34,6 +38,11 @@ class Stack:
     pixel_mm: NDArray[np.float64]
     size: tuple[int, int]
     pixel_type: str
+    frames: tuple[int, ...] = ()
+
+    def name(self, i: int) -> str:
+        """What a message calls a slice."""
+        return f"frame {self.frames[i] + 1}" if self.frames else self.files[i].name
 
     @property
     def normal(self) -> NDArray[np.float64]:
@@ -96,14 +105,37 @@ def _is_image(path: str) -> bool:
         reader.ReadImageInformation()
     except RuntimeError:
         return False
-    return bool(reader.HasMetaDataKey(POSITION))
+    return bool(reader.HasMetaDataKey(POSITION)) or frames_of(Path(path)) is not None
+
+
+def _multiframe_stack(source: Source, path: Path, frames: Frames) -> Stack:
+    """The frames of one file, sorted along their normal."""
+    reader = sitk.ImageFileReader()
+    reader.SetFileName(str(path))
+    reader.ReadImageInformation()
+    size = reader.GetSize()
+    count = size[2] if len(size) > 2 else 1
+    if count != len(frames.positions):
+        msg = f"{path}: the file holds {count} frames and positions of {len(frames.positions)}; allowed: one for each."
+        raise LoadError(msg + " Export the series again.")
+    _require_uniform(source, list(frames.orientations), list(frames.pixels_mm), [size[:2]])
+    axes = frames.orientations[0].reshape(2, 3).T
+    order = np.argsort(frames.positions @ np.cross(axes[:, 0], axes[:, 1]), kind="stable")
+    return Stack(
+        (path,) * count, frames.positions[order], axes, frames.pixels_mm[0][::-1], (size[0], size[1]),
+        sitk.GetPixelIDValueAsString(reader.GetPixelID()), tuple(int(i) for i in order),
+    )  # fmt: skip
 
 
 def read_stack(source: Source) -> Stack:
-    """Headers of the one series in a folder, sorted along the slice normal."""
+    """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
+    names = _series_files(source.path, source.dataset) if source.path.is_dir() else (str(source.path),)
+    several = frames_of(Path(names[0])) if len(names) == 1 else None
+    if several is not None:
+        return _multiframe_stack(source, Path(names[0]), several)
     files, positions, orientations, pixels, sizes = [], [], [], [], []
     pixel_type = ""
-    for name in _series_files(source.path, source.dataset):
+    for name in names:
         reader = sitk.ImageFileReader()
         reader.SetFileName(name)
         reader.ReadImageInformation()
@@ -146,7 +178,7 @@ def irregularities(stack: Stack) -> list[str]:
     usual = stack.spacing_mm
     odd = np.flatnonzero(np.abs(gaps - usual) > GAP_TOLERANCE * usual)
     if len(odd) and usual > 1e-3:
-        where = ", ".join(f"{gaps[i]:.3f} mm after {stack.files[i].name}" for i in odd[:4])
+        where = ", ".join(f"{gaps[i]:.3f} mm after {stack.name(i)}" for i in odd[:4])
         whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(
             gaps[odd] > usual
         )
@@ -194,8 +226,11 @@ def read_dicom_header(source: Source, resample: bool) -> tuple[Header, Stack]:
 def read_dicom(header: Header, stack: Stack, box: Box) -> NDArray[Any]:
     """Voxels of ``box``: of a regular stack the needed slices alone, of an irregular one the resampled grid."""
     (x0, y0, z0), (x1, y1, z1) = box
-    if header.assumed:
+    if any("resampled" in text for text in header.assumed):
         return _resampled(header, stack)[x0:x1, y0:y1, z0:z1]
+    if stack.frames:
+        whole = to_xyz(sitk.ReadImage(str(stack.files[0])))
+        return np.asfortranarray(whole[x0:x1, y0:y1, list(stack.frames[z0:z1])])
     reader = sitk.ImageSeriesReader()
     reader.SetFileNames([str(f) for f in stack.files[z0:z1]])
     return to_xyz(reader.Execute())[x0:x1, y0:y1]
@@ -205,10 +240,14 @@ def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
     """Linear between the two nearest slices, each first shifted in plane by its drift (undoes the tilt)."""
     heights = stack.heights - stack.heights[0]
     slices: dict[int, NDArray[np.float32]] = {}
+    whole = to_xyz(sitk.ReadImage(str(stack.files[0]))) if stack.frames else None
 
     def straightened(i: int) -> NDArray[np.float32]:
         if i not in slices:
-            plane = to_xyz(sitk.ReadImage(str(stack.files[i])))[:, :, 0].astype(np.float32)
+            if whole is None:
+                plane = to_xyz(sitk.ReadImage(str(stack.files[i])))[:, :, 0].astype(np.float32)
+            else:
+                plane = whole[:, :, stack.frames[i]].astype(np.float32)
             slices[i] = shift_slice(
                 plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min())
             )

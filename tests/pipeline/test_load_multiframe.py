@@ -1,0 +1,63 @@
+"""Enhanced multi-frame DICOM: geometry from the frames themselves, and what is irregular refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config import LoadConfig
+from pipeline.load import LoadError, load, read_header
+from tests.pipeline.enhanced_dicom import enhanced
+from tests.pipeline.test_load import ORIGIN, SPACING, numbered, straight_stack
+
+
+@pytest.mark.parametrize("implicit", [False, True])
+@pytest.mark.parametrize("delimited", [False, True])
+def test_frames_are_placed_by_their_own_positions(tmp_path: Path, implicit: bool, delimited: bool) -> None:
+    """Written from the top down: SimpleITK alone gives such a file the wrong direction."""
+    path = tmp_path / "scan.dcm"
+    turned = numbered()[:, :, ::-1]
+    path.write_bytes(enhanced(turned, SPACING, straight_stack()[::-1], implicit, delimited))
+    header = read_header(path)
+    assert header.item_count == 1
+    np.testing.assert_allclose(header.spacing_mm, SPACING, rtol=1e-9)
+    np.testing.assert_allclose(header.origin_mm, ORIGIN)
+    np.testing.assert_allclose(header.direction, np.eye(3))
+    np.testing.assert_array_equal(load(header).values, numbered())
+    crop = load(header, ((1, 2, 3), (4, 6, 8)))
+    np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
+
+
+def test_a_folder_with_one_multiframe_file_is_a_series(tmp_path: Path) -> None:
+    (tmp_path / "series").mkdir()
+    (tmp_path / "series" / "scan.dcm").write_bytes(enhanced(numbered(), SPACING, straight_stack()))
+    np.testing.assert_array_equal(load(read_header(tmp_path / "series")).values, numbered())
+
+
+def test_a_missing_frame_is_named_or_filled_on_request(tmp_path: Path) -> None:
+    positions = straight_stack()
+    path = tmp_path / "scan.dcm"
+    path.write_bytes(enhanced(np.delete(numbered(), 4, axis=2), SPACING, [*positions[:4], *positions[5:]]))
+    with pytest.raises(LoadError, match=r"missing slices: 1 of 7 gaps differ from 0\.700 mm .*after frame 4"):
+        read_header(path)
+    asked = LoadConfig(resample=True)
+    header = read_header(path, asked)
+    assert "missing slices" in header.assumed[0]
+    np.testing.assert_allclose(load(header, None, asked).values, numbered(), atol=1e-3)  # linear along z
+
+
+def test_a_tilted_multiframe_file_is_refused(tmp_path: Path) -> None:
+    positions = [(x, y + 0.5 * k, z) for k, (x, y, z) in enumerate(straight_stack())]
+    (tmp_path / "scan.dcm").write_bytes(enhanced(numbered(), SPACING, positions))
+    with pytest.raises(LoadError, match="gantry tilt"):
+        read_header(tmp_path / "scan.dcm")
+
+
+def test_two_stacks_in_one_file_are_refused(tmp_path: Path) -> None:
+    """Two phases at the same places: which one is meant cannot be known."""
+    twice = np.concatenate([numbered(), numbered() + 1], axis=2)
+    (tmp_path / "scan.dcm").write_bytes(enhanced(twice, SPACING, straight_stack() * 2))
+    with pytest.raises(LoadError, match="repeated position"):
+        read_header(tmp_path / "scan.dcm", LoadConfig(resample=True))
