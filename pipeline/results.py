@@ -49,8 +49,6 @@ def error_row(frame: Frame) -> dict[str, Any]:
         row["skill"] = skill_of(c.rms_mm, frame.nulls_rms_mm.get("centreline", NAN))
     if frame.curve is not None and len(frame.curve.sigma_mm):
         row["trace_sigma_mm"] = float(np.sqrt(np.mean(np.asarray(frame.curve.sigma_mm) ** 2)))
-        row["trace_flagged"] = float(np.mean(np.asarray(frame.curve.flagged)))
-        row["trace_in_plane"] = float(np.mean(np.asarray(frame.curve.in_plane)))
     if frame.simulated is not None:
         s = frame.simulated
         row |= {"max_penetration_mm": s.max_penetration_mm, "push_force_N": s.push_force_N}
@@ -190,7 +188,7 @@ def result_of(
         "sentence": str(run.failure) if run.failure else _first_sentence(run.frames),
         "frames": [
             {k: getattr(f, k) for k in ("status", "sentence", "stage", "message")}
-            | {"frame": f.index, "registration": record(f.registration)}
+            | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
             for f in run.frames
         ],
         "counts": {"ok": row["frames_ok"], "failed": row["frames_failed"]},
@@ -210,6 +208,14 @@ def result_of(
         "config": settings,
         **extra,
     }
+
+
+def _marked(frame: Frame) -> dict[str, float]:
+    """Shares of a frame's traced points that are flagged, and that run nearly in the plane of rotation."""
+    if frame.curve is None or len(frame.curve.points_mm) == 0:
+        return {}
+    marks = {"flagged": frame.curve.flagged, "in_plane": frame.curve.in_plane}
+    return {name: float(np.mean(np.asarray(values))) for name, values in marks.items()}
 
 
 def _clamps(run: CaseRun) -> dict[str, Any]:
