@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.advance import settle_once
 from solver._kernels.follow import follow
 from solver._kernels.layout import Rule
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
@@ -28,7 +27,7 @@ from solver._kernels.problem import (
     SWEEPS,
     Switch,
 )
-from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders
+from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders, hold, measure, settle
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
 from solver.grid import read_only
@@ -122,8 +121,11 @@ def buffers_for(wire: GuideWire, wall: VesselWall | None, settings: Settings) ->
 
 def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     """Relax the current state of a work space in place; return status, iterations and energy, N mm."""
-    result = settle_once(b.problem, b.cut, b.k, settings.orders, b.report, b.force)
-    return OUTCOMES[result[0]], result[1], result[2]
+    if b.friction:
+        hold(b.problem, b.k)
+    outcome, iterations, energy = settle(b.problem, 0, b.k, settings.orders, b.report)
+    measure(b.problem, b.wire.profile, b.k, max(len(b.rule.hull), 1), b.report, b.force)
+    return OUTCOMES[outcome], iterations, energy
 
 
 def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, float]:

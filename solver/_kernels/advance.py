@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.energy import point_at
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inner, kernel
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.layout import Cut, lay_out, segments_at
@@ -59,6 +58,8 @@ def advance(
     at : (4,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, updated.     goal : (3,) depth, roll and the iterations allowed.
     """
     outcome, iterations, shrink = CONVERGED, 0, at[SHRINK]
+    now = 0 * orders.max_iterations
+    kept = np.empty(report.size)
     while True:
         if base.idle_roll and at[ROLL] != goal[ROLL]:
             at[ROLL] = goal[ROLL]
@@ -67,8 +68,18 @@ def advance(
         if abs(ahead) < MATCH and turn == 0.0:
             break
         fraction = min(1.0, shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
-        outcome, used = attempt(problem, cut, base, orders, at, ahead, turn, fraction, report)
+        depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
+        k = set_out(problem, cut, base, at, depth, roll, report, kept)
+        outcome, used, energy = CONVERGED, 0, 0.0
+        if k > 0:
+            outcome, used, energy = settle(problem, now, k, orders, report)
+            if outcome == CONVERGED and problem.stiffness > 0.0 and left_grid(problem, base, k):
+                outcome = LEFT_GRID
         iterations += used
+        if outcome == CONVERGED:
+            at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
+        else:
+            take_back(problem, cut, at, report, kept)
         if iterations > goal[2]:
             outcome = EXHAUSTED
             break
@@ -85,7 +96,7 @@ def advance(
     return outcome, iterations
 
 
-@kernel
+@inner
 def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, turn: float) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
     fraction = 1.0
@@ -105,41 +116,47 @@ def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, 
     return fraction
 
 
-@kernel
-def attempt(
-    problem: Problem, cut: Cut, base: Base, orders: Orders, at: Any, ahead: float, turn: float, fraction: float,
-    report: Any,
-) -> tuple[int, int]:  # fmt: skip
-    """Take a fraction of the way; on failure put everything back. Returns the outcome and the iterations."""
-    now = 0 * orders.max_iterations + NOW
+@inner
+def set_out(
+    problem: Problem, cut: Cut, base: Base, at: Any, depth: float, roll: float, report: Any, kept: Any
+) -> int:
+    """Keep the last good state and lay the wire out at a new depth and roll; return its number of segments."""
+    now = 0 * report.size
     was, _ = segments_at(at[DEPTH], cut.segment)
-    copy_state(problem, now, LAST_GOOD, was)
-    kept = report.copy()
-    depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
+    copy_state(problem, now, now + LAST_GOOD, was)
+    for i in range(report.size):
+        kept[i] = report[i]
     k, first = segments_at(depth, cut.segment)
-    outcome, iterations, energy = CONVERGED, 0, 0.0
     clamp(problem, base, roll)
-    if k == 0:
-        report[:] = 0.0
-        problem.state.parts[:] = 0.0
-    else:
-        lay_along(problem, cut, base, was, k, first, fraction * ahead)
-        outcome, iterations, energy = settle(problem, now, k, orders, report)
-        walled = outcome == CONVERGED and problem.stiffness > 0.0
-        if walled and furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin:
-            outcome = LEFT_GRID
-    if outcome == CONVERGED:
-        at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
-        return outcome, iterations
-    _, first = segments_at(at[DEPTH], cut.segment)
+    if k > 0:
+        lay_along(problem, cut, base, was, k, first, depth - at[DEPTH])
+        return k
+    for i in range(report.size):
+        report[i] = 0.0
+    for a in range(4):
+        problem.state.parts[NOW, a] = 0.0
+    return k
+
+
+@inner
+def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> None:
+    """Put the last good state back."""
+    now = 0 * report.size
+    was, first = segments_at(at[DEPTH], cut.segment)
     if was > 0:
         lay_out(problem.chain, cut, was, first)
-    copy_state(problem, LAST_GOOD, now, was)
-    report[:] = kept
-    return outcome, iterations
+    copy_state(problem, now + LAST_GOOD, now, was)
+    for i in range(report.size):
+        report[i] = kept[i]
 
 
-@kernel
+@inner
+def left_grid(problem: Problem, base: Base, k: int) -> bool:
+    """Whether a joint is further outside the grid than it may be."""
+    return bool(furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin)
+
+
+@inner
 def clamp(problem: Problem, base: Base, roll: float) -> None:
     """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
     angle = math.radians(roll)
@@ -151,7 +168,7 @@ def clamp(problem: Problem, base: Base, roll: float) -> None:
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, base.frame[a, 2]
 
 
-@kernel
+@inner
 def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: float, ahead: float) -> None:
     """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
     chain, state = problem.chain, problem.state
@@ -159,8 +176,9 @@ def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: f
     lay_out(chain, cut, k, first)
     if problem.twisting:
         keep_twist(state.u, was, k)
-    chain.load[:k] = 0.0
-    chain.load[k] = base.load
+    for n in range(k + 1):
+        for a in range(3):
+            chain.load[n, a] = base.load[a] if n == k else 0.0
     source, count = LAST_GOOD, was + 1
     if was == 0:
         source, count = TRIAL, begin(base, state.x[TRIAL])
@@ -171,7 +189,7 @@ def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: f
         anchor_friction(problem, state.x[LAST_GOOD], was, k, ahead)
 
 
-@kernel
+@inner
 def begin(base: Base, curve: Any) -> int:
     """Straight on from the entry, as two points."""
     for a in range(3):
@@ -180,7 +198,7 @@ def begin(base: Base, curve: Any) -> int:
     return 2
 
 
-@kernel
+@inner
 def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) -> int:
     """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
     curve, count = x[TRIAL], begin(base, x[TRIAL]) - 1
@@ -193,7 +211,7 @@ def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) ->
     return max(count, 2)
 
 
-@kernel
+@inner
 def keep_twist(u: Any, was: int, k: int) -> None:
     """Twist stays with the material, which is counted from the tip."""
     common = min(was, k)
@@ -201,7 +219,7 @@ def keep_twist(u: Any, was: int, k: int) -> None:
         u[NOW, j, 2] = u[LAST_GOOD, was - k + j, 2] if j >= k - common else 0.0
 
 
-@kernel
+@inner
 def anchor_friction(problem: Problem, curve: Any, was: int, k: int, ahead: float) -> None:
     """Note where each look-up point was before the step: its material was ``ahead`` mm further back.
 
@@ -225,18 +243,3 @@ def anchor_friction(problem: Problem, curve: Any, was: int, k: int, ahead: float
             for a in range(3):
                 along = t * (curve[m + 1, a] - curve[m, a]) if was > 0 else 0.0
                 start[p, a] = curve[m, a] + along + min(s, 0.0) * back[a]
-
-
-@kernel
-def settle_once(
-    problem: Problem, cut: Cut, k: int, orders: Orders, report: Any, force: Any
-) -> tuple[int, int, float]:
-    """One relaxation of state 0 and its forces; friction holds every look-up point where it is now."""
-    now = 0 * k + NOW
-    if problem.friction.coefficient > 0.0:
-        for n in range(1, k + 1):
-            for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
-                point_at(problem, now, n, p, problem.friction.start[p])
-    outcome, iterations, energy = settle(problem, now, k, orders, report)
-    measure(problem, cut.profile, k, max(cut.rule.hull.shape[0], 1), report, force)
-    return outcome, iterations, energy

@@ -17,7 +17,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.flags import inlined, inner, kernel
 from solver._kernels.follow import aim
 from solver._kernels.joint import jacobian
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, ROUND_OFF, STALLED, admissible, scale_of
@@ -88,7 +88,7 @@ def after(problem: Problem, which: int, k: int, j: int, axis: int) -> float:
     return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
 
 
-@kernel
+@inner
 def propose(problem: Problem, which: int, k: int, share: float) -> None:
     """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
@@ -111,7 +111,7 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
         aim(chain, state.u[new], state.x[new], state.r[new], i)
 
 
-@kernel
+@inner
 def minimise_closed_form(
     problem: Problem, which: int, k: int, tolerance: float, max_sweeps: int, report: Any
 ) -> tuple[int, int, int, float]:

@@ -6,14 +6,15 @@ import math
 from typing import Any
 
 from solver._kernels.energy import slide_of
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inner
 from solver._kernels.layout import Profile
 from solver._kernels.problem import Problem
 from solver._kernels.rotation import turn
+from solver._kernels.small import load9, store9
 from solver._kernels.spline import Field
 
 
-@kernel
+@inner
 def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
 
@@ -22,6 +23,7 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
     chain, state, friction = problem.chain, problem.state, problem.friction
     deepest = 0.0
     slide = problem.scratch.slide
+    now = 0 * k
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
             share = -chain.offset[p, 2] / chain.length[n - 1]
@@ -33,14 +35,14 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
                     force[n, a] += (1 - share) * size * state.jet[0, p, 1 + a]
                     force[n - 1, a] += share * size * state.jet[0, p, 1 + a]
             if friction.coefficient > 0.0 and friction.load[p] > 0.0:
-                size = -friction.coefficient * friction.load[p] / slide_of(problem, 0, n, p, slide)
+                size = -friction.coefficient * friction.load[p] / slide_of(problem, now, n, p, slide)
                 for a in range(3):
                     force[n, a] += (1 - share) * size * slide[a]
                     force[n - 1, a] += share * size * slide[a]
     return deepest
 
 
-@kernel
+@inner
 def profile_at(at: Any, value: Any, s: float) -> float:
     """A piecewise linear function of the distance from the tip; at a jump the value further out."""
     n = at.size
@@ -52,7 +54,7 @@ def profile_at(at: Any, value: Any, s: float) -> float:
     return float(value[n - 1])
 
 
-@kernel
+@inner
 def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
@@ -88,7 +90,7 @@ def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: A
     return float(force)
 
 
-@kernel
+@inner
 def furthest_outside(field: Field, x: Any, k: int) -> float:
     """How far joints 1 to k are outside the grid's voxels (half a voxel beyond their centres) at most, mm."""
     m, o, shape = field.to_index, field.origin, field.coefficients.shape
@@ -105,7 +107,7 @@ def furthest_outside(field: Field, x: Any, k: int) -> float:
     return math.sqrt(furthest)
 
 
-@kernel
+@inner
 def least_turn_cosine(r: Any, k: int) -> float:
     """Cosine of the sharpest turn between consecutive segments."""
     least = 1.0
@@ -115,16 +117,21 @@ def least_turn_cosine(r: Any, k: int) -> float:
     return least
 
 
-@kernel
+@inner
 def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
     """Copy one of the states over another."""
     s = problem.state
-    points = problem.chain.first[k + 1]
-    s.u[target, :k] = s.u[source, :k]
-    s.x[target, : k + 1] = s.x[source, : k + 1]
-    s.r[target, : k + 1] = s.r[source, : k + 1]
-    s.depth[target, :points] = s.depth[source, :points]
-    s.parts[target] = s.parts[source]
-    for p in range(points):
-        if s.depth[source, p] != 0.0:
-            s.jet[target, p] = s.jet[source, p]
+    u, x, r, depth, jet = s.u[source], s.x[source], s.r[source], s.depth[source], s.jet[source]
+    to_u, to_x, to_r, to_depth, to_jet = s.u[target], s.x[target], s.r[target], s.depth[target], s.jet[target]
+    for n in range(k + 1):
+        to_x[n, 0], to_x[n, 1], to_x[n, 2] = x[n, 0], x[n, 1], x[n, 2]
+        store9(to_r[n], load9(r[n]))
+        if n < k:
+            to_u[n, 0], to_u[n, 1], to_u[n, 2] = u[n, 0], u[n, 1], u[n, 2]
+    for a in range(4):
+        s.parts[target, a] = s.parts[source, a]
+    for p in range(problem.chain.first[k + 1]):
+        to_depth[p] = depth[p]
+        if depth[p] != 0.0:
+            for a in range(10):
+                to_jet[p, a] = jet[p, a]

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inner
 from solver._kernels.layout import Chain
 from solver._kernels.newton import costate, sweep
 from solver._kernels.passage import crossed
@@ -29,14 +29,14 @@ SEARCHES = tol.SEARCHES
 FORETOLD = tol.FORETOLD
 
 
-@kernel
+@inner
 def scale_of(problem: Problem, which: int, k: int) -> float:
     """The energy that tolerances are relative to, N mm."""
     parts = problem.state.parts[which]
     return float(parts[BENDING] + parts[WALL] + parts[RUBBING] + FLOOR * stiffest(problem.chain, k))
 
 
-@kernel
+@inner
 def stiffest(chain: Chain, k: int) -> float:
     """Largest joint stiffness, N mm/rad."""
     largest = 0.0
@@ -45,7 +45,7 @@ def stiffest(chain: Chain, k: int) -> float:
     return largest
 
 
-@kernel
+@inner
 def largest_moment(chain: Chain, u: Any, k: int) -> float:
     """Largest bending moment in the wire, N mm, with a floor."""
     largest = 0.0
@@ -54,13 +54,13 @@ def largest_moment(chain: Chain, u: Any, k: int) -> float:
     return largest
 
 
-@kernel
+@inner
 def admissible(problem: Problem, which: int, k: int) -> bool:
     """Whether the trial state can be reached from the current one without passing through a wall."""
     return problem.stiffness == 0.0 or not crossed(problem, which, k)
 
 
-@kernel
+@inner
 def search(problem: Problem, which: int, k: int, energy: float, decrement: float, noise: float) -> float:
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
@@ -75,7 +75,7 @@ def search(problem: Problem, which: int, k: int, energy: float, decrement: float
     return math.inf
 
 
-@kernel
+@inner
 def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
@@ -98,7 +98,7 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
     return math.inf
 
 
-@kernel
+@inner
 def rest_shape(problem: Problem, which: int, k: int) -> bool:
     """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
     state = problem.state
@@ -112,7 +112,7 @@ def rest_shape(problem: Problem, which: int, k: int) -> bool:
     return parts[WALL] == 0.0 and parts[RUBBING] == 0.0 and admissible(problem, which, k)
 
 
-@kernel
+@inner
 def unloaded(chain: Chain, k: int) -> bool:
     """No dead load on any joint."""
     for n in range(k + 1):
@@ -121,7 +121,7 @@ def unloaded(chain: Chain, k: int) -> bool:
     return True
 
 
-@kernel
+@inner
 def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
     rollout(problem, which, k, 0 * k, 1.0)
@@ -133,13 +133,13 @@ def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> 
     return which, energy
 
 
-@kernel
+@inner
 def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
     """Whether the residual moments that ``costate`` left are nothing beside the moments in the wire."""
     return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
 
 
-@kernel
+@inner
 def minimise(
     problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:

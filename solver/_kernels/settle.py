@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
 from solver._kernels.closed_form import minimise_closed_form
-from solver._kernels.energy import lag_friction, total_energy
+from solver._kernels.energy import lag_friction, point_at, total_energy
 from solver._kernels.flags import kernel
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Profile
@@ -35,50 +35,42 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
 
     With friction the contact loads are taken from the last relaxation until they settle.
     """
-    if problem.friction.coefficient == 0.0:
-        outcome, iterations, energy = minimised(problem, which, k, orders, report)
-    else:
-        outcome, iterations, energy = rubbed(problem, which, k, orders, report)
+    rubs = problem.friction.coefficient > 0.0
+    if rubs:
+        problem.friction.load[:] = 0.0
+        total_energy(problem, which, k)
+        lag_friction(problem, which, k)
+    outcome, iterations, energy, limit = UNSETTLED, 0, 0.0, orders.max_iterations
+    for _ in range(ROUNDS):
+        if orders.closed_form:
+            result = minimise_closed_form(problem, which, k, orders.tolerance, limit, report)
+        else:
+            result = minimise(problem, which, k, orders.tolerance, limit, report)
+        outcome, iterations, energy = result[0], iterations + result[1], result[3]
+        if result[2] != which:
+            copy_state(problem, result[2], which, k)
+        if outcome != CONVERGED or not rubs or lag_friction(problem, which, k) < CHANGE:
+            break
+        outcome = UNSETTLED
     if outcome == CONVERGED and least_turn_cosine(problem.state.r[which], k) < FOLD:
         outcome = FOLDED
     return outcome, iterations, energy
 
 
 @kernel
-def minimised(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
-    """One run of the loop; the result is moved to state ``which``."""
-    if orders.closed_form:
-        result = minimise_closed_form(problem, which, k, orders.tolerance, orders.max_iterations, report)
-    else:
-        result = minimise(problem, which, k, orders.tolerance, orders.max_iterations, report)
-    outcome, iterations, ended, energy = result
-    if ended != which:
-        copy_state(problem, ended, which, k)
-    return outcome, iterations, energy
-
-
-@kernel
-def rubbed(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
-    """Runs of the loop until the contact loads, and so the friction, settle."""
-    outcome, iterations, energy = UNSETTLED, 0, 0.0
-    problem.friction.load[:] = 0.0
-    total_energy(problem, which, k)
-    lag_friction(problem, which, k)
-    for _ in range(ROUNDS):
-        ended, more, energy = minimised(problem, which, k, orders, report)
-        iterations += more
-        if ended != CONVERGED:
-            return ended, iterations, energy
-        if lag_friction(problem, which, k) < CHANGE:
-            outcome = CONVERGED
-            break
-    return outcome, iterations, energy
+def hold(problem: Problem, k: int) -> None:
+    """Friction holds every look-up point where it is now."""
+    now = 0 * k
+    for n in range(1, k + 1):
+        for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
+            point_at(problem, now, n, p, problem.friction.start[p])
 
 
 @kernel
 def measure(problem: Problem, profile: Profile, k: int, hulls: int, report: Any, force: Any) -> None:
     """Forces of the wire at rest in state 0: force (capacity + 1, 3) N per joint; deepest contact and push force."""
-    force[: k + 1] = 0.0
+    for n in range(k + 1):
+        force[n, 0] = force[n, 1] = force[n, 2] = 0.0
     report[DEEPEST] = report[PUSH] = 0.0
     if k == 0:
         return
