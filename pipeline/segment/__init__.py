@@ -10,6 +10,7 @@ from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
 from pipeline.segment.connect import connect, connect_relative, neighbours
+from pipeline.segment.contact import contacts, warning
 from pipeline.segment.levels import deepest, levels_at, scanner_blur
 from pipeline.segment.surface import Site, prepare, signed_distance
 from pipeline.status import FrameStatus, StageError
@@ -94,7 +95,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
 
     volume : grey values, brighter inside the vessel.  seeds_mm : (m, 3) LPS mm, points inside it.
     Returns a Lumen whose distance is float32 mm, negative inside, on the vessel's own box; exact to
-    ``config.outer_mm`` outside. Raises StageError (SEGMENT_FAILED) when the seeds lie in no bright vessel.
+    ``config.outer_mm`` outside; its warnings name places where two vessels have merged. Raises StageError
+    (SEGMENT_FAILED) when the seeds lie in no bright vessel.
     Udupa and Samarasekera 1996 for the connectedness; the wall is the half-level surface, blur corrected.
     """
     config = config or SegmentConfig()
@@ -113,4 +115,6 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         "voxels_visited": float(len(order)), "noise": levels.noise,
     }  # fmt: skip
     distance, mask = site.grid.with_values(values), site.grid.with_values((values < 0).view(np.uint8))
-    return Lumen(reorder(distance, axes), reorder(mask, axes), level, (), counters)
+    touching = contacts(distance)
+    counters["touching_places"] = float(len(touching))
+    return Lumen(reorder(distance, axes), reorder(mask, axes), level, warning(touching), counters)

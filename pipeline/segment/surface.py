@@ -24,6 +24,7 @@ from pipeline._kernels.wall import (
 from pipeline.segment.affinity import Levels
 from pipeline.segment.blur import blur_of_wall, half_level_offset
 from pipeline.sparse import sparse_zeros
+from pipeline.status import FrameStatus, StageError
 from solver.grid import Array, Grid
 
 LAYERS = 4
@@ -137,6 +138,11 @@ def signed_distance(
     inside = sparse_zeros(shape, np.uint8)
     wall = _half_level_wall(site, levels.half, inside)
     voxels, good = wall.voxels, np.isfinite(wall.distance)
+    if not good.any():
+        got = f"no place where smoothed grey is {levels.half:.0f}, half way between the vessel and its surroundings"
+        do = "the vessel is thinner than its blur: scan with smaller voxels, or set segment.scale = 0"
+        msg = f"segment: got {got}; expected a surface; {do}"
+        raise StageError(FrameStatus.SEGMENT_FAILED, msg)
     owner = np.zeros(shape, np.int32)
     owner.reshape(-1)[voxels[good]] = np.flatnonzero(good) + 1
     blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)

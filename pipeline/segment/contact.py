@@ -1,0 +1,116 @@
+"""Vessels that run side by side so close that their lumens have merged: found, so that the report can say so.
+
+The core of a vessel is where the wall is at least 0.7 as far as the vessel is thick there. Where two vessels touch
+flank to flank the opening between them is shallow, so their cores stay apart; at a branching the cores are joined, or
+one of them ends there. Merged is what meets without being near along the cores, and goes on both ways on both sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline._kernels.contact import along_cores, meetings, nearest_core, runs_on, thickness
+from pipeline.sparse import sparse_zeros
+from solver.grid import Array, Grid
+
+CORE = 0.7
+"""Depth over local thickness in a core: tubes of radius r have separate cores until they overlap by r / 2. At 0.8 noise
+breaks tubes of two voxels radius into pieces that look like neighbours; at 0.6 two vessels at 0.5 mm voxels merge."""
+FAR = 3.0
+"""Steps along a core, in sums of both radii, from which two stretches of one vessel are not neighbours."""
+ONWARD = 1.0
+"""How far (local radii) both vessels must go on beyond the contact: a branch ends in its parent, and does not."""
+WINDOW = 2.5
+"""Within how many local radii that is looked for."""
+LEAST_FACES = 4
+"""Voxel faces shared by two vessels below which they do not count as touching."""
+LONG = 3.0
+"""Length over radius from which a core is a vessel's: what is shorter is a bump of the wall, or the opening itself."""
+LEAST_DEPTH = 0.75
+"""Depth in voxels that a vessel's core reaches: the ripple that noise leaves on a wall does not."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One place where two vessels have merged: where (LPS mm), and the area of the opening between them, mm^2."""
+
+    place_mm: Array
+    area_mm2: float
+
+
+MOST_NAMED = 4
+"""Places that a warning names; the largest openings."""
+
+
+def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
+    """One sentence for the report, or none."""
+    if not places:
+        return ()
+    largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
+    named = ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm^2)" for c in largest)
+    return (
+        f"segment: vessels that run side by side are open to each other in {len(places)} place(s), allowed 0; largest "
+        f"at {named} mm; a simulated wire may slip across there: look at the picture, scan with smaller voxels, or "
+        "give the lumen as a file (manifest key lumen)",
+    )
+
+
+def _groups(places: NDArray[np.float64], apart: float) -> list[NDArray[np.int64]]:
+    """Indices of places (n, 3) that hang together by gaps of at most ``apart``."""
+    left, out = np.arange(len(places)), []
+    while len(left):
+        group, left = left[:1], left[1:]
+        fresh = group
+        while len(fresh) and len(left):
+            gaps = np.linalg.norm(places[left][:, None] - places[fresh][None], axis=2).min(axis=1)
+            fresh, left = left[gaps <= apart], left[gaps > apart]
+            group = np.concatenate([group, fresh])
+        out.append(group)
+    return out
+
+
+def _vessels_only(
+    core: NDArray[np.bool_], part: NDArray[np.int32], steps: NDArray[np.int32], thick: Array, voxel: float
+) -> NDArray[np.bool_]:
+    """The core (n,) without parts too short or too thin to be a vessel's."""
+    length, radius = np.zeros(part.max() + 1), np.zeros(part.max() + 1)
+    np.maximum.at(length, part[core], steps[core] * voxel)
+    np.maximum.at(radius, part[core], thick[core])
+    good = (length >= LONG * radius) & (radius >= LEAST_DEPTH * voxel)
+    return core & good[part]
+
+
+def contacts(distance: Grid) -> tuple[Contact, ...]:
+    """Places where vessels that do not branch from each other are open to each other.
+
+    distance : signed distance, mm, negative inside; C-contiguous.
+    """
+    values, spacing = distance.values, np.asarray(distance.spacing_mm)
+    inner = np.flatnonzero(values < 0)
+    if len(inner) == 0:
+        return ()
+    ids = sparse_zeros(values.shape, np.int32)
+    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
+    depth = -values.reshape(-1)[inner].astype(np.float64)
+    thick = thickness(ids, inner, depth, spacing)
+    core = depth >= CORE * thick
+    part, steps = along_cores(ids, inner, core)
+    voxel = float(spacing.min())
+    owner = nearest_core(ids, inner, _vessels_only(core, part, steps, thick, voxel))
+    found = meetings(ids, inner, owner, part, steps, np.ceil(FAR * thick / voxel).astype(np.int32))
+    if len(found) < LEAST_FACES:
+        return ()
+    passes = {}
+    for core_voxel in np.unique(found[:, 1:]):
+        radius = thick[core_voxel] / voxel
+        window, least = int(np.ceil(WINDOW * radius)), int(np.ceil(ONWARD * radius))
+        passes[core_voxel] = runs_on(ids, inner, part, steps, int(core_voxel), window, least)
+    kept = np.array([passes[p] and passes[q] for _, p, q in found], bool)
+    index = np.stack(np.unravel_index(inner[found[kept, 0]], values.shape), axis=1)
+    apart = 2.0 * float(np.median(thick[found[kept, 1]])) / voxel if kept.any() else 0.0
+    face = float(np.prod(spacing) ** (2 / 3))
+    groups = [g for g in _groups(index.astype(float), apart) if len(g) >= LEAST_FACES]
+    return tuple(Contact(distance.to_mm(index[g].mean(axis=0)), len(g) * face) for g in groups)

@@ -1,0 +1,72 @@
+"""Kissing vessels: apart where the wall between them shows, a warning where it does not, none at junctions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from data_synthetic import shapes
+from pipeline.model import Volume
+from pipeline.segment import segment
+from pipeline.status import FrameStatus, StageError
+from tests.pipeline import phantoms
+
+NOISE = 100.0  # a ninth of the contrast
+
+
+def scanned(anatomy, low, high, voxel, seed=0):
+    """An anatomy's scan, PSF 0.8 voxel."""
+    low = np.array(low, float)
+    shape = np.ceil((np.array(high) - low) / voxel).astype(int)
+    index = np.stack(np.meshgrid(*[np.arange(n) for n in shape], indexing="ij"), axis=-1)
+    distance = anatomy.distance(index.reshape(-1, 3) * voxel + low).reshape(shape)
+    clean = 100.0 + 900.0 * phantoms.partial_volume(distance, voxel)
+    return Volume(phantoms.scan(clean, 0.8, NOISE, seed), [voxel] * 3, low)
+
+
+def kissing(wall_mm, voxel):
+    volume = scanned(shapes.kissing(wall_mm=wall_mm), (-6, -3.5, -1), (6, 3.5, 21), voxel)
+    lumen = segment(volume, [[1.8 + 0.5 * wall_mm, 0.0, 10.0]])
+    across = lumen.distance.to_mm(np.argwhere(lumen.distance.values < 0))[:, 0] < -0.5
+    return lumen, bool(across.any())
+
+
+@pytest.mark.parametrize("wall_mm", [0.6, 0.9])
+def test_vessels_with_two_voxels_between_them_are_kept_apart(wall_mm):
+    lumen, merged = kissing(wall_mm, 0.3)
+    assert not merged
+    assert lumen.warnings == ()
+
+
+@pytest.mark.parametrize(("wall_mm", "voxel"), [(0.0, 0.3), (0.15, 0.3), (0.3, 0.3), (0.15, 0.5)])
+def test_vessels_that_merge_are_warned_of_where_they_do(wall_mm, voxel):
+    lumen, merged = kissing(wall_mm, voxel)
+    assert merged
+    assert lumen.counters["touching_places"] == 1
+    assert "open to each other in 1 place" in lumen.warnings[0]
+    place = [float(c) for c in lumen.warnings[0].split("at [")[1].split("]")[0].split(",")]
+    np.testing.assert_allclose(place, [0.0, 0.0, 10.0], atol=2.0)
+
+
+@pytest.mark.parametrize(
+    ("anatomy", "low", "high"),
+    [
+        (shapes.bifurcation(), (-12, -3.5, -5), (12, 3.5, 20)),
+        (shapes.bifurcation(angle_deg=60.0, branch_mm=1.0), (-14, -3.5, -5), (14, 3.5, 12)),
+        (shapes.stenosed(), (-3, -3, 0), (6, 3, 20)),
+        (shapes.side_aneurysm(), (-4, -4, -4), (16, 8, 26)),
+        (shapes.end_aneurysm(), (-8, -8, -4), (8, 8, 20)),
+    ],
+)
+def test_junctions_narrowings_and_sacs_are_no_contacts(anatomy, low, high):
+    assert segment(scanned(anatomy, low, high, 0.4), [[0.0, 0.0, 1.0]]).warnings == ()
+
+
+def test_a_vessel_thinner_than_its_blur_alone_is_refused_by_name():
+    axis = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
+    points = np.stack(np.indices((32, 32, 32)), axis=-1) * 0.5 - 8.0
+    away = np.linalg.norm(points - (points @ axis)[..., None] * axis, axis=-1)
+    grey = phantoms.scan(100.0 + 900.0 * phantoms.partial_volume(away - 0.35, 0.5), 0.8, NOISE / 3, 1)
+    with pytest.raises(StageError, match="thinner than its blur") as error:
+        segment(Volume(grey, [0.5] * 3, [-8.0] * 3), [[0.0, 0.0, 0.0]])
+    assert error.value.status is FrameStatus.SEGMENT_FAILED
