@@ -38,6 +38,8 @@ WORST_DAMPING = 1e9
 """Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
 SEARCHES = 6
 """Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
+POLISHES = 20
+"""Newton's steps beyond the energy's last place: where a stiff wall holds a long lever each may only halve the rest."""
 SLIP_MM = 1e-3
 """Tangential way in mm below which a point in contact still sticks: a thousandth of a usual step."""
 FRICTION_CHANGE = 1e-4
@@ -50,6 +52,9 @@ CLOSED_FORM_ANGLE = 0.2
 """Largest turn of a segment in one sweep of the closed form, rad: its model is linear in the turn."""
 CLOSED_FORM_SMALLEST = 1e-12
 """Smallest share of the closed form's own step that is tried before the sweep counts as stalled."""
+CLOSED_FORM_IDLE_ANGLE = 3e-11
+"""A moment that would turn the stiffest joint by this angle, rad, is nothing: below it the energy by which the closed
+form accepts its steps no longer shows them (sqrt(2e-16 u), 1.4e-11 rad in a wire bent by 1e-6 rad a joint)."""
 SWEEPS_PER_ITERATION = 500
 """Sweeps of the closed form that max_iterations allows for each of its iterations: it needs O(k²) of them."""
 RISE_RADII = 0.5
@@ -57,6 +62,12 @@ RISE_RADII = 0.5
 only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
 BUDGET_STEPS = 20
 """Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
+WORK = 8_000_000
+"""Joints and look-up points that all iterations or sweeps of one depth may pass, whatever max_iterations: 80,000
+sweeps of 50 joints with one look-up each (the closed form needs up to 75,000 for a step in a bend), or 2,000 of
+Newton's iterations at 2000 joints. A hopeless depth so ends after two or three seconds."""
+WORK_PER_ITERATION = 2_500
+"""The same, for each of max_iterations on top: raising max_iterations must help."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
 FORETOLD = 100.0

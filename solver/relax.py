@@ -86,7 +86,9 @@ class Settings:
         """The same for the kernels."""
         closed = self.method == "closed_form"
         sweeps = tol.SWEEPS_PER_ITERATION if closed else 1
-        return Orders(closed, float(self.tolerance), int(self.max_iterations * sweeps))
+        count = int(self.max_iterations)
+        work = tol.WORK + tol.WORK_PER_ITERATION * count
+        return Orders(closed, float(self.tolerance), count * sweeps, work)
 
 
 def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> Rule:

@@ -27,7 +27,7 @@ CLOSED_FORM: dict[str, Any] = {
     "method": "closed_form",
     "quadrature": "joints",
     "tolerance": 1e-6,
-    "max_iterations": 2000,
+    "max_iterations": 20_000,
 }
 CLOSED_FORM_SHORTEST_MM = 1.0
 """Sweeps grow with the square of the number of joints: below 1 mm one insertion takes minutes."""

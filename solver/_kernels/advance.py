@@ -17,7 +17,7 @@ from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.layout import Cut, lay_out, segments_at
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED
 from solver._kernels.passage import free_way
-from solver._kernels.problem import ROLLS, Problem
+from solver._kernels.problem import ROLLS, SPENT, Problem
 from solver._kernels.settle import LEFT_GRID, Orders, measure, settle
 
 # what an insertion remembers between depths
@@ -80,7 +80,7 @@ def advance(
             at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
         else:
             take_back(problem, cut, at, report, kept)
-        if iterations > goal[2]:
+        if iterations > goal[2] or problem.scratch.counter[SPENT] >= orders.work:
             outcome = EXHAUSTED
             break
         if outcome == CONVERGED:

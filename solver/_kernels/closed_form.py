@@ -6,8 +6,8 @@ segments move along without turning (eq. 9). Deviations from the printed eq. 10,
 - Υ_i and ρ_i hold the sum of the two joints that α_i bends, c_i b̂_i and c_{i+1} n̂, divided by λ;
 - the numerator is the exact gradient of the total energy: θ of eq. 1 instead of sin θ, the roll that turning a
   segment hands on to every rest bend behind it, and the wall under a segment;
-- a step counts only where the total energy falls, is limited, and the loop stops on Newton's decrement, never
-  on a_i: at 40 segments a_i/λ < 1e-3 leaves the tip wrong by 16 % of the length.
+- a step counts only where the total energy falls, is limited, and the loop stops on Newton's decrement and on the
+  moments left, never on a_i: at 40 segments a_i/λ < 1e-3 leaves the tip wrong by 16 % of the length.
 """
 
 from __future__ import annotations
@@ -18,17 +18,28 @@ from typing import Any
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import inlined, inner, kernel
-from solver._kernels.follow import aim
 from solver._kernels.joint import jacobian
-from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, ROUND_OFF, STALLED, admissible, scale_of
+from solver._kernels.minimise import (
+    BROKEN,
+    CONVERGED,
+    EXHAUSTED,
+    MOMENT,
+    ROUND_OFF,
+    STALLED,
+    admissible,
+    largest_moment,
+    scale_of,
+    stiffest,
+)
 from solver._kernels.newton import costate, sweep
 from solver._kernels.node import node_gradient
-from solver._kernels.problem import ROLLOUTS, SWEEPS, Problem
-from solver._kernels.rotation import turn
-from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9
+from solver._kernels.problem import LOAD, ROLLOUTS, SWEEPS, Problem
+from solver._kernels.rotation import bend_towards, turn
+from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9, store9, times
 
 STEP = tol.CLOSED_FORM_ANGLE
 SMALLEST = tol.CLOSED_FORM_SMALLEST
+IDLE_ANGLE = tol.CLOSED_FORM_IDLE_ANGLE
 
 
 @inlined
@@ -93,8 +104,10 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
     """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     new = 1 - which
-    state.x[new, 0, :] = state.x[which, 0]
-    state.r[new, 0, :, :] = state.r[which, 0]
+    u, x, r = state.u[new], state.x[new], state.r[new]
+    x[0, :] = state.x[which, 0]
+    r[0, :, :] = state.r[which, 0]
+    frame = load9(r[0])
     for i in range(k):
         rho = gain[i, 2, 0]
         if rho <= 0.0:
@@ -104,11 +117,31 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
         size = math.sqrt(d0 * d0 + d1 * d1)
         if size > STEP:
             d0, d1 = d0 * STEP / size, d1 * STEP / size
+        old = load9(state.r[which, i + 1])
+        size = math.sqrt(1.0 + d0 * d0 + d1 * d1)
+        # directions, never differences of joints: far from the origin their last place would bend the wire
+        t = apply_transposed(frame, apply(old, (d1 / size, -d0 / size, 1.0 / size)))
+        u0, u1 = bend_towards(chain.rest[i], t[0], t[1], t[2])
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, 0.0
+        frame = times(frame, turn(chain.rest[i], u0, u1, 0.0))
+        store9(r[i + 1], frame)
         for a in range(3):
-            r = state.r[which, i + 1, a]
-            state.x[new, i + 1, a] = state.x[new, i, a] + chain.length[i] * (r[2] + d1 * r[0] - d0 * r[1])
-        state.u[new, i, 2] = 0.0
-        aim(chain, state.u[new], state.x[new], state.r[new], i)
+            x[i + 1, a] = x[i, a] + chain.length[i] * r[i + 1, a, 2]
+
+
+@inner
+def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any) -> bool:
+    """Whether a state is a minimum: no way down left in Newton's decrement, and no moment to speak of."""
+    minimal = sweep(problem, which, k, 0.0, report)
+    problem.scratch.counter[SWEEPS] += 1
+    costate(problem, which, k, report)
+    scale = scale_of(problem, which, k)
+    if not (minimal and report[0] <= max(tolerance, ROUND_OFF) * scale):
+        return False
+    # the decrement is quadratic in the moments
+    share = max(MOMENT, math.sqrt(tolerance))
+    nothing = IDLE_ANGLE * stiffest(problem.chain, k)
+    return bool(report[1] <= max(share * largest_moment(problem.chain, problem.state.u[which], k), nothing))
 
 
 @inner
@@ -119,18 +152,20 @@ def minimise_closed_form(
     share = 1.0
     energy = total_energy(problem, which, k)
     report[18] = energy
-    check = 32
+    check, before = 32, math.inf
     for count in range(max_sweeps):
         if not math.isfinite(energy):
             return BROKEN, count, which, energy
         if count == check or count == 0:
             check += check // 4
-            minimal = sweep(problem, which, k, 0.0, report)
-            problem.scratch.counter[SWEEPS] += 1
-            noise = ROUND_OFF * scale_of(problem, which, k)
-            if minimal and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
-                costate(problem, which, k, report)
+            if settled(problem, which, k, tolerance, report):
                 return CONVERGED, count, which, energy
+            if not before - energy > ROUND_OFF * (
+                scale_of(problem, which, k) + abs(problem.state.parts[which, LOAD])
+            ):
+                # a fifth of all sweeps so far lowered the energy by rounding alone
+                return STALLED, count, which, energy
+            before = energy
         gradients(problem, which, k)
         trial = math.inf
         while share > SMALLEST:
@@ -142,8 +177,8 @@ def minimise_closed_form(
             trial = math.inf
             share *= 0.5
         if trial == math.inf:
-            costate(problem, which, k, report)
-            return STALLED, count, which, energy
+            ended = CONVERGED if settled(problem, which, k, tolerance, report) else STALLED
+            return ended, count, which, energy
         which, energy = 1 - which, trial
         share = min(1.0, 1.1 * share)
     costate(problem, which, k, report)

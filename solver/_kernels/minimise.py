@@ -26,6 +26,7 @@ FIRST_DAMPING = tol.FIRST_DAMPING
 LEAST_DAMPING = tol.LEAST_DAMPING
 WORST_DAMPING = tol.WORST_DAMPING
 SEARCHES = tol.SEARCHES
+POLISHES = tol.POLISHES
 FORETOLD = tol.FORETOLD
 
 
@@ -140,6 +141,44 @@ def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
 
 
 @inner
+def polish(
+    problem: Problem, which: int, k: int, energy: float, noise: float, report: Any
+) -> tuple[int, float]:
+    """Newton's steps where the energy is flat to its last place: the fall that is left to foretell decides."""
+    definite = sweep(problem, which, k, 0.0, report)
+    for _ in range(POLISHES):
+        left = report[0]
+        if not definite or at_rest(problem, which, k, report):
+            break
+        rollout(problem, which, k, 0 * k, 1.0)
+        problem.scratch.counter[ROLLOUTS] += 1
+        trial = total_energy(problem, 1 - which, k)
+        if not (trial <= energy + noise and admissible(problem, which, k)):
+            break
+        definite = sweep(problem, 1 - which, k, 0.0, report)
+        problem.scratch.counter[SWEEPS] += 1
+        if not (definite and report[0] < left):
+            break
+        which, energy = 1 - which, trial
+        costate(problem, which, k, report)
+    return which, energy
+
+
+@inner
+def rounding_moment(problem: Problem, which: int, k: int) -> float:
+    """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
+    chain, depth = problem.chain, problem.state.depth
+    force, lever = 0.0, 0.0
+    for n in range(1, k + 1):
+        lever += chain.length[n - 1]
+        for a in range(3):
+            force += abs(chain.load[n, a])
+        for i in range(chain.first[n], chain.first[n + 1]):
+            force += problem.stiffness * chain.weight[i] * depth[which, i]
+    return ROUND_OFF * force * lever
+
+
+@inner
 def minimise(
     problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:
@@ -166,8 +205,13 @@ def minimise(
         if damping == 0.0 and definite and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
             before = energy
             which, energy = finish(problem, which, k, energy, report)
-            if report[0] <= noise or at_rest(problem, which, k, report):
+            if at_rest(problem, which, k, report):
                 return CONVERGED, iteration, which, energy
+            if report[0] <= noise:
+                which, energy = polish(problem, which, k, energy, noise, report)
+                flat = report[1] <= rounding_moment(problem, which, k)
+                ended = CONVERGED if flat or at_rest(problem, which, k, report) else STALLED
+                return ended, iteration, which, energy
             if energy < before:
                 continue
             # the full step does not help, as where a contact opens and closes again: search as usual

@@ -8,8 +8,8 @@ from solver._kernels.layout import Chain
 from solver._kernels.spline import Field
 
 # places in the work counters
-FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT = range(9)
-COUNTERS = 9
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, SPENT = range(10)
+COUNTERS = 10
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 # places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``

@@ -11,7 +11,7 @@ from solver._kernels.flags import kernel
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Profile
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
-from solver._kernels.problem import DEEPEST, PUSH, Problem
+from solver._kernels.problem import DEEPEST, PUSH, SPENT, Problem
 
 # how a relaxation ends, beyond the ways of ``minimise``
 UNSETTLED, FOLDED, LEFT_GRID = range(BROKEN + 1, BROKEN + 4)
@@ -22,11 +22,16 @@ FOLD = tol.FOLD_COSINE
 
 
 class Orders(NamedTuple):
-    """How to relax. max_iterations : of Newton, or sweeps of the closed form."""
+    """How to relax.
+
+    max_iterations : of Newton, or sweeps of the closed form, in one relaxation.     work : joints and look-up points
+    passed in all relaxations of a depth together, see ``tol.WORK``.
+    """
 
     closed_form: bool
     tolerance: float
     max_iterations: int
+    work: int
 
 
 @kernel
@@ -40,13 +45,16 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
         problem.friction.load[:] = 0.0
         total_energy(problem, which, k)
         lag_friction(problem, which, k)
-    outcome, iterations, energy, limit = UNSETTLED, 0, 0.0, orders.max_iterations
+    outcome, iterations, energy = UNSETTLED, 0, 0.0
+    counter, cost = problem.scratch.counter, k + problem.chain.first[k + 1]
     for _ in range(ROUNDS):
+        limit = min(orders.max_iterations, max(orders.work - counter[SPENT], 0) // cost)
         if orders.closed_form:
             result = minimise_closed_form(problem, which, k, orders.tolerance, limit, report)
         else:
             result = minimise(problem, which, k, orders.tolerance, limit, report)
         outcome, iterations, energy = result[0], iterations + result[1], result[3]
+        counter[SPENT] += result[1] * cost
         if result[2] != which:
             copy_state(problem, result[2], which, k)
         if outcome != CONVERGED or not rubs or lag_friction(problem, which, k) < CHANGE:
