@@ -15,10 +15,9 @@ from data_synthetic.scan_grid import ScanGrid
 from data_synthetic.scanner import Greys, PsfScanner
 from data_synthetic.scene import Setup, Study, enter, spread
 from data_synthetic.steer import steer
-from data_synthetic.study import describe_case, planned_insertion, truth_quality
-from data_synthetic.truth_cache import cached_replay
+from data_synthetic.study import converged_truth, describe_case, planned_insertion
 from data_synthetic.tubes import Anatomy, Tube
-from data_synthetic.vessel_way import VesselWay, find_way, vessel_threshold
+from data_synthetic.vessel_way import find_way, vessel_threshold
 from data_synthetic.wire import TrueWire
 
 Array = NDArray[np.float64]
@@ -37,7 +36,7 @@ def background_study(
     frames: int | None = None,
     voxel_mm: float | None = None,
     seed: int = 0,
-    truth_step_mm: float = 0.2,
+    truth_step_mm: float | None = None,
 ) -> Study:
     """A study in a real scan: from its widest inlet past its widest place.
 
@@ -45,10 +44,8 @@ def background_study(
     """
     values, grid = read_scan(Path(path), voxel_mm)
     threshold = vessel_threshold(values)
-    found = find_way(values, grid, threshold)
-    setup = _setup(values, grid, threshold, found, frames or 12)
-    insertion = planned_insertion(setup, truth_step_mm)
-    truth = cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
+    setup = background_setup(values, grid, threshold, frames or 12)
+    truth, quality = converged_truth(setup, truth_step_mm)
     scanner = _painter(values, grid, threshold, setup.greys)
     name = Path(path).name.split(".")[0]
     wires = [(f.points_mm, setup.wire.radius_mm) for f in truth]
@@ -60,7 +57,7 @@ def background_study(
         truth=truth,
         expected=("ok",) * len(truth),
         manifest=describe_case(name, setup, grid, np.random.default_rng([seed, 4])),
-        quality=truth_quality(insertion, truth),
+        quality=quality,
         setup=setup,
         make_frame=lambda i: scanner.scan([wires[i]], (seed, 3, i)),
     )
@@ -76,10 +73,9 @@ def read_scan(path: Path, voxel_mm: float | None) -> tuple[NDArray[np.float32], 
     return values, ScanGrid(shape, spacing, np.array(image.GetOrigin()), direction)
 
 
-def _setup(
-    values: NDArray[np.float32], grid: ScanGrid, threshold: float, found: VesselWay, frames: int
-) -> Setup:
+def background_setup(values: NDArray[np.float32], grid: ScanGrid, threshold: float, frames: int) -> Setup:
     """Where the wire enters and how it is rolled, tried out against the scan's own wall."""
+    found = find_way(values, grid, threshold)
     way = found.way
     box, part = _around(way, grid)
     vessel = np.where(found.vessel[box], values[box], 0.0).astype(np.float32)

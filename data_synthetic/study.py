@@ -28,6 +28,12 @@ DIRECTION_ERROR_DEG = 2.0
 LONGEST_ADVANCE_MM = 0.4
 """Insertion between two equilibria: a tip cannot pass a wall of 1 mm unseen, and smaller steps change nothing."""
 
+TRUTH_STEP_MM, MOST_HALVINGS, CONVERGED_MM = 0.2, 2, 0.01
+"""The true wire's first node spacing, how often it is halved at most, and the move of a frame at which it is not."""
+
+TRIED = 7
+"""Frames of a study on which halving is tried."""
+
 DEPTH_NOISE_MM = 0.2
 """sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
 
@@ -51,7 +57,7 @@ def make_study(
     size: int | None = None,
     voxel_mm: float | None = None,
     seed: int = 0,
-    truth_step_mm: float = 0.2,
+    truth_step_mm: float | None = None,
     scanner: ScannerFactory = psf_scanner,
 ) -> Study:
     """Build a scene: sizes default to the scene's own; voxel_mm to its field of view over ``size``."""
@@ -61,9 +67,7 @@ def make_study(
     ratio = np.array(setup.spacing_ratio)
     nx, ny, nz = (max(2, round(size / r)) for r in ratio)
     grid = centred_grid(setup.centre_mm, (nx, ny, nz), voxel * ratio, setup.axes)
-    # the shortest wire still gets a dozen nodes
-    insertion = planned_insertion(setup, min(truth_step_mm, min(setup.depths_mm) / 8.0))
-    truth = cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
+    truth, quality = converged_truth(setup, truth_step_mm)
     machine = _Machine(setup, grid, scanner, seed)
     return Study(
         name=scene.name,
@@ -73,10 +77,28 @@ def make_study(
         truth=truth,
         expected=scene.expected_statuses(frames),
         manifest=describe_case(scene.name, setup, grid, np.random.default_rng([seed, 4])),
-        quality=truth_quality(insertion, truth),
+        quality=quality,
         setup=setup,
         make_frame=lambda i: machine.frame(i, truth[i]),
     )
+
+
+def converged_truth(
+    setup: Setup, step_mm: float | None = None
+) -> tuple[tuple[TrueFrame, ...], dict[str, float]]:
+    """The true wire at every depth, and its quality; nodes are put closer until halving them moves nothing.
+
+    step_mm : a node spacing that is taken as it is, for tests that need no converged truth.
+    """
+    step, left = step_mm or TRUTH_STEP_MM, 0 if step_mm else MOST_HALVINGS
+    while True:
+        # the shortest wire still gets a dozen nodes
+        insertion = planned_insertion(setup, min(step, min(setup.depths_mm) / 8.0))
+        truth = cached_replay(insertion, setup.depths_mm, setup.rolls_deg)
+        quality = truth_quality(insertion, truth)
+        if quality["halving_moves_mm"] <= CONVERGED_MM or not left:
+            return truth, quality
+        step, left = 0.5 * step, left - 1
 
 
 def planned_insertion(setup: Setup, step_mm: float) -> Insertion:
@@ -95,8 +117,8 @@ def planned_insertion(setup: Setup, step_mm: float) -> Insertion:
 
 
 def truth_quality(insertion: Insertion, truth: tuple[TrueFrame, ...]) -> dict[str, float]:
-    """Figures that tell how far the truth can be trusted; halving is tried on first, middle and last frame."""
-    tried = {0, len(truth) // 2, len(truth) - 1}
+    """Figures that tell how far the truth can be trusted; halving is tried on a few frames, the last among them."""
+    tried = {round(i) for i in np.linspace(0, len(truth) - 1, min(len(truth), TRIED))}
     return {
         "node_spacing_mm": insertion.step_mm,
         "largest_residual_N": max(f.residual_N for f in truth),

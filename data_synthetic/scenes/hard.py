@@ -28,7 +28,7 @@ def _missing(_rng: np.random.Generator, frames: int) -> Setup:
 
 
 def _missing_statuses(frames: int) -> tuple[str, ...]:
-    return tuple("no_wire|trace_low_contrast" if i == frames // 2 else "ok" for i in range(frames))
+    return tuple("trace_low_contrast" if i == frames // 2 else "ok" for i in range(frames))
 
 
 def _two(_rng: np.random.Generator, frames: int) -> Setup:
@@ -92,7 +92,7 @@ HARD = (
         160,
         5,
         _two,
-        "ok|trace_ambiguous|length_mismatch",
+        "trace_ambiguous",
     ),
     Scene(
         "introducer",

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import SimpleITK as sitk
+from PIL import Image
 
 from data_synthetic import catalogue, coverage
 from data_synthetic.scene import Study
 from data_synthetic.write import FORMATS, write_study
+from tests.studies import catalogue_page
 
 SMALL = {"frames": 2, "size": 40, "truth_step_mm": 0.8}
 
@@ -77,6 +80,20 @@ def test_files_read_back_identically(study: Study, format_: str, tmp_path: Path)
     np.testing.assert_allclose(truth["frames"][1]["points_mm"], study.truth[1].points_mm, atol=1e-6)
 
 
+@pytest.mark.parametrize("format_", FORMATS)
+def test_oblique_anisotropic_geometry_reads_back(study: Study, format_: str, tmp_path: Path) -> None:
+    turned = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    turned *= np.sign(np.linalg.det(turned))
+    grid = replace(study.grid, spacing_mm=np.array([0.4, 0.55, 0.9]), direction=turned)
+    manifest = write_study(replace(study, grid=grid), tmp_path, format=format_)
+    case = tomllib.loads(manifest.read_text(encoding="utf-8"))["case"][0]
+    corner = np.array(grid.shape) - 1
+    for i, image in enumerate(read_frames(tmp_path, case["frames"])):
+        np.testing.assert_array_equal(as_array(image), study.frame(i))
+        there = image.TransformContinuousIndexToPhysicalPoint(corner.astype(float).tolist())
+        np.testing.assert_allclose(there, grid.to_mm(corner), atol=1e-3)
+
+
 def read_frames(folder: Path, frames: str | list[str]) -> list[sitk.Image]:
     if isinstance(frames, list):
         return [read_series(folder / f) for f in frames]
@@ -117,6 +134,16 @@ def test_every_scene_tries_something_and_every_stage_is_tried(capsys: pytest.Cap
     for stage in coverage.STAGES:
         assert sum(stage in tried for tried in coverage.TRIED.values()) >= 3, stage
     assert all(set(tried) <= set(coverage.STAGES) for tried in coverage.TRIED.values())
+
+
+def test_the_page_of_the_catalogue_is_up_to_date() -> None:
+    assert catalogue_page.PAGE.read_text(encoding="utf-8") == catalogue_page.page(), (
+        "python -m tests.studies.catalogue_page"
+    )
+    for name in catalogue.names():
+        with Image.open(catalogue_page.PICTURES / f"{name}.png") as picture:
+            assert max(picture.size) == catalogue_page.EDGE
+            assert len(set(picture.convert("L").tobytes())) > 20, "not a blank picture"
 
 
 @pytest.mark.parametrize(

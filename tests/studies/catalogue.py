@@ -17,6 +17,7 @@ from time import process_time
 import pandas as pd
 
 from data_synthetic import catalogue
+from data_synthetic.scene import Scene
 from data_synthetic.write import write_study
 from pipeline.case import STAGES
 from pipeline.cli import main as wireval
@@ -59,14 +60,16 @@ class Outcome:
         ]
 
 
+def size_of(scene: Scene) -> int:
+    """Voxels along an edge."""
+    return round(scene.fov_mm / (WIDE_VOXEL_MM if scene.fov_mm > WIDE_MM else VOXEL_MM))
+
+
 def run_scene(name: str, root: Path) -> Outcome:
     """Make a scene's files, run its manifest, keep its tables under ``root``/out/cases."""
     scene = catalogue.describe(name)
-    voxel = WIDE_VOXEL_MM if scene.fov_mm > WIDE_MM else VOXEL_MM
     clock = process_time()
-    study = catalogue.build(
-        name, frames=FRAMES, size=round(scene.fov_mm / voxel), seed=SEED, truth_step_mm=TRUTH_STEP_MM
-    )
+    study = catalogue.build(name, frames=FRAMES, size=size_of(scene), seed=SEED, truth_step_mm=TRUTH_STEP_MM)
     manifest = write_study(study, root / "studies" / name)
     made, clock = process_time() - clock, process_time()
     log = io.StringIO()

@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
 
 from data_synthetic import catalogue
+from data_synthetic.background import background_setup, read_scan
+from data_synthetic.scene import Setup
 from data_synthetic.study import planned_insertion
+from data_synthetic.vessel_way import vessel_threshold
 from data_synthetic.wire_truth import TrueFrame, replay
 
 Array = NDArray[np.float64]
 ALLOWED_MM = 0.01
 FRAMES, SEED, STEP_MM = 6, 100, 0.2
 PLACES = 800
+BACKGROUND_VOXEL_MM = 0.5  # of the real scan, whose own spacing is a placeholder
 
 
 def apart(a: TrueFrame, b: TrueFrame) -> float:
@@ -38,10 +43,17 @@ def at_arc(frame: TrueFrame, places: Array) -> Array:
     )
 
 
-def halved(name: str, seed: int, step_mm: float, frames: int) -> tuple[str, float, bool]:
+def scene_setup(name: str, seed: int, frames: int) -> Setup:
+    """A scene's set-up, or that of a wire in a real scan where the name is a file."""
+    if not Path(name).suffix:
+        scene = catalogue.describe(name)
+        return scene.setup(np.random.default_rng([seed, 1]), min(frames, scene.frames))
+    values, grid = read_scan(Path(name), BACKGROUND_VOXEL_MM)
+    return background_setup(values, grid, vessel_threshold(values), 2 * frames)
+
+
+def halved(name: str, setup: Setup, step_mm: float) -> tuple[str, float, bool]:
     """The scene's line, the largest distance, and whether it has friction."""
-    scene = catalogue.describe(name)
-    setup = scene.setup(np.random.default_rng([seed, 1]), min(frames, scene.frames))
     step = min(step_mm, min(setup.depths_mm) / 8.0)
     clock = process_time()
     coarse, fine = (
@@ -61,7 +73,9 @@ def halved(name: str, seed: int, step_mm: float, frames: int) -> tuple[str, floa
 def main(words: list[str]) -> None:
     """Print the table; exit 1 where a frictionless scene moves by more than is allowed."""
     parser = argparse.ArgumentParser(prog="python -m tests.studies.truth", description=__doc__)
-    parser.add_argument("names", nargs="*")
+    parser.add_argument(
+        "names", nargs="*", help="scenes (all of them without), or volume files for a real background"
+    )
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--step", type=float, default=STEP_MM)
     parser.add_argument("--frames", type=int, default=FRAMES)
@@ -71,7 +85,7 @@ def main(words: list[str]) -> None:
     sys.stdout.write(f"{'':20s}" + "".join(f"{h:>{w}s}" for h, w in zip(heads, widths, strict=True)) + "\n")
     bad = []
     for name in args.names or catalogue.names():
-        line, moves, rubs = halved(name, args.seed, args.step, args.frames)
+        line, moves, rubs = halved(Path(name).name, scene_setup(name, args.seed, args.frames), args.step)
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
         if moves > ALLOWED_MM and not rubs:
