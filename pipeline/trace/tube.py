@@ -17,6 +17,11 @@ WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
 STIFFNESS = 2.0
 """Standard deviation (voxel) that the prior gives third differences of control points: it carries gaps, not bends."""
+FULL_KNOT = 8.0
+"""Knot distance (voxel) from which that holds. A short wire has two intervals whatever its length, and the third
+differences of one and the same bend fall with the cube of their length: without that its ends curl up in the noise."""
+TIGHTEST = 10.0
+"""Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
 TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
@@ -107,10 +112,14 @@ def spline_through(points: Array, knot: float) -> Array:
     return np.stack([substitute(lower, first, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
 
 
-def _prior(controls: int, columns: int, noise: float, voxel: float) -> Array:
-    """Normal matrix of the smoothness prior on the control points."""
+def _prior(controls: int, columns: int, noise: float, voxel: float, knot: float) -> Array:
+    """Normal matrix of the smoothness prior on the control points, ``knot`` mm apart."""
     third = np.diff(np.eye(controls), n=3, axis=0)
-    block = third.T @ third * (noise / (STIFFNESS * voxel)) ** 2
+    loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3
+    block = third.T @ third * (noise / (loose * voxel)) ** 2
+    if knot < FULL_KNOT * voxel:
+        second = np.diff(np.eye(controls), n=2, axis=0)
+        block += second.T @ second * (noise * TIGHTEST * voxel / knot**2) ** 2
     out = np.zeros((columns, columns))
     for axis in range(3):
         out[axis : 3 * controls : 3, axis : 3 * controls : 3] = block
@@ -242,7 +251,7 @@ def fit_tube(
     per = max(3, int(np.ceil(_mean_speed(tube.controls) / step_mm)))
     samples = sampling(tube.intervals, per)
     columns = 3 * len(tube.controls) + len(tube.tint) + 2
-    prior = _prior(len(tube.controls), columns, data.noise, voxel)
+    prior = _prior(len(tube.controls), columns, data.noise, voxel, _mean_speed(tube.controls))
     held = [columns - 2] if not fit_sigma else []
     slot = sparse_zeros(data.grey.shape, np.int32)
     done = 0

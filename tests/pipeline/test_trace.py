@@ -277,3 +277,53 @@ def test_empty_previous_curve_and_config_are_accepted():
     curve = trace(frame, lumen, entry, direction, reference=reference, previous=nothing, expected_mm=5.0,
                   config=TraceConfig(ridge_voxels=0.8))  # fmt: skip
     assert curve.length_mm > 20
+
+
+def straight(seed, length, bulge=0.0):
+    """A nearly straight wire in a tank, turned anyhow, whose middle bulges sideways; frame, reference, lumen, wire."""
+    rng = np.random.default_rng(seed)
+    z = np.linspace(0, length, 400)
+    side = rng.uniform(-0.05, 0.05) * z**2 + bulge * np.exp(-(((z - 0.5 * length) / 1.5) ** 2))
+    wire = np.stack([side, 0 * z, z], axis=1)
+    turn = tangles._rotation(rng) if bulge == 0 else np.eye(3)
+    origin, shape, lumen = tangles.tank(wire @ turn.T)
+    clean = tangles.clean_frame(tangles.Tangle("straight", wire @ turn.T), origin, shape)
+    frame, reference = (
+        Volume(phantoms.scan(v, 0.8, PEAK / 12, 2 * seed + n), [VOXEL] * 3, origin)
+        for n, v in enumerate((clean, np.full(shape, 1000.0, np.float32)))
+    )
+    return frame, reference, lumen, wire @ turn.T
+
+
+@pytest.mark.parametrize("length", [1.2, 1.8, 2.4])
+def test_a_wire_of_a_few_voxels_does_not_turn_back(length):
+    for seed in range(6):
+        frame, reference, lumen, wire = straight(seed, length)
+        heading = wire[1] - wire[0]
+        curve = trace(frame, lumen, wire[0], heading, reference=reference)
+        assert curve.status is FrameStatus.OK
+        assert np.all(np.diff(curve.points_mm, axis=0) @ heading > 0)
+        assert curve.length_mm == pytest.approx(length, abs=0.2)
+
+
+def test_a_length_that_disagrees_with_the_insertion_is_a_named_status():
+    frame, reference, lumen, wire = straight(0, 12.0)
+    for expected, status in ((11.0, FrameStatus.OK), (16.0, FrameStatus.LENGTH_MISMATCH)):
+        curve = trace(frame, lumen, wire[0], wire[1] - wire[0], reference=reference, expected_mm=expected)
+        assert curve.status is status
+    assert "insertion_mm" in curve.note
+    assert "16.00" in curve.note
+
+
+def test_a_curve_that_leaves_the_lumen_is_a_named_status():
+    frame, reference, lumen, wire = straight(0, 14.0, bulge=2.0)
+    inside = trace(frame, lumen, wire[0], wire[1] - wire[0], reference=reference)
+    assert inside.status is FrameStatus.OK
+    x = lumen.distance.origin_mm[0] + VOXEL * np.arange(lumen.distance.shape[0])
+    depth = np.maximum(lumen.distance.values, (x - 1.0)[:, None, None]).astype(np.float32)
+    narrow = Lumen(
+        lumen.distance.with_values(depth), lumen.distance.with_values((depth < 0).astype(np.uint8))
+    )
+    outside = trace(frame, narrow, wire[0], wire[1] - wire[0], reference=reference)
+    assert outside.status is FrameStatus.TRACE_LEFT_LUMEN
+    assert outside.flagged.any()
