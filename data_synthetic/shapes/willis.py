@@ -31,7 +31,7 @@ DIAMETERS_MM = {
     "vertebral": (2.8, 0.6),
 }
 SPREAD_LIMIT = 1.0
-"""Diameters are drawn within this many sd: a vessel far from its mean would be another scene."""
+"""Diameters are drawn within this many published sd: a vessel far from its mean would be another scene."""
 
 # right side, x < 0; the left side is its mirror image
 CAROTID = np.array(
@@ -102,12 +102,15 @@ class WillisPlan:
     """Which variant to build. missing : tube names left out, for example ("left.PCoA",).
 
     aneurysm : "terminus", "acoa", "sidewall" or "none".     sac_mm : radius of the sac.     jitter_mm : sd of the
-    control points, so that no two seeds share an anatomy.     stenosis : share of the cavernous radius taken away.
+    control points, so that no two seeds share an anatomy.     spread : share of the published sd with which diameters
+    are drawn; half of it keeps a catalogue scene the same situation from seed to seed.     stenosis : share of the
+    cavernous radius taken away.
     """
 
     aneurysm: str = "terminus"
     sac_mm: float = 4.0
     jitter_mm: float = 0.3
+    spread: float = 0.5
     stenosis: float = 0.0
     missing: tuple[str, ...] = ()
     tortuous_vertebrals: bool = False
@@ -117,7 +120,7 @@ class WillisPlan:
 def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -> Anatomy:
     """A seeded anatomy; the right carotid is the tube ``right.ICA``, entered from below."""
     plan = plan or WillisPlan()
-    radius = {name: 0.5 * _draw(rng, mean, sd) for name, (mean, sd) in DIAMETERS_MM.items()}
+    radius = {name: 0.5 * _draw(rng, mean, sd, plan.spread) for name, (mean, sd) in DIAMETERS_MM.items()}
     tubes: list[Tube] = []
     joints = {name: rng.normal(0.0, plan.jitter_mm, (60, 3)) for name in ("right", "left")}
     for side, sign in (("right", 1.0), ("left", -1.0)):
@@ -129,8 +132,8 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     return Anatomy(tuple(t for t in tubes if t.name not in plan.missing))
 
 
-def _draw(rng: np.random.Generator, mean: float, sd: float) -> float:
-    return mean + sd * float(np.clip(rng.normal(0.0, 0.5), -SPREAD_LIMIT, SPREAD_LIMIT))
+def _draw(rng: np.random.Generator, mean: float, sd: float, spread: float) -> float:
+    return mean + sd * float(np.clip(rng.normal(0.0, spread), -SPREAD_LIMIT, SPREAD_LIMIT))
 
 
 def _one_side(
