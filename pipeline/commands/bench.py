@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from time import perf_counter
 
 import pandas as pd
 
 from pipeline.benchmark import outputs, scenes
 from pipeline.benchmark.own_case import NoScene, scenes_of
 from pipeline.benchmark.scenes import BenchScene
+from pipeline.benchmark.stress.scene_run import Outcome
 from pipeline.benchmark.study import SEGMENTS_MM, settings, study
 from pipeline.commands.common import complain, say
 from pipeline.config import Config
@@ -90,23 +92,31 @@ def run_stress_study(args: Namespace) -> bool:
     from pipeline.benchmark.stress.study import SCENES
 
     count = args.scenes or (QUICK_SCENES if args.quick else SCENES)
-    done = iter(range(1, count + 1))
-
-    def tick(outcome: object) -> None:
-        number = next(done)
-        if getattr(outcome, "fault", ""):
-            say(f"scene {outcome.index}: {outcome.fault}: {outcome.detail}")  # type: ignore[attr-defined]
-        if number % 500 == 0:
-            say(f"{number} of {count} scenes")
-
-    rows = run_stress(args.seed, range(count), min(2, os.cpu_count() or 1), tick=tick)
-    rows.to_csv(args.out / outputs.SCENES_CSV, index=False)
+    path = args.out / outputs.SCENES_CSV
+    jobs = min(2, os.cpu_count() or 1)
+    rows = run_stress(args.seed, range(count), jobs, tick=_progress(count), path=path)
+    rows.to_csv(path, index=False)
     table = stress_table(rows)
     table.to_csv(args.out / outputs.STRESS_CSV, index=False)
     _say_table(table)
     faults = int((rows["fault"] != "").sum())
     say(f"{count - faults} of {count} scenes ended as they may (seed {args.seed}), {faults} did not")
     return faults == 0
+
+
+def _progress(count: int) -> Callable[[Outcome], None]:
+    """A line for every fault, and one for every 250 scenes with their rate."""
+    done, began = iter(range(1, count + 1)), perf_counter()
+
+    def tick(outcome: Outcome) -> None:
+        number = next(done)
+        if outcome.fault:
+            say(f"scene {outcome.index}: {outcome.fault}: {outcome.detail}")
+        if number % 250 == 0:
+            rate = number / (perf_counter() - began)
+            say(f"scene {outcome.index} of {count}: {number} run now, {rate:.3g} a second")
+
+    return tick
 
 
 def _say_table(table: pd.DataFrame) -> None:

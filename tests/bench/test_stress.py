@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pipeline.benchmark.stress import AXES, draw, isolate, run_stress, stress_table
@@ -81,6 +83,17 @@ def test_the_judge_sees(fault: str, spoil: Any) -> None:
     assert judge(plan, wire, wall, spoil(solution), start, False).fault == fault
 
 
+def test_every_relaxation_of_an_insertion_knows_its_start() -> None:
+    plan, wire, wall, _ = _solved()
+    plan.way, plan.depths, plan.rolls = "insertion", [6.0, 14.0, 20.0, 9.0], [0.0, 0.0, 40.0, 40.0]
+    pairs = solve(plan, wire, wall)
+    assert all(start >= solution.energy_N_mm > 0.0 for solution, start in pairs)
+    assert pairs[0][1] > 1.1 * pairs[0][0].energy_N_mm
+    solution, start = pairs[2]
+    risen = replace(solution, energy_N_mm=start * (1 + 1e-6))
+    assert judge(plan, wire, wall, risen, start, False).fault == "energy_rose"
+
+
 def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
     from pipeline.benchmark import statics
 
@@ -150,3 +163,38 @@ def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.Mo
         "all converged": 1, "all CRASH": 1, "roll converged": 1, "hull converged": 1, "roll CRASH": 1,
     }  # fmt: skip
     assert len(found) == 5
+
+
+def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    ran: list[int] = []
+    stop = [2]
+
+    def runs(_: int, indices: Any, *__: Any) -> Any:
+        for index in indices:
+            if index in stop:
+                stop.clear()
+                raise KeyboardInterrupt
+            ran.append(index)
+            yield Outcome(
+                index, ("roll", "hull"), "converged", "", 'a "word", and\na line', residual=1e-7 / 3
+            )
+
+    monkeypatch.setattr("pipeline.benchmark.stress.study.run_isolated", runs)
+    path = tmp_path / "scenes.csv"
+    with pytest.raises(KeyboardInterrupt):
+        run_stress(5, range(4), path=path)
+    with path.open("a") as file:
+        file.write('2,"roll hull",conv')
+    rows = run_stress(5, range(4), path=path)
+    assert ran == [0, 1, 2, 3]
+    assert list(rows["index"]) == [0, 1, 2, 3]
+    whole = run_stress(5, range(4))
+    pd.testing.assert_frame_equal(rows, whole, check_dtype=False)
+    # rows of another seed, or of another solver, are no rows of this study
+    assert ran == [0, 1, 2, 3] * 2
+    run_stress(6, range(4), path=path)
+    monkeypatch.setattr("pipeline.benchmark.stress.ledger.version", lambda: "other")
+    run_stress(6, range(4), path=path)
+    assert ran == [0, 1, 2, 3] * 4

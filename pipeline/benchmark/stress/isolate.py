@@ -12,8 +12,8 @@ from queue import SimpleQueue
 from pipeline.benchmark.stress.plan import draw
 from pipeline.benchmark.stress.scene_run import Outcome, run_scene
 
-LIMIT_S = 300.0
-"""A scene that takes longer hangs: the slowest sound one takes seconds, on a busy machine a minute."""
+LIMIT_S = 60.0
+"""A scene that takes longer hangs: the work of a depth is limited, the slowest scene takes some 10 s of one core."""
 START_S = 1200.0
 """Room for compiling the kernels in a new process of a busy machine."""
 
@@ -100,11 +100,13 @@ def run_isolated(
         finally:
             free.put(worker)
 
+    pool = ThreadPoolExecutor(jobs)
     try:
         # one compiles into the cache, the others read it
         workers[0].start()
-        with ThreadPoolExecutor(jobs) as pool:
-            yield from pool.map(one, indices)
+        yield from pool.map(one, indices)
     finally:
+        # a study that is broken off does not run on to its end
+        pool.shutdown(wait=False, cancel_futures=True)
         for worker in workers:
             worker.stop()

@@ -51,7 +51,7 @@ def judge(
 ) -> Verdict:
     """Judge one solution.
 
-    start_energy : of the state that the relaxation began with, NaN where it is not known.
+    start_energy : of the state that the last relaxation began with, NaN where it is not known.
     deep : also form the Hessian of a small chain and look for a way down.
     """
     broken = _broken(solution)

@@ -60,7 +60,7 @@ def build(plan: Plan) -> tuple[GuideWire, VesselWall | None]:
 
 
 def solve(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[Solution, float]]:
-    """Solutions, each with the energy that its relaxation started from (NaN where it is not published)."""
+    """Solutions, each with the energy that its last relaxation started from."""
     at, direction, axis = entry(plan)
     if plan.way == "relax":
         return [_relaxed(plan, wire, wall)]
@@ -68,7 +68,8 @@ def solve(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[So
         wire, wall, at, direction, plan.method, plan.initial, axis,
         max_iterations=plan.max_iterations, step_mm=plan.step_mm, quadrature=plan.quadrature, tip_load_N=plan.load_N,
     )  # fmt: skip
-    return [(s, float("nan")) for s in insertion.to_depths(plan.depths, roll_deg=plan.rolls)]
+    found = insertion.to_depths(plan.depths, roll_deg=plan.rolls)
+    return [(s, s.work["start_energy_N_mm"]) for s in found]
 
 
 def _relaxed(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> tuple[Solution, float]:
@@ -79,8 +80,10 @@ def _relaxed(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> tuple[Solu
         roll_deg=plan.rolls[0], start_mm=start, load_N=plan.load_N if any(plan.load_N) else None,
         method=plan.method, max_iterations=plan.max_iterations, quadrature=plan.quadrature,
     )  # fmt: skip
+    # the second assembly where it knows the start, else what the solver says of it
     known = plan.start is None and (plan.quadrature == "joints" or wall is None) and plan.friction == 0.0
-    return solution, _straight_energy(plan, wire, wall, solution) if known else float("nan")
+    before = solution.work["start_energy_N_mm"]
+    return solution, _straight_energy(plan, wire, wall, solution) if known else before
 
 
 def _straight_energy(plan: Plan, wire: GuideWire, wall: VesselWall | None, solution: Solution) -> float:
