@@ -216,6 +216,65 @@ def _walk(
 
 
 @njit(cache=True)
+def _taken(stamp: NDArray[Any], i: int, j: int, k: int) -> bool:
+    """Whether a crest was walked within two voxels or so (square root of 5) of a voxel."""
+    ni, nj, nk = stamp.shape
+    for a in range(max(0, i - 2), min(ni, i + 3)):
+        for b in range(max(0, j - 2), min(nj, j + 3)):
+            for c in range(max(0, k - 2), min(nk, k + 3)):
+                near = (a - i) * (a - i) + (b - j) * (b - j) + (c - k) * (c - k) <= 5
+                if near and stamp[a, b, c] != 0:
+                    return True
+    return False
+
+
+@njit(cache=True)
+def _rows(array: NDArray[Any], count: int, wanted: int) -> NDArray[Any]:
+    """``array`` (n, 3) with room for ``wanted`` rows, its first ``count`` kept."""
+    size = array.shape[0]
+    if wanted < size:
+        return array
+    while size <= wanted:
+        size *= 2
+    larger = np.empty((size, 3))
+    larger[:count] = array[:count]
+    return larger
+
+
+@njit(cache=True)
+def _lay_down(
+    at: int,
+    part: NDArray[Any],
+    part_t: NDArray[Any],
+    part_v: NDArray[Any],
+    n: int,
+    back: bool,
+    points: NDArray[Any],
+    tangents: NDArray[Any],
+    values: NDArray[Any],
+) -> None:
+    """Copy n points of a walk to place ``at``; those of a walk ``back`` in reverse, their tangents turned."""
+    for m in range(n):
+        source = n - 1 - m if back else m
+        sign = -1.0 if back else 1.0
+        for axis in range(3):
+            points[at + m, axis] = part[source, axis]
+            tangents[at + m, axis] = sign * part_t[source, axis]
+        values[at + m] = part_v[source]
+
+
+@njit(cache=True)
+def _mark(stamp: NDArray[Any], spacing: NDArray[Any], points: NDArray[Any], first: int, stop: int) -> None:
+    """Stamp the voxels of points [first, stop) with their number + 1."""
+    ni, nj, nk = stamp.shape
+    for m in range(first, stop):
+        a, b = round(points[m, 0] / spacing[0]), round(points[m, 1] / spacing[1])
+        c = round(points[m, 2] / spacing[2])
+        if 0 <= a < ni and 0 <= b < nj and 0 <= c < nk:
+            stamp[a, b, c] = m + 1
+
+
+@njit(cache=True)
 def tracklets(
     grey: NDArray[Any],
     allowed: NDArray[Any],
@@ -233,110 +292,49 @@ def tracklets(
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Crests through the seeds (flat box indices, strongest first), each walked both ways with step ``length`` mm.
 
-    stamp : int32 zeros on the box, working memory.  Returns points (n, 3), tangents (n, 3), crest values (n,), and the first point of every tracklet (m + 1,).
+    stamp : int32 zeros on the box, working memory.  Returns points (n, 3), tangents (n, 3), crest values (n,), and the
+    first point of every tracklet (m + 1,).
     """
     _, nj, nk = grey.shape
     size = min(spacing[0], spacing[1], spacing[2])
-    w = np.empty((3, 3, 64))
-    out = np.empty(10)
-    step = np.empty(3)
-    points = np.empty((1024, 3))
-    tangents = np.empty((1024, 3))
-    values = np.empty(1024)
+    w, out, step = np.empty((3, 3, 64)), np.empty(10), np.empty(3)
+    points, tangents, values = np.empty((1024, 3)), np.empty((1024, 3)), np.empty(1024)
     first = np.zeros(64, np.int64)
     count = 0
     tracks = 0
     ahead, ahead_t, ahead_v = np.empty((longest, 3)), np.empty((longest, 3)), np.empty(longest)
     back, back_t, back_v = np.empty((longest, 3)), np.empty((longest, 3)), np.empty(longest)
-    p = np.empty(3)
-    t = np.empty(3)
+    p, t = np.empty((1, 3)), np.empty((1, 3))
+    value = np.empty(1)
     for n in range(seeds.shape[0]):
-        flat = seeds[n]
-        k = flat % nk
-        rest = flat // nk
-        j = rest % nj
-        i = rest // nj
-        taken = False
-        for a in range(max(0, i - 2), min(grey.shape[0], i + 3)):
-            for b in range(max(0, j - 2), min(nj, j + 3)):
-                for c in range(max(0, k - 2), min(nk, k + 3)):
-                    if (a - i) * (a - i) + (b - j) * (b - j) + (c - k) * (c - k) <= 5:
-                        taken = taken or stamp[a, b, c] != 0
-        if taken:
+        rest, k = seeds[n] // nk, seeds[n] % nk
+        i, j = rest // nj, rest % nj
+        if _taken(stamp, i, j, k):
             continue
-        p[0], p[1], p[2] = i * spacing[0], j * spacing[1], k * spacing[2]
+        p[0, 0], p[0, 1], p[0, 2] = i * spacing[0], j * spacing[1], k * spacing[2]
+        x, y, z = p[0, 0], p[0, 1], p[0, 2]
         t[:] = 0.0
-        middle = to_ridge(grey, spacing, sigma, p, t, 3, w, out, step)
-        moved = (p[0] - i * spacing[0]) ** 2 + (p[1] - j * spacing[1]) ** 2 + (p[2] - k * spacing[2]) ** 2
+        middle = to_ridge(grey, spacing, sigma, p[0], t[0], 3, w, out, step)
+        moved = (p[0, 0] - x) ** 2 + (p[0, 1] - y) ** 2 + (p[0, 2] - z) ** 2
         if out[0] < high or middle > -sharp or moved > (1.8 * size) ** 2:
             continue
-        value = out[0]
+        value[0] = out[0]
         na = _walk(
-            grey,
-            allowed,
-            stamp,
-            spacing,
-            sigma,
-            p,
-            t,
-            length,
-            low,
-            sharp,
-            turn,
-            bend,
-            ahead,
-            ahead_t,
-            ahead_v,
-            points,
-            tangents,
-        )
+            grey, allowed, stamp, spacing, sigma, p[0], t[0], length, low, sharp, turn, bend,
+            ahead, ahead_t, ahead_v, points, tangents,
+        )  # fmt: skip
         nb = _walk(
-            grey,
-            allowed,
-            stamp,
-            spacing,
-            sigma,
-            p,
-            -t,
-            length,
-            low,
-            sharp,
-            turn,
-            bend,
-            back,
-            back_t,
-            back_v,
-            points,
-            tangents,
-        )
+            grey, allowed, stamp, spacing, sigma, p[0], -t[0], length, low, sharp, turn, bend,
+            back, back_t, back_v, points, tangents,
+        )  # fmt: skip
         total = na + nb + 1
-        while count + total >= points.shape[0]:
+        points, tangents = _rows(points, count, count + total), _rows(tangents, count, count + total)
+        while values.shape[0] < points.shape[0]:
             values = _grown(values)
-            larger = np.empty((2 * points.shape[0], 3))
-            larger[:count] = points[:count]
-            points = larger
-            larger = np.empty((2 * tangents.shape[0], 3))
-            larger[:count] = tangents[:count]
-            tangents = larger
-        for m in range(nb):
-            points[count + m] = back[nb - 1 - m]
-            tangents[count + m] = -back_t[nb - 1 - m]
-            values[count + m] = back_v[nb - 1 - m]
-        points[count + nb] = p
-        tangents[count + nb] = t
-        values[count + nb] = value
-        for m in range(na):
-            points[count + nb + 1 + m] = ahead[m]
-            tangents[count + nb + 1 + m] = ahead_t[m]
-            values[count + nb + 1 + m] = ahead_v[m]
-        for m in range(count, count + total):
-            a, b, c = (
-                round(points[m, 0] / spacing[0]),
-                round(points[m, 1] / spacing[1]),
-                round(points[m, 2] / spacing[2]),
-            )
-            if 0 <= a < grey.shape[0] and 0 <= b < nj and 0 <= c < nk:
-                stamp[a, b, c] = m + 1
+        _lay_down(count, back, back_t, back_v, nb, True, points, tangents, values)
+        _lay_down(count + nb, p, t, value, 1, False, points, tangents, values)
+        _lay_down(count + nb + 1, ahead, ahead_t, ahead_v, na, False, points, tangents, values)
+        _mark(stamp, spacing, points, count, count + total)
         count += total
         tracks += 1
         if tracks >= first.shape[0]:

@@ -11,17 +11,16 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
 from pipeline.model import Array
-from pipeline.sparse import sparse_zeros
 from pipeline.trace.scene import Scene
-from pipeline.trace.tube import Tube, TubeData, predicted
+from pipeline.trace.tube import Tube
 
 CLEAR_VOXELS = 3.5
 """Distance from the wire's axis from which grey less the fitted wire is taken for noise alone: nearer, the fit has
 taken some of it away."""
 BESIDE_VOXELS = 12.0
 """and up to which: noise and background are those of the wire's own surroundings."""
-PLACES = 400
-"""Places at which the templates are tried, in DEPTHS groups: a standard deviation to 5 per cent in each."""
+PLACES = 300
+"""Places at which the templates are tried, in DEPTHS groups: a standard deviation to 6 per cent in each."""
 DEPTHS = 4
 """Groups of places by their depth in the lumen: near the wall the background is known less well."""
 LEAST = 50
@@ -101,14 +100,17 @@ def _places(scene: Scene, curve: Array) -> NDArray[np.int64]:
 
 def _patches(scene: Scene, tube: Tube, index: NDArray[np.int64]) -> tuple[NDArray[np.float32], Array]:
     """Grey less the tube's around places (n, 3), and the share of it (n,) that was read: the rest is 0."""
-    voxels, model = predicted(TubeData(scene.grey, scene.spacing, scene.noise), tube)
     offset = np.arange(-HALF, HALF + 1)
     i, j, k = (index[:, axis, None] + offset for axis in range(3))
     at = (i[:, :, None, None], j[:, None, :, None], k[:, None, None, :])
-    grey = scene.grey[at]
-    light = sparse_zeros(scene.grey.shape, np.float32)
-    light.reshape(-1)[voxels] = model
-    return np.asarray(grey - light[at]), np.asarray(np.mean(grey != 0, axis=(1, 2, 3)))
+    none = np.zeros(0, np.int64)
+    voxels, rest = (none if tube.voxels is None else tube.voxels), (none if tube.rest is None else tube.rest)
+    flat = scene.grey.reshape(-1)
+    kept = flat[voxels]
+    flat[voxels] = rest
+    patches = scene.grey[at]
+    flat[voxels] = kept  # put back: a copy of the box would cost more than the fit
+    return patches, np.asarray(np.mean(patches != 0, axis=(1, 2, 3)))
 
 
 def inflation(scene: Scene, curve: Array, tube: Tube) -> Inflation:

@@ -42,7 +42,10 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Tube:
-    """Control points (k, 3) in kernel coordinates, amplitude nodes, blur (mm) and offset; covariance when fitted."""
+    """Control points (k, 3) in kernel coordinates, amplitude nodes, blur (mm) and offset; covariance when fitted.
+
+    voxels, rest : those that were fitted (flat), and the grey that the fit leaves of them.
+    """
 
     controls: Array
     tint: Array
@@ -51,6 +54,8 @@ class Tube:
     covariance: Array | None = None
     residual_rms: float = float("nan")
     iterations: int = 0
+    voxels: NDArray[np.int64] | None = None
+    rest: Array | None = None
 
     @property
     def intervals(self) -> int:
@@ -159,8 +164,8 @@ def _weights(data: TubeData, voxels: NDArray[np.int64]) -> Array:
 
 def _step(
     data: TubeData, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
-) -> tuple[Array, Array, float, float]:
-    """One set of normal equations: matrix with prior, right-hand side, residual rms, and cost."""
+) -> tuple[Array, Array, float, tuple[NDArray[np.int64], Array]]:
+    """One set of normal equations: matrix with prior, right-hand side, residual rms, and voxels with residuals."""
     curve, velocity = _sampled(tube.controls, samples)
     radius = WINDOW * max(tube.sigma, 0.5 * float(data.spacing.min()))
     voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
@@ -176,7 +181,7 @@ def _step(
     )  # fmt: skip
     slot.reshape(-1)[voxels] = 0
     right[: 3 * k] -= prior[: 3 * k, : 3 * k] @ tube.controls.ravel()
-    return normal + prior, right, float(np.sqrt(square / max(1.0, weight.sum()))), square
+    return normal + prior, right, float(np.sqrt(square / max(1.0, weight.sum()))), (voxels, residual)
 
 
 def _sampled(controls: Array, s: Samples) -> tuple[Array, Array]:
@@ -263,10 +268,10 @@ def fit_tube(
         tube, size = _moved(tube, _solved(normal, right), voxel, samples)
         if size < tolerance * voxel and done > 2:
             break
-    normal, _, rms, _ = _step(data, tube, samples, prior, slot)
+    normal, _, rms, (voxels, rest) = _step(data, tube, samples, prior, slot)
     normal = _frozen(_damped(normal, tube, 1e-6), held)
     covariance = inverse(*_factors(normal)) * data.noise**2
-    return replace(tube, covariance=covariance, residual_rms=rms, iterations=done)
+    return replace(tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=voxels, rest=rest)
 
 
 def _mean_speed(controls: Array) -> float:
