@@ -24,6 +24,11 @@ ENTRY_REACH_MM = 4.0
 """How far from the manifest's entry the wire may pass."""
 PREFIX_MM = 3.0
 """How much wire before the entry is fitted along: its end must not disturb the fit at the entry."""
+THICK_SLICES = 1.5
+"""Largest over smallest voxel edge (as the kernels see them) from which slices count as thick."""
+KNOTS_PER_PITCH = 2.0
+"""Least distance between knots in lengths of wire from slice to slice: with one a slice the curve follows each slice's
+own error (0.15 mm of ripple at 2.5 mm slices)."""
 NEAR_VOXELS = 2.5
 """Crests nearer than this to the curve belong to it."""
 FIRST_BLUR = 0.9
@@ -66,6 +71,18 @@ def knot_voxels(cnr: float) -> float:
     return float(np.interp(cnr, [4.0, 8.0, 16.0], [12.0, 10.0, 8.0]))
 
 
+def slice_pitch(scene: Scene, line: Array) -> float:
+    """Length of wire (mm) from one slice to the next along a path (n, 3), where slices are thicker than pixels; else 0.
+
+    Such slices are wider apart than the blur can join: between two of them the grey hardly says how high the wire is.
+    """
+    axis = int(np.argmax(scene.spacing))
+    if scene.spacing[axis] < THICK_SLICES * float(scene.spacing.min()):
+        return 0.0
+    slices = float(np.sum(np.abs(np.diff(line[:, axis])))) / float(scene.spacing[axis])
+    return float(arc_length(line)[-1]) / max(slices, 1.0)
+
+
 def first_tube(scene: Scene, points: Array) -> Tube:
     """Where the fit starts: a spline along the path, with the amplitude seen there."""
     h = float(scene.spacing.min())
@@ -73,7 +90,8 @@ def first_tube(scene: Scene, points: Array) -> Tube:
     crest = values_at(scene.grey, scene.spacing, 0.7 * h, np.ascontiguousarray(line[::4]))
     gain = 1.0 + (0.7 / FIRST_BLUR) ** 2
     amplitude = max(float(np.median(crest)) * gain, scene.noise)
-    controls = spline_through(line, knot_voxels(amplitude / scene.noise) * h)
+    knot = max(knot_voxels(amplitude / scene.noise) * h, KNOTS_PER_PITCH * slice_pitch(scene, line))
+    controls = spline_through(line, knot)
     nodes = tint_nodes(len(controls) - 3)
     return Tube(controls, np.full(nodes, amplitude), FIRST_BLUR * h, 0.0)
 
