@@ -69,8 +69,8 @@ def _incomplete(rng: np.random.Generator, frames: int) -> Setup:
 
 
 def _acoa(rng: np.random.Generator, frames: int) -> Setup:
-    # past three snaps (at 50, 53 and 62 mm) and 4 mm short of a fourth, where a hair's breadth decides where the tip is
-    setup = willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 8.0)
+    # past the snaps at 50, 53, 62 and 68 mm: short of the last one, a hair's breadth decides where the tip is
+    setup = willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 15.0)
     return replace(setup, centre_mm=np.array([-12.0, -9.0, -9.0]))
 
 
