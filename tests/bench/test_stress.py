@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -133,20 +134,29 @@ def _crashes(seed: int, index: int) -> Outcome:
         os._exit(3)
     if index == 2:
         time.sleep(60.0)
+    if index == 3:
+        stop = time.perf_counter() + 60.0
+        while time.perf_counter() < stop:
+            pass
     return Outcome(index, ("roll",), "converged")
 
 
-def _serve_crashing(pipe: Any, seed: int) -> None:
+def _serve_crashing(pipe: Any, seed: int, limit_s: float) -> None:
     pipe.send(None)
     while True:
-        pipe.send(_crashes(seed, pipe.recv()))
+        index = pipe.recv()
+        isolate.limit_processor_time(limit_s)
+        pipe.send(_crashes(seed, index))
 
 
 def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(isolate, "_serve", _serve_crashing)
-    done = list(isolate.run_isolated(0, [0, 1, 0, 2], limit_s=2.0))
-    assert [d.outcome for d in done] == ["converged", "crash", "converged", "hang"]
+    done = list(isolate.run_isolated(0, [0, 1, 0, 2, 3], limit_s=0.5))
+    assert [d.outcome for d in done] == ["converged", "crash", "converged", "hang", "hang"]
     assert "exit code 3" in done[1].detail
+    assert "no answer within 5 s" in done[3].detail
+    if hasattr(signal, "setitimer"):
+        assert "0.5 s of processor time" in done[4].detail
 
 
 def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:

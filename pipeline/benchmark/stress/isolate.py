@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
@@ -13,12 +14,20 @@ from pipeline.benchmark.stress.plan import draw
 from pipeline.benchmark.stress.scene_run import Outcome, run_scene
 
 LIMIT_S = 60.0
-"""A scene that takes longer hangs: the work of a depth is limited, the slowest scene takes some 10 s of one core."""
+"""Processor time beyond which a scene hangs: the work of a depth is limited, the slowest scene takes some 15 s."""
+BUSY = 10.0
+"""A busy machine gives a process a tenth of a core; one that is silent for longer waits for something."""
 START_S = 1200.0
 """Room for compiling the kernels in a new process of a busy machine."""
 
 
-def _serve(pipe: Connection, seed: int) -> None:
+def limit_processor_time(seconds: float) -> None:
+    """Have this process killed after so much more processor time, where the system can; 0 takes that back."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
+def _serve(pipe: Connection, seed: int, limit_s: float) -> None:
     """Run scenes as their numbers come in; a warm-up first, so that compiling is on nobody's clock."""
     run_scene(seed, 0)
     pipe.send(None)
@@ -26,7 +35,10 @@ def _serve(pipe: Connection, seed: int) -> None:
         index = pipe.recv()
         if index is None:
             return
-        pipe.send(run_scene(seed, index))
+        limit_processor_time(limit_s)
+        outcome = run_scene(seed, index)
+        limit_processor_time(0.0)
+        pipe.send(outcome)
 
 
 class Worker:
@@ -42,7 +54,7 @@ class Worker:
         if self.process is None or self.pipe is None:
             context = multiprocessing.get_context("spawn")
             self.pipe, theirs = context.Pipe()
-            self.process = context.Process(target=_serve, args=(theirs, self.seed), daemon=True)
+            self.process = context.Process(target=_serve, args=(theirs, self.seed, self.limit_s), daemon=True)
             self.process.start()
             theirs.close()
             if not self.pipe.poll(START_S):
@@ -55,14 +67,16 @@ class Worker:
         """Run one scene; a crash or a hang is its outcome."""
         pipe = self.start()
         pipe.send(index)
-        if not pipe.poll(self.limit_s):
+        if not pipe.poll(BUSY * self.limit_s):
             self.stop()
-            return _lost(self.seed, index, "hang", f"no answer within {self.limit_s:g} s")
+            return _lost(self.seed, index, "hang", f"no answer within {BUSY * self.limit_s:g} s")
         try:
             return pipe.recv()  # type: ignore[no-any-return]
         except EOFError:
             code = self._exit_code()
             self.stop()
+            if code is not None and code == -getattr(signal, "SIGPROF", 0):
+                return _lost(self.seed, index, "hang", f"no end within {self.limit_s:g} s of processor time")
             return _lost(self.seed, index, "crash", f"the process died, exit code {code}")
 
     def _exit_code(self) -> int | None:

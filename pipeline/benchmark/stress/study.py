@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipeline.benchmark.stress.axes import AXES
 from pipeline.benchmark.stress.isolate import LIMIT_S, run_isolated
 from pipeline.benchmark.stress.ledger import Ledger, rows_at, version
 from pipeline.benchmark.stress.plan import draw
@@ -56,6 +57,9 @@ def stress_table(rows: pd.DataFrame) -> pd.DataFrame:
     rows = rows.assign(outcome=rows["outcome"].where(rows["fault"] == "", rows["fault"].str.upper()))
     each = rows.assign(axis=rows["axes"].str.split()).explode("axis")
     both = pd.concat([rows.assign(axis="all"), each], ignore_index=True)
+    common = list(rows["outcome"].value_counts().index)
+    both = both.sort_values("outcome", key=lambda names: names.map(common.index), kind="stable")
+    both = both.sort_values("axis", key=lambda names: names.map(["all", *AXES].index), kind="stable")
     grouped = both.groupby(["axis", "outcome"], sort=False)
     table = grouped.agg(
         count=("index", "size"),
