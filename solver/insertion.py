@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.advance import DEPTH, ENERGY, ROLL, SHRINK, Base, advance
+from solver._kernels.advance import DEPTH, ROLL, SHRINK, Base, advance
 from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
 from solver.errors import refuse
@@ -81,7 +81,7 @@ class Insertion:
             rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),
             margin=float(wire.radius_mm),
         )
-        self.at = np.zeros(4)
+        self.at, self.goal = np.zeros(4), np.zeros(3)
         self.at[SHRINK] = 1.0
         self.buffers.state.x[0, 0] = self.base.entry
         self.buffers.state.r[0, 0] = self.base.frame
@@ -130,11 +130,10 @@ class Insertion:
         status, iterations = self._refusal(depth), 0
         if status is Status.CONVERGED:
             b.reserve(depth)
-            goal = np.array([depth, roll, self._budget(depth - self.at[DEPTH], roll - self.at[ROLL])])
-            result = advance(b.problem, b.cut, self.base, self.orders, self.at, goal, b.report, b.force)
-            status, iterations = OUTCOMES[result[0]], result[1]
-            b.k = self.wire.segments_at(self.at[DEPTH])[0]
-        energy, depth, roll = float(self.at[ENERGY]), float(self.at[DEPTH]), float(self.at[ROLL])
+            self.goal[:] = depth, roll, self._budget(depth - self.at[DEPTH], roll - self.at[ROLL])
+            result = advance(b.problem, b.cut, self.base, self.orders, self.at, self.goal, b.report, b.force)
+            status, iterations, b.k = OUTCOMES[result[0]], result[1], result[2]
+        depth, roll, energy, _ = self.at.tolist()
         return solution_of(b, status, iterations, energy, depth, roll)
 
     def _budget(self, ahead: float, turn: float) -> float:

@@ -13,6 +13,7 @@ from solver._kernels.follow import follow
 from solver._kernels.layout import Rule
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
 from solver._kernels.problem import (
+    BENDING,
     CHEAP,
     CLEAR,
     DEEPEST,
@@ -22,15 +23,16 @@ from solver._kernels.problem import (
     PUSH,
     ROLLOUTS,
     ROLLS,
+    RUBBING,
     START,
     STRAIGHT,
     SWEEPS,
+    WALL,
     Switch,
 )
 from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders, hold, measure, settle
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
-from solver.grid import read_only
 from solver.solution import Solution
 from solver.status import Status
 from solver.wall import VesselWall
@@ -130,48 +132,55 @@ def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     return OUTCOMES[outcome], iterations, energy
 
 
+WORK = {
+    "wall_look_ups": FULL,
+    "wall_look_ups_cheap": CHEAP,
+    "wall_look_ups_proven_unnecessary": CLEAR,
+    "sweeps": SWEEPS,
+    "rollouts": ROLLOUTS,
+    "levenberg": LEVENBERG,
+    "rest_shapes": IDLE,
+    "rolls_proven_idle": ROLLS,
+    "sweeps_without_roll": STRAIGHT,
+}
+
+
 def work_of(counter: NDArray[np.int64], start_energy: float) -> Mapping[str, float]:
     """Counters by name: what was computed and what was proven unnecessary."""
-    full, cheap, clear = (float(counter[i]) for i in (FULL, CHEAP, CLEAR))
-    looked = full + cheap + clear
-    return {
-        "wall_look_ups": full,
-        "wall_look_ups_cheap": cheap,
-        "wall_look_ups_proven_unnecessary": clear,
-        "wall_look_ups_done_fraction": full / looked if looked else 0.0,
-        "sweeps": float(counter[SWEEPS]),
-        "rollouts": float(counter[ROLLOUTS]),
-        "levenberg": float(counter[LEVENBERG]),
-        "rest_shapes": float(counter[IDLE]),
-        "rolls_proven_idle": float(counter[ROLLS]),
-        "sweeps_without_roll": float(counter[STRAIGHT]),
-        "start_energy_N_mm": start_energy,
-    }
+    counts = counter.tolist()
+    work = {name: float(counts[place]) for name, place in WORK.items()}
+    looked = counts[FULL] + counts[CHEAP] + counts[CLEAR]
+    work["wall_look_ups_done_fraction"] = counts[FULL] / looked if looked else 0.0
+    work["start_energy_N_mm"] = start_energy
+    return work
 
 
 def solution_of(
     b: Buffers, status: Status, iterations: int, energy: float, depth: float, roll: float
 ) -> Solution:
     """Dress the current state of a work space."""
-    n = b.k + 1
-    parts = b.state.parts[0]
+    n, state = b.k + 1, b.state
+    report, parts = b.report.tolist(), state.parts[0].tolist()
+    kept = [state.x[0, :n].copy(), state.r[0, :n].copy(), b.force[:n].copy(), b.report[6:9].copy()]
+    for array in kept:
+        array.flags.writeable = False
     return Solution(
-        joints_mm=read_only(b.state.x[0, :n].copy()),
-        frames=read_only(b.state.r[0, :n].copy()),
+        joints_mm=kept[0],
+        frames=kept[1],
         energy_N_mm=energy,
-        bending_energy_N_mm=float(parts[0]),
-        wall_energy_N_mm=float(parts[1]),
-        friction_energy_N_mm=float(parts[3]),
+        bending_energy_N_mm=parts[BENDING],
+        wall_energy_N_mm=parts[WALL],
+        friction_energy_N_mm=parts[RUBBING],
         status=status,
         iterations=iterations,
-        contact_force_N=read_only(b.force[:n].copy()),
-        reaction_force_N=read_only(b.report[6:9].copy()),
-        reaction_torque_N_mm=float(b.report[11]),
-        push_force_N=float(b.report[PUSH]),
-        max_penetration_mm=float(b.report[DEEPEST]),
+        contact_force_N=kept[2],
+        reaction_force_N=kept[3],
+        reaction_torque_N_mm=report[11],
+        push_force_N=report[PUSH],
+        max_penetration_mm=report[DEEPEST],
         depth_mm=depth,
         roll_deg=roll,
-        work=work_of(b.counter, float(b.report[START])),
+        work=work_of(b.counter, report[START]),
     )
 
 

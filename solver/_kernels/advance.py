@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inner, kernel
+from solver._kernels.flags import kernel
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.layout import Cut, lay_out, segments_at
@@ -52,8 +52,8 @@ class Base(NamedTuple):
 @kernel
 def advance(
     problem: Problem, cut: Cut, base: Base, orders: Orders, at: Any, goal: Any, report: Any, force: Any
-) -> tuple[int, int]:
-    """Step until the goal is reached or no step succeeds; return the outcome and the iterations spent.
+) -> tuple[int, int, int]:
+    """Step until the goal is reached or no step succeeds; return the outcome, the iterations and the segments.
 
     at : (4,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, updated.     goal : (3,) depth, roll and the iterations allowed.
     """
@@ -93,10 +93,10 @@ def advance(
     at[SHRINK] = max(shrink, 8 * SMALLEST)
     k, _ = segments_at(at[DEPTH], cut.segment)
     measure(problem, cut.profile, k, max(cut.rule.hull.shape[0], 1), report, force)
-    return outcome, iterations
+    return outcome, iterations, k
 
 
-@inner
+@kernel
 def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, turn: float) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
     fraction = 1.0
@@ -116,7 +116,7 @@ def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, 
     return fraction
 
 
-@inner
+@kernel
 def set_out(
     problem: Problem, cut: Cut, base: Base, at: Any, depth: float, roll: float, report: Any, kept: Any
 ) -> int:
@@ -138,7 +138,7 @@ def set_out(
     return k
 
 
-@inner
+@kernel
 def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> None:
     """Put the last good state back."""
     now = 0 * report.size
@@ -150,13 +150,13 @@ def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> No
         report[i] = kept[i]
 
 
-@inner
+@kernel
 def left_grid(problem: Problem, base: Base, k: int) -> bool:
     """Whether a joint is further outside the grid than it may be."""
     return bool(furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin)
 
 
-@inner
+@kernel
 def clamp(problem: Problem, base: Base, roll: float) -> None:
     """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
     angle = math.radians(roll)
@@ -168,7 +168,7 @@ def clamp(problem: Problem, base: Base, roll: float) -> None:
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, base.frame[a, 2]
 
 
-@inner
+@kernel
 def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: float, ahead: float) -> None:
     """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
     chain, state = problem.chain, problem.state
@@ -189,7 +189,7 @@ def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: f
         anchor_friction(problem, state.x[LAST_GOOD], was, k, ahead)
 
 
-@inner
+@kernel
 def begin(base: Base, curve: Any) -> int:
     """Straight on from the entry, as two points."""
     for a in range(3):
@@ -198,7 +198,7 @@ def begin(base: Base, curve: Any) -> int:
     return 2
 
 
-@inner
+@kernel
 def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) -> int:
     """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
     curve, count = x[TRIAL], begin(base, x[TRIAL]) - 1
@@ -211,7 +211,7 @@ def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) ->
     return max(count, 2)
 
 
-@inner
+@kernel
 def keep_twist(u: Any, was: int, k: int) -> None:
     """Twist stays with the material, which is counted from the tip."""
     common = min(was, k)
@@ -219,7 +219,7 @@ def keep_twist(u: Any, was: int, k: int) -> None:
         u[NOW, j, 2] = u[LAST_GOOD, was - k + j, 2] if j >= k - common else 0.0
 
 
-@inner
+@kernel
 def anchor_friction(problem: Problem, curve: Any, was: int, k: int, ahead: float) -> None:
     """Note where each look-up point was before the step: its material was ``ahead`` mm further back.
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import inlined, inner, kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.joint import jacobian
 from solver._kernels.minimise import (
     BROKEN,
@@ -99,7 +99,7 @@ def after(problem: Problem, which: int, k: int, j: int, axis: int) -> float:
     return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
 
 
-@inner
+@kernel
 def propose(problem: Problem, which: int, k: int, share: float) -> None:
     """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
@@ -129,7 +129,7 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
             x[i + 1, a] = x[i, a] + chain.length[i] * r[i + 1, a, 2]
 
 
-@inner
+@kernel
 def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any) -> bool:
     """Whether a state is a minimum: no way down left in Newton's decrement, and no moment to speak of."""
     minimal = sweep(problem, which, k, 0.0, report)
@@ -144,7 +144,7 @@ def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any)
     return bool(report[1] <= max(share * largest_moment(problem.chain, problem.state.u[which], k), nothing))
 
 
-@inner
+@kernel
 def minimise_closed_form(
     problem: Problem, which: int, k: int, tolerance: float, max_sweeps: int, report: Any
 ) -> tuple[int, int, int, float]:

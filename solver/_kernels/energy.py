@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from solver._kernels.flags import inlined, inner, kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
 from solver._kernels.spline import in_grid, locate, set_basis, spline, to_world, trilinear, value
@@ -28,7 +28,7 @@ def total_energy(problem: Problem, which: int, k: int) -> float:
     return float(parts[BENDING] + parts[WALL] + parts[LOAD] + parts[RUBBING])
 
 
-@inner
+@kernel
 def bending_energy(chain: Chain, u: Any, k: int) -> float:
     """Eq. 1, 2 and 5: the sum over the joints, N mm."""
     total = 0.0
@@ -39,7 +39,7 @@ def bending_energy(chain: Chain, u: Any, k: int) -> float:
     return total
 
 
-@inner
+@kernel
 def load_energy(chain: Chain, x: Any, k: int) -> float:
     """Potential of the dead loads, N mm."""
     total = 0.0
@@ -57,7 +57,7 @@ def point_at(problem: Problem, which: int, n: int, p: int, q: Any) -> None:
         q[a] = x[a] + r[a, 0] * o[0] + r[a, 1] * o[1] + r[a, 2] * o[2]
 
 
-@inner
+@kernel
 def wall_energy(problem: Problem, which: int, k: int) -> float:
     """Eq. 6 and 7: look every point up and add its share, N mm."""
     total = 0.0
@@ -107,7 +107,7 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
     return total
 
 
-@inner
+@kernel
 def penetration(c: Any, m: Any, i: int, j: int, k: int, weights: Any, jet: Any, reach: float) -> float:
     """How far the wire's hull is beyond the lumen, mm (negative inside); fills the point's jet where it is."""
     d = value(c, i, j, k, weights) + reach
@@ -134,7 +134,7 @@ def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
     return float(np.sqrt(size))
 
 
-@inner
+@kernel
 def friction_energy(problem: Problem, which: int, k: int) -> float:
     """Incremental potential of Coulomb's law, N mm: load times coefficient times the way slid in this step."""
     friction, chain = problem.friction, problem.chain
@@ -148,7 +148,7 @@ def friction_energy(problem: Problem, which: int, k: int) -> float:
     return total
 
 
-@inner
+@kernel
 def lag_friction(problem: Problem, which: int, k: int) -> float:
     """Take contact loads and normals from a state; return the largest change of a load over the largest load."""
     friction, chain, state = problem.friction, problem.chain, problem.state

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.flags import inner, kernel
+from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
 from solver._kernels.rotation import bend_towards, turn, with_twist
 from solver._kernels.small import apply_transposed, load9, store9, times
 
 
-@inner
+@kernel
 def leaving(a: Any, b: Any, centre: Any, radius: float) -> float:
     """Where, between 0 and 1, the segment a -> b leaves the sphere around ``centre``; above 1 if it does not."""
     aa = ab = bb = 0.0
@@ -55,7 +55,7 @@ def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, k: int) -> 
         aim(chain, u, x, r, j)
 
 
-@inner
+@kernel
 def extend(curve: Any, m: int, x: Any, j: int, length: float) -> None:
     """Place joint j + 1 beyond the end of the curve, along its last direction."""
     d0, d1, d2 = (

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from solver._kernels.energy import slide_of
-from solver._kernels.flags import inner
+from solver._kernels.flags import kernel
 from solver._kernels.layout import Profile
 from solver._kernels.problem import Problem
 from solver._kernels.rotation import turn
@@ -14,7 +14,7 @@ from solver._kernels.small import load9, store9
 from solver._kernels.spline import Field
 
 
-@inner
+@kernel
 def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
 
@@ -42,7 +42,7 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
     return deepest
 
 
-@inner
+@kernel
 def profile_at(at: Any, value: Any, s: float) -> float:
     """A piecewise linear function of the distance from the tip; at a jump the value further out."""
     n = at.size
@@ -54,7 +54,7 @@ def profile_at(at: Any, value: Any, s: float) -> float:
     return float(value[n - 1])
 
 
-@inner
+@kernel
 def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
@@ -90,7 +90,7 @@ def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: A
     return float(force)
 
 
-@inner
+@kernel
 def furthest_outside(field: Field, x: Any, k: int) -> float:
     """How far joints 1 to k are outside the grid's voxels (half a voxel beyond their centres) at most, mm."""
     m, o, shape = field.to_index, field.origin, field.coefficients.shape
@@ -107,7 +107,7 @@ def furthest_outside(field: Field, x: Any, k: int) -> float:
     return math.sqrt(furthest)
 
 
-@inner
+@kernel
 def least_turn_cosine(r: Any, k: int) -> float:
     """Cosine of the sharpest turn between consecutive segments."""
     least = 1.0
@@ -117,7 +117,7 @@ def least_turn_cosine(r: Any, k: int) -> float:
     return least
 
 
-@inner
+@kernel
 def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
     """Copy one of the states over another."""
     s = problem.state

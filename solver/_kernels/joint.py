@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.flags import inlined, inner
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.rotation import jacobian_terms, sine_terms
 from solver._kernels.small import Nine, Six, Three, add6, conjugate, cross, transpose
@@ -101,7 +101,7 @@ def solve_block(q: Six, twisting: bool) -> Nine:
     )
 
 
-@inner
+@kernel
 def note_direction(q: Six, j: int, least: float, report: Any) -> None:
     """Keep the direction of negative curvature of an indefinite block: the way off a saddle."""
     report[2] = j

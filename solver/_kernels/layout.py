@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import inner, kernel
+from solver._kernels.flags import kernel
 
 GAUSS = 1 / math.sqrt(3.0)
 
@@ -68,7 +68,7 @@ class Chain(NamedTuple):
     reach: float
 
 
-@inner
+@kernel
 def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
     """Integral from 0 to s of a piecewise linear function, or of one over it (exact on every piece)."""
     total = 0.0
@@ -107,7 +107,7 @@ def tabulate(profile: Profile, segment_mm: float, table: Any) -> None:
         cell(profile, inner, outer, table[m])
 
 
-@inner
+@kernel
 def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
     """Compliance 1/c and rest bend of a joint whose cell reaches from ``inner`` to ``outer`` mm from the tip."""
     result[0] = integral(profile.stiffness_at, profile.stiffness, outer, True)
@@ -149,7 +149,7 @@ def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
     return place_points(chain, cut.rule, k)
 
 
-@inner
+@kernel
 def place_points(chain: Chain, rule: Rule, k: int) -> int:
     """Fill the look-up points of every node and of the segment that ends there.
 
@@ -179,7 +179,7 @@ def place_points(chain: Chain, rule: Rule, k: int) -> int:
     return p
 
 
-@inner
+@kernel
 def place_point(chain: Chain, rule: Rule, p: int, along: float, weight: float) -> int:
     """Fill the points of the hull around one place on the wire; return the next free one."""
     hulls = rule.hull.shape[0]

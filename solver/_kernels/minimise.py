@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import inner
+from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
 from solver._kernels.newton import costate, sweep
 from solver._kernels.passage import crossed
@@ -30,14 +30,14 @@ POLISHES = tol.POLISHES
 FORETOLD = tol.FORETOLD
 
 
-@inner
+@kernel
 def scale_of(problem: Problem, which: int, k: int) -> float:
     """The energy that tolerances are relative to, N mm."""
     parts = problem.state.parts[which]
     return float(parts[BENDING] + parts[WALL] + parts[RUBBING] + FLOOR * stiffest(problem.chain, k))
 
 
-@inner
+@kernel
 def stiffest(chain: Chain, k: int) -> float:
     """Largest joint stiffness, N mm/rad."""
     largest = 0.0
@@ -46,7 +46,7 @@ def stiffest(chain: Chain, k: int) -> float:
     return largest
 
 
-@inner
+@kernel
 def largest_moment(chain: Chain, u: Any, k: int) -> float:
     """Largest bending moment in the wire, N mm, with a floor."""
     largest = 0.0
@@ -55,13 +55,13 @@ def largest_moment(chain: Chain, u: Any, k: int) -> float:
     return largest
 
 
-@inner
+@kernel
 def admissible(problem: Problem, which: int, k: int) -> bool:
     """Whether the trial state can be reached from the current one without passing through a wall."""
     return problem.stiffness == 0.0 or not crossed(problem, which, k)
 
 
-@inner
+@kernel
 def search(problem: Problem, which: int, k: int, energy: float, decrement: float, noise: float) -> float:
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
@@ -76,7 +76,7 @@ def search(problem: Problem, which: int, k: int, energy: float, decrement: float
     return math.inf
 
 
-@inner
+@kernel
 def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
@@ -99,7 +99,7 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
     return math.inf
 
 
-@inner
+@kernel
 def rest_shape(problem: Problem, which: int, k: int) -> bool:
     """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
     state = problem.state
@@ -113,7 +113,7 @@ def rest_shape(problem: Problem, which: int, k: int) -> bool:
     return parts[WALL] == 0.0 and parts[RUBBING] == 0.0 and admissible(problem, which, k)
 
 
-@inner
+@kernel
 def unloaded(chain: Chain, k: int) -> bool:
     """No dead load on any joint."""
     for n in range(k + 1):
@@ -122,7 +122,7 @@ def unloaded(chain: Chain, k: int) -> bool:
     return True
 
 
-@inner
+@kernel
 def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
     rollout(problem, which, k, 0 * k, 1.0)
@@ -134,13 +134,13 @@ def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> 
     return which, energy
 
 
-@inner
+@kernel
 def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
     """Whether the residual moments that ``costate`` left are nothing beside the moments in the wire."""
     return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
 
 
-@inner
+@kernel
 def polish(
     problem: Problem, which: int, k: int, energy: float, noise: float, report: Any
 ) -> tuple[int, float]:
@@ -164,7 +164,7 @@ def polish(
     return which, energy
 
 
-@inner
+@kernel
 def rounding_moment(problem: Problem, which: int, k: int) -> float:
     """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
     chain, depth = problem.chain, problem.state.depth
@@ -178,7 +178,7 @@ def rounding_moment(problem: Problem, which: int, k: int) -> float:
     return ROUND_OFF * force * lever
 
 
-@inner
+@kernel
 def minimise(
     problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:

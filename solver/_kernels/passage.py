@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inner
+from solver._kernels.flags import kernel
 from solver._kernels.problem import Problem
 from solver._kernels.spline import Field, locate, set_basis, value
 
@@ -16,7 +16,7 @@ HOP = tol.HOP_VOXELS
 LOOK_AHEAD = tol.LOOK_AHEAD_MM
 
 
-@inner
+@kernel
 def crossed(problem: Problem, which: int, k: int) -> bool:
     """Whether a joint, moving straight from one state to the other, would pass through wall.
 
@@ -33,13 +33,13 @@ def crossed(problem: Problem, which: int, k: int) -> bool:
     return False
 
 
-@inner
+@kernel
 def hops(problem: Problem, a: Any, b: Any, way: float) -> bool:
     """Whether the straight way from a to b passes through wall."""
     return free_fraction(problem.field, a, b, way, problem.spacing, problem.scratch.weights) < 1.0
 
 
-@inner
+@kernel
 def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float, weights: Any) -> float:
     """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
     last = distance_at(field, a, 1.0, b, weights)
@@ -51,7 +51,7 @@ def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float, weig
     return 1.0
 
 
-@inner
+@kernel
 def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
     """Signed distance, mm, at a + t (b - a)."""
     x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
@@ -60,7 +60,7 @@ def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
     return float(value(field.coefficients, i, j, k, weights))
 
 
-@inner
+@kernel
 def free_way(
     field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float, weights: Any
 ) -> float:
@@ -89,7 +89,7 @@ def free_way(
     return max(free, min(step, 0.25 * rise))
 
 
-@inner
+@kernel
 def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float, weights: Any) -> bool:
     """Whether the distance on the ray from a through b rises above the surface and falls again, 2 mm past b."""
     top = 0.0

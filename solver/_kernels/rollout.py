@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inlined, inner, kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import Problem, State
 from solver._kernels.rotation import turn
@@ -29,7 +29,7 @@ def place(chain: Chain, state: State, which: int, k: int) -> None:
             x[j + 1, a] = x[j, a] + length * r[j + 1, a, 2]
 
 
-@inner
+@kernel
 def rollout(problem: Problem, which: int, k: int, near: int, fraction: float) -> None:
     """Take a fraction of Newton's step forward with feedback, from joint ``near`` on: the trial state.
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import inlined, inner, kernel
+from solver._kernels.flags import inlined, kernel
 
 # Cells along an edge of the blocks over which bounds are taken: small enough to stay local, large enough to be cheap.
 BLOCK = 4
@@ -30,7 +30,7 @@ class Field(NamedTuple):
     slope: float
 
 
-@inner
+@kernel
 def solve_natural(line: Any, scratch: Any) -> None:
     """Replace the values of one line by its natural B-spline coefficients (Thomas algorithm on 1 4 1)."""
     n = line.size
@@ -121,7 +121,7 @@ def basis(t: float, weights: Any) -> None:
     weights[2, 3] = t
 
 
-@inner
+@kernel
 def set_basis(r: float, s: float, t: float, weights: Any) -> None:
     """Fill (3, 3, 4) weights for a place in a cell."""
     basis(r, weights[0])
@@ -129,7 +129,7 @@ def set_basis(r: float, s: float, t: float, weights: Any) -> None:
     basis(t, weights[2])
 
 
-@inner
+@kernel
 def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
     """Fill jet (10,): value, gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
     p, q, r = weights[0], weights[1], weights[2]
@@ -164,7 +164,7 @@ def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
     jet[4], jet[5], jet[6], jet[7], jet[8], jet[9] = hxx, hyy, hzz, hxy, hxz, hyz
 
 
-@inner
+@kernel
 def value(c: Any, i: int, j: int, k: int, weights: Any) -> float:
     """The spline alone, without derivatives: a third of the cost."""
     p, q, r = weights[0, 0], weights[1, 0], weights[2, 0]
@@ -233,7 +233,7 @@ def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     return gap, slope
 
 
-@inner
+@kernel
 def largest_differences(c: Any, i0: int, j0: int, k0: int, first: Any, second: Any) -> float:
     """Largest first and second differences (3,) in the support of a block of cells; return its least value."""
     n = BLOCK + 3

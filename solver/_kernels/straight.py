@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inlined, inner
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.joint import note_direction
 from solver._kernels.node import node_gradient, node_hessian
 from solver._kernels.problem import Problem
@@ -58,7 +58,7 @@ def block(bend: float, u: Pair, jac: Six, h: Three, g: Pair, b: float, db: float
     )
 
 
-@inner
+@kernel
 def sweep_straight(problem: Problem, which: int, k: int, damping: float, report: Any) -> bool:
     """``newton.sweep`` of a straight wire; same arguments, gains, report and result."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain

@@ -16,6 +16,7 @@ from pipeline.benchmark.peers.judge import row_of
 
 ADAPTERS = {
     "exudyn_cable": "exudyn",
+    "exudyn_plain": "exudyn",
     "pypbd_rod": "pyPBD",
     "mujoco_cable": "mujoco",
     "pyelastica_rod": "pyelastica",
@@ -32,6 +33,7 @@ WORK: dict[str, Sequence[tuple[str, int]]] = {
         *(("cantilever", n) for n in (5, 10, 20, 50, 100, 200)),
         *(("bend", n) for n in (30, 60, 120)),
     ],
+    "exudyn_plain": [*(("bend", n) for n in (30, 60, 120))],
     "pypbd_rod": [*(("cantilever", n) for n in (20, 50, 100)), *(("bend", n) for n in (30, 60, 120))],
     "mujoco_cable": [("cantilever", 20), ("cantilever", 50), ("bend", 30)],
     "pyelastica_rod": [("cantilever", 20), ("cantilever", 50), ("bend", 30)],
