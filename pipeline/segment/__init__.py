@@ -13,6 +13,7 @@ from pipeline.segment.connect import connect, connect_relative, neighbours
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.levels import deepest, levels_at, scanner_blur
 from pipeline.segment.surface import Site, prepare, signed_distance
+from pipeline.segment.thin import add_balls, balls, thin_branches
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
@@ -104,15 +105,18 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     levels, seeds = _start(grid, _seed_voxels(grid, seeds_mm))
     affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma, config.scale)
     order, read = _connected(grid, seeds, affinity, config)
-    site = prepare(grid, order, affinity.taps, config.margin_mm)
+    thin, more = thin_branches(grid, seeds, order, levels, affinity)
+    site = prepare(grid, order, affinity.taps, config.margin_mm, thin)
     values, level, counters = _wall(site, levels, config.outer_mm)
-    counters["scanner_blur_mm"] = scanner_blur(
-        counters["blur_mm"], affinity.taps, float(np.min(grid.spacing_mm))
-    )
+    blur = scanner_blur(counters["blur_mm"], affinity.taps, float(np.min(grid.spacing_mm)))
+    if len(thin):
+        found = balls(grid, thin, site.box.corner, levels, blur)
+        add_balls(values, np.asarray(grid.spacing_mm), found, config.outer_mm)
     total = float(np.prod(grid.shape))
     counters |= {
-        "voxels_total": total, "voxels_read": read, "voxels_skipped": total - read,
-        "voxels_visited": float(len(order)), "noise": levels.noise,
+        "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
+        "voxels_visited": float(len(order)), "voxels_thin": float(len(thin)),
+        "noise": levels.noise, "scanner_blur_mm": blur,
     }  # fmt: skip
     distance, mask = site.grid.with_values(values), site.grid.with_values((values < 0).view(np.uint8))
     touching = contacts(distance)

@@ -108,9 +108,18 @@ class Site:
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.box.corner), self.volume.direction)
 
 
-def prepare(volume: Grid, order: NDArray[np.int64], taps: NDArray[np.float32], margin_mm: float) -> Site:
-    """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them."""
-    box = box_of(order, volume, margin_mm)
+def prepare(
+    volume: Grid,
+    order: NDArray[np.int64],
+    taps: NDArray[np.float32],
+    margin_mm: float,
+    more: NDArray[np.int64] | None = None,
+) -> Site:
+    """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them.
+
+    more : further voxels that the box must hold.
+    """
+    box = box_of(order if more is None else np.concatenate([order, more]), volume, margin_mm)
     state = sparse_zeros(box.shape, np.uint8)
     flat = into_box(order, volume.shape, box.corner, box.shape)
     state.reshape(-1)[flat] = 1

@@ -1,0 +1,152 @@
+"""Branches too thin to reach half the contrast: followed at a lower grey, and given the radius that their peak tells.
+
+A cylinder of radius r blurred by sigma peaks at 1 - exp(-r^2 / 2 sigma^2) of the contrast: two voxels across and a blur
+of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half height ends there. Beyond the blurred
+skirt of the vessel, what hangs together at a lower grey, is long, thin and nowhere bright, is such a branch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline._kernels.contact import along_cores
+from pipeline._kernels.ridges import smooth_voxels
+from pipeline._kernels.solids import cones
+from pipeline._kernels.thin import crests
+from pipeline._kernels.wall import PAD, dilate, into_box
+from pipeline.segment.affinity import Affinity, Levels, noise_after
+from pipeline.segment.connect import connect, neighbours
+from pipeline.segment.surface import Box, box_of
+from pipeline.sparse import sparse_zeros
+from solver.grid import Array, Grid
+
+FAINTEST = 0.09
+"""Least share of the contrast at which branches are followed: other tissue may be brighter than that."""
+SIGMAS = 5.0
+"""The same in standard deviations of the smoothed noise: none of a hundred million voxels is above by chance."""
+SKIRT = 3
+"""Layers around the voxels at FULL that the vessel's own blur may fill: from 0.65 to 0.09 it falls in two voxels."""
+SHORTEST = 6
+"""Voxels from end to end of a branch."""
+FATTEST = 45.0
+"""Voxels per step along a branch: its cross-section where the skirt ends, and oblique steps."""
+BRIGHTEST = 0.75
+"""Share of the contrast above which something is no thin branch, but a vessel that connectedness did not reach."""
+FULL = 0.65
+"""Share of the contrast that a vessel thick enough for a surface at half height reaches: at a radius of 1.5 voxels."""
+CREST_VOXELS = 0.7
+"""Blur in which the crest is looked for."""
+NEAR_VOXELS = 3.0
+HIGHEST = 0.85
+"""Share of the brightest crest point within three voxels that another must have: half a blur off it is 0.88."""
+SHARP = 0.4
+"""Curvature of a crest over that of a Gaussian line of its height: half a blur off its middle it is down to 0.7."""
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """A thin branch as balls: centres (n, 3) mm along the box's axes from its first voxel, radii (n,) mm."""
+
+    centre: Array
+    radius: Array
+
+
+def _low_affinity(levels: Levels, affinity: Affinity) -> Affinity | None:
+    """Tables that link any two voxels whose mean is above the faintest grey; None where noise leaves no room."""
+    least = max(FAINTEST, SIGMAS * levels.noise * noise_after(affinity.taps) / levels.contrast)
+    if least > 0.4:
+        return None
+    mean = affinity.low + 0.5 / affinity.scale * np.arange(len(affinity.feature))
+    feature = (mean >= levels.outside + least * levels.contrast).astype(np.float32)
+    return Affinity(
+        np.full_like(affinity.homogeneity, 255.0), feature, affinity.low, affinity.scale, affinity.taps
+    )
+
+
+def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Any]:
+    """Voxels of ``low`` (flat, ascending) that the blur of ``thick`` does not reach, and their box of positions + 1."""
+    box: Box = box_of(low, volume, 0.0)
+    state = sparse_zeros(box.shape, np.uint8)
+    main, wide = (into_box(o, volume.shape, box.corner, box.shape) for o in (thick, low))
+    state.reshape(-1)[main] = 1
+    dilate(state, main, SKIRT, 2)
+    rest = np.flatnonzero(state.reshape(-1)[wide] == 0)
+    inner = np.sort(wide[rest])
+    ids = sparse_zeros(box.shape, np.int32)
+    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
+    index = np.stack(np.unravel_index(inner, box.shape), axis=1) - PAD + box.corner
+    return np.ravel_multi_index(tuple(index.T), volume.shape), (ids, inner)
+
+
+def thin_branches(
+    volume: Grid, seeds: Index, order: Index, levels: Levels, affinity: Affinity
+) -> tuple[Index, float]:
+    """Flat indices of the voxels of thin branches beyond the vessel ``order``, and the number of voxels read."""
+    tables = _low_affinity(levels, affinity)
+    nothing = np.zeros(0, np.int64)
+    if tables is None:
+        return nothing, 0.0
+    low, read = connect(volume, seeds, tables, 0.5, neighbours(6))
+    bright = smooth_voxels(volume.values, affinity.taps, order)
+    thick = order[bright >= levels.outside + FULL * levels.contrast]
+    if len(low) <= len(order) or len(thick) == 0:
+        return nothing, read
+    found, (ids, inner) = _beyond_skirt(volume, thick, low)
+    if len(found) < SHORTEST:
+        return nothing, read
+    part, steps = along_cores(ids, inner, np.ones(len(inner), bool))
+    share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
+    count = np.bincount(part)
+    length, most = np.zeros(len(count)), np.zeros(len(count))
+    np.maximum.at(length, part, steps + 1)
+    np.maximum.at(most, part, share)
+    good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
+    return found[good[part]], read
+
+
+def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
+    """Which points (n, 3), in voxels, have no much brighter one beside them: on the flank of a crest one does."""
+    near = cKDTree(points).query_ball_point(points, NEAR_VOXELS)
+    return np.array([s >= HIGHEST * share[n].max() for s, n in zip(share, near, strict=True)], bool)
+
+
+def balls(volume: Grid, thin: Index, corner: Index, levels: Levels, blur_mm: float) -> Balls:
+    """Crest points of thin branches and the radii that their peaks tell. blur_mm : the scanner's."""
+    spacing = np.asarray(volume.spacing_mm)
+    sigma = CREST_VOXELS * float(spacing.min())
+    whole = float(np.hypot(blur_mm, sigma))
+    at, peak = crests(volume.values, spacing, sigma, thin, levels.outside, SHARP / whole**2)
+    share = np.clip((peak - levels.outside) / levels.contrast, 0.0, 0.95)
+    radius = whole * np.sqrt(-2.0 * np.log1p(-share))
+    good = np.flatnonzero(share > 0)
+    good = good[_highest(at[good] / float(spacing.min()), share[good])]
+    # several voxels lead to one point of the crest: one ball per third of a voxel
+    _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
+    return Balls(at[good][first] - corner * spacing, radius[good][first])
+
+
+def add_balls(distance: NDArray[np.float32], spacing: Array, found: Balls, outer_mm: float) -> None:
+    """Lower the signed distance to that of the union with the balls, each drawn towards the vessel it hangs on."""
+    if len(found.radius) == 0:
+        return
+    index = np.clip(np.rint(found.centre / spacing).astype(int), 1, np.array(distance.shape) - 2)
+    away = distance[tuple(index.T)].astype(float)
+    end = found.centre.copy()
+    near = (away > 0) & (away < 4.0 * float(spacing.min()))
+    steps = np.eye(3, dtype=int)
+    slope = np.stack(
+        [
+            (distance[tuple((index + s).T)] - distance[tuple((index - s).T)]) / (2.0 * spacing[a])
+            for a, s in enumerate(steps)
+        ],
+        axis=1,
+    )
+    slope /= np.maximum(np.linalg.norm(slope, axis=1), 1e-6)[:, None]
+    end[near] -= (away + float(spacing.min()))[near, None] * slope[near]
+    cones(found.centre, end, found.radius, found.radius, spacing, outer_mm, distance)

@@ -1,0 +1,62 @@
+"""Branches one to three voxels across: kept, with the radius that was drawn, and nothing else is added."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from pipeline.model import Volume
+from pipeline.segment import segment
+from tests.pipeline import phantoms
+
+VOXEL, LOW = 0.3, np.array([-4.93, -7.43, -8.93])
+AXIS = np.array([0.95, 0.2, 0.25]) / np.linalg.norm([0.95, 0.2, 0.25])
+POINTS = np.stack(np.indices((70, 50, 60)), axis=-1) * VOXEL + LOW
+
+
+def lumen_of(radius, cnr, seed=100):
+    """A tube of 2 mm with a branch of ``radius`` mm, contrast 900, PSF 0.8 voxel."""
+    along = np.clip(POINTS @ AXIS, 0.0, 15.0)
+    branch = np.linalg.norm(POINTS - along[..., None] * AXIS, axis=-1) - radius
+    clean = 100.0 + 900.0 * phantoms.partial_volume(
+        np.minimum(np.hypot(POINTS[..., 0], POINTS[..., 1]) - 2.0, branch), VOXEL
+    )
+    grey = phantoms.scan(clean, 0.8, 900.0 / cnr, seed)
+    return segment(Volume(np.asfortranarray(grey), [VOXEL] * 3, LOW), [[0.0, 0.0, 0.0]])
+
+
+def wall_along(lumen):
+    """Where the wall lies (mm from the axis, at four sides) along the branch outside its parent, and gaps in it."""
+    place = np.arange(3.5, 13.5, 0.3)[:, None] * AXIS
+    u = np.cross(AXIS, [0.0, 0.0, 1.0])
+    u /= np.linalg.norm(u)
+    v = np.cross(AXIS, u)
+    index = lumen.distance.to_index(place)
+    assert np.all(index > 0)
+    assert np.all(index < np.array(lumen.distance.shape) - 1)
+    inside = map_coordinates(lumen.distance.values, index.T, order=1) < 0
+    sides = [s * w for w in (u, v) for s in (1, -1)]
+    away = np.array(
+        [
+            map_coordinates(lumen.distance.values, lumen.distance.to_index(place + 0.9 * w).T, order=1)
+            for w in sides
+        ]
+    )
+    return 0.9 - away.mean(), inside.mean()
+
+
+@pytest.mark.parametrize(
+    ("radius_voxels", "least"), [(0.67, 0.6), (0.83, 0.85), (1.0, 0.95), (1.33, 0.99), (1.67, 0.99)]
+)
+def test_thin_branches_are_kept_with_their_radius(radius_voxels, least):
+    """``least``: share of the axis where the distance is negative between the nodes, which 0.67 voxel hardly allow."""
+    radius, kept = wall_along(lumen_of(radius_voxels * VOXEL, 9.0))
+    assert kept > least
+    assert radius == pytest.approx(radius_voxels * VOXEL, abs=0.25 * VOXEL)
+
+
+def test_no_branch_is_made_of_noise_or_of_the_skirt_of_a_vessel():
+    for seed in range(100, 104):
+        lumen = lumen_of(0.0, 9, seed)
+        assert lumen.counters["voxels_thin"] == 0
