@@ -33,6 +33,12 @@ STRESS_COLUMNS: tuple[Column, ...] = (
     Column("axis", "-", "what is extreme in the scene", "text"),
     Column("outcome", "-", "converged, or the status", "text"),
     Column("count", "1", "number of scenes; 1 where each has its own row", "integer"),
+    Column("iterations_median", "1", "iterations, or sweeps of the closed form, of a scene"),
+    Column("iterations_max", "1", "the most iterations of a scene"),
+    Column("worst_residual", "1", "largest moment left in a wire called converged, relative to its largest"),
+    Column("worst_stretch", "1", "largest change of a segment's length, relative"),
+    Column("seconds_max", "s", "processor time of the slowest scene"),
+    Column("slowest", "-", "number of that scene", "integer"),
 )
 BENCH_FIGURES = {"pareto": pareto, "convergence": convergence, "stress_outcomes": stress_outcomes}
 TARGETS_MM = (0.1, 0.01)
@@ -57,6 +63,7 @@ def render_bench(
         "recommended": _grid(best) if len(best) else None,
         "rows": _grid(bench.rows.drop(columns="on_front")),
         "stress": _grid(_crosstab(counts)) if len(counts) else None,
+        "stress_numbers": _numbers(bench.stress),
         "source": bench_csv.name,
     }
     return write_page("bench.html.j2", page, out_dir / "bench.html")
@@ -115,6 +122,12 @@ def _crosstab(counts: pd.DataFrame) -> pd.DataFrame:
     table = table.astype(int)
     table["all"] = table.sum(axis=1)
     return table.reset_index()
+
+
+def _numbers(stress: pd.DataFrame) -> dict[str, Any] | None:
+    """How much and how well, by outcome, over all scenes; None where the table has counts alone."""
+    whole = stress[stress["axis"] == "all"].drop(columns="axis")
+    return _grid(whole) if len(whole) and whole["iterations_max"].notna().any() else None
 
 
 def _grid(table: pd.DataFrame) -> dict[str, Any]:

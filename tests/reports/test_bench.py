@@ -110,3 +110,19 @@ def test_nothing_to_show_is_no_figure(draw: object, tmp_path: Path) -> None:
     pd.DataFrame({"scene": ["bend"], "method": ["newton"]}).to_csv(tmp_path / "b.csv", index=False)
     result: Drawing | None = draw(bench.read_bench(tmp_path / "b.csv"))  # type: ignore[operator]
     assert result is None
+
+
+def test_a_stress_study_alone_shows_how_well_its_scenes_ended(tmp_path: Path) -> None:
+    pd.DataFrame(columns=["scene", "method"]).to_csv(tmp_path / "b.csv", index=False)
+    row = {
+        "outcome": "converged",
+        "count": 3,
+        "iterations_max": 71,
+        "worst_residual": 2.5e-5,
+        "slowest": 1099,
+    }
+    pd.DataFrame([{"axis": a, **row} for a in ("all", "roll")]).to_csv(tmp_path / "s.csv", index=False)
+    text = bench.render_bench(tmp_path / "b.csv", tmp_path / "out", tmp_path / "s.csv").read_text("utf-8")
+    assert "Over all scenes, by outcome" in text
+    assert "1099" in text
+    assert "All rows" not in text
