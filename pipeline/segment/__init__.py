@@ -109,6 +109,7 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     site = prepare(grid, order, affinity.taps, config.margin_mm, thin)
     values, level, counters = _wall(site, levels, config.outer_mm)
     blur = scanner_blur(counters["blur_mm"], affinity.taps, float(np.min(grid.spacing_mm)))
+    touching = contacts(site.grid.with_values(values))
     if len(thin):
         found = balls(grid, thin, site.box.corner, levels, blur)
         add_balls(values, np.asarray(grid.spacing_mm), found, config.outer_mm)
@@ -116,9 +117,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     counters |= {
         "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
         "voxels_visited": float(len(order)), "voxels_thin": float(len(thin)),
+        "touching_places": float(len(touching)),
         "noise": levels.noise, "scanner_blur_mm": blur,
     }  # fmt: skip
     distance, mask = site.grid.with_values(values), site.grid.with_values((values < 0).view(np.uint8))
-    touching = contacts(distance)
-    counters["touching_places"] = float(len(touching))
     return Lumen(reorder(distance, axes), reorder(mask, axes), level, warning(touching), counters)

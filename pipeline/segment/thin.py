@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pipeline._kernels.contact import along_cores
@@ -41,7 +43,12 @@ FULL = 0.65
 """Share of the contrast that a vessel thick enough for a surface at half height reaches: at a radius of 1.5 voxels."""
 CREST_VOXELS = 0.7
 """Blur in which the crest is looked for."""
+BRIDGE_VOXELS = 7.0
+"""Longest gap over which pieces are joined: a skirt on both sides and a voxel more."""
+LEAST_RADIUS = 0.6
+"""Voxels: a thinner tube falls between the nodes of the distance and comes to pieces."""
 NEAR_VOXELS = 3.0
+"""How far round about the highest point of a crest is looked for."""
 HIGHEST = 0.85
 """Share of the brightest crest point within three voxels that another must have: half a blur off it is 0.88."""
 SHARP = 0.4
@@ -128,25 +135,55 @@ def balls(volume: Grid, thin: Index, corner: Index, levels: Levels, blur_mm: flo
     good = good[_highest(at[good] / float(spacing.min()), share[good])]
     # several voxels lead to one point of the crest: one ball per third of a voxel
     _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
-    return Balls(at[good][first] - corner * spacing, radius[good][first])
+    thickest = np.maximum(radius[good][first], LEAST_RADIUS * float(spacing.min()))
+    return Balls(at[good][first] - corner * spacing, thickest)
+
+
+def _pieces(points: Array, apart: float) -> NDArray[np.int64]:
+    """The piece (n,) that each point belongs to: points at most ``apart`` from one another hang together."""
+    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1], np.int64)
+
+
+def _nearest(places: Array, points: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Distance from each point to the nearest place, and which that is."""
+    away, at = cKDTree(places).query(points)
+    return np.asarray(away, float), np.asarray(at, np.int64)
+
+
+def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_], Array]:
+    """Which points (n, 3) hang together with the vessel's (m, 3) over gaps of at most ``reach``, and the bridges.
+
+    Returns also (b, 2): from a point to the place it hangs on, (b, 2, 3). Pieces are joined nearest first, as in
+    Prim's minimum spanning tree: the gaps are the skirts that were cut out of one connected region.
+    """
+    piece = _pieces(points, 2.0)
+    gap, at = _nearest(vessel, points)
+    foot = vessel[at]
+    free, bridges = np.ones(len(points), bool), []
+    while free.any():
+        n = int(np.argmin(np.where(free, gap, np.inf)))
+        if gap[n] > reach:
+            break
+        own = piece == piece[n]
+        bridges.append((points[n], foot[n]))
+        free &= ~own
+        away, at = _nearest(points[own], points)
+        nearer = free & (away < gap)
+        gap[nearer], foot[nearer] = away[nearer], points[own][at[nearer]]
+    return ~free, np.array(bridges).reshape(-1, 2, 3)
 
 
 def add_balls(distance: NDArray[np.float32], spacing: Array, found: Balls, outer_mm: float) -> None:
-    """Lower the signed distance to that of the union with the balls, each drawn towards the vessel it hangs on."""
-    if len(found.radius) == 0:
+    """Lower the signed distance to that of the union with the balls that hang together with the vessel."""
+    vessel = np.argwhere(distance < 0).astype(float)
+    if len(found.radius) == 0 or len(vessel) == 0:
         return
-    index = np.clip(np.rint(found.centre / spacing).astype(int), 1, np.array(distance.shape) - 2)
-    away = distance[tuple(index.T)].astype(float)
-    end = found.centre.copy()
-    near = (away > 0) & (away < 4.0 * float(spacing.min()))
-    steps = np.eye(3, dtype=int)
-    slope = np.stack(
-        [
-            (distance[tuple((index + s).T)] - distance[tuple((index - s).T)]) / (2.0 * spacing[a])
-            for a, s in enumerate(steps)
-        ],
-        axis=1,
-    )
-    slope /= np.maximum(np.linalg.norm(slope, axis=1), 1e-6)[:, None]
-    end[near] -= (away + float(spacing.min()))[near, None] * slope[near]
-    cones(found.centre, end, found.radius, found.radius, spacing, outer_mm, distance)
+    kept, bridges = joined(found.centre / spacing, vessel, BRIDGE_VOXELS)
+    centre, radius = found.centre[kept], found.radius[kept]
+    cones(centre, centre, radius, radius, spacing, outer_mm, distance)
+    if len(bridges):
+        start, end = bridges[:, 0] * spacing, bridges[:, 1] * spacing
+        thick = radius[cKDTree(centre).query(start)[1]]
+        cones(start, end, thick, thick, spacing, outer_mm, distance)
