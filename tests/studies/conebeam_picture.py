@@ -16,10 +16,10 @@ from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
 
 Array = NDArray[np.float64]
 
-EDGE = 440  # pixels of a panel
+EDGE = 380  # pixels of a panel
 LINE = 26  # pixels of its title
-SLAB = 6
-"""Voxels on either side of the wire that are averaged where streaks are shown: noise falls, streaks stay."""
+SLAB = 1
+"""Slices on either side that are averaged where streaks are shown: noise falls, streaks stay."""
 
 
 def draw(out: Path, scene: str, seed: int, target: Path) -> None:
@@ -30,13 +30,15 @@ def draw(out: Path, scene: str, seed: int, target: Path) -> None:
     truth = json.loads((out / "conebeam" / "truth.json").read_text(encoding="utf-8"))["frames"][-1]
     grid = _grid(out / "conebeam" / "reference.mha")
     wire = grid.to_index(truth["points_mm"])
-    level = round(float(np.median(wire[:, 1])))
-    streaks = (scans["conebeam"] - reference)[:, max(level - SLAB, 0) : level + SLAB + 1].mean(axis=1)
+    # streaks lie in planes across the axis of rotation: take the one in which most of the wire runs
+    level = int(np.bincount(np.rint(wire[:, 2]).astype(int)).argmax())
+    added = scans["conebeam"] - reference
+    streaks = added[:, :, max(level - SLAB, 0) : level + SLAB + 1].mean(axis=2)
     panels = [
-        ("psf: coronal slice through the wire", scans["psf"][:, level], (-300.0, 1800.0)),
-        ("conebeam: the same slice", scans["conebeam"][:, level], (-300.0, 1800.0)),
+        ("psf: axial slice through the wire", scans["psf"][:, :, level], (-300.0, 1500.0)),
+        ("conebeam: the same slice", scans["conebeam"][:, :, level], (-300.0, 1500.0)),
         ("conebeam: one X-ray projection, -log of the photons", _projection(scene, seed, grid, truth), None),
-        ("conebeam: frame minus reference, mean of a slab", streaks, (-60.0, 60.0)),
+        ("conebeam: frame minus reference, mean of three slices", streaks, (-250.0, 250.0)),
     ]
     sheet = Image.new("L", (2 * EDGE, 2 * (EDGE + LINE)), 255)
     for k, (title, values, window) in enumerate(panels):
@@ -44,7 +46,7 @@ def draw(out: Path, scene: str, seed: int, target: Path) -> None:
         ImageDraw.Draw(sheet).text((left + 6, top + 7), title, fill=0)
         sheet.paste(_panel(values, window), (left, top + LINE))
     target.parent.mkdir(parents=True, exist_ok=True)
-    sheet.quantize(64).save(target, optimize=True)
+    sheet.quantize(24).save(target, optimize=True)
 
 
 def _load(path: Path) -> Array:
