@@ -13,6 +13,7 @@ from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.scene import Scene
+from pipeline.trace.tip import extended, resampled
 
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
@@ -31,6 +32,10 @@ MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
 MOST_DOUBLE_MM = 3.0
 """Length of line too bright for one strand (a crossing is 1 mm) from which a frame alone does not decide."""
+TIP_VOXELS = 4.0
+"""Length on either side of the tip over which a faint wire must be seen to end: the noise of its mean is a fifth."""
+TIP_AHEAD = 0.4
+"""Share of the usual crest grey beyond the tip from which the wire seems to go on."""
 MEAN_OVER_MM = 1.5
 """Length over which crest grey is averaged before it is called faint or double."""
 
@@ -102,7 +107,9 @@ def judge(
     faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
     cnr = attempt.cnr(scene)
     status, note = FrameStatus.OK, ""
-    if cnr < LEAST_CNR and (not attempt.from_previous or _weak(share, spread)):
+    if cnr < LEAST_CNR and not (
+        attempt.from_previous and not _weak(share, spread) and _ends_there(scene, points)
+    ):
         status = FrameStatus.TRACE_LOW_CONTRAST
         got, allowed = (
             f"a wire {cnr:.1f} noises bright",
@@ -138,6 +145,20 @@ def judge(
 
 def _sentence(got: str, allowed: str, do: str) -> str:
     return f"trace: wire: got {got}; expected {allowed}; {do}"
+
+
+def _ends_there(scene: Scene, points: Array) -> bool:
+    """Whether the crest is nearer its usual height than nothing over the last TIP_VOXELS, and not so beyond the tip.
+
+    A previous curve says where the wire lay, not how far it has been pushed since: that the frame alone must show.
+    """
+    h = float(scene.spacing.min())
+    line = resampled(extended(points, TIP_VOXELS * h, h), h)
+    grey = values_at(scene.grey, scene.spacing, 0.7 * h, np.ascontiguousarray(line))
+    count = round(TIP_VOXELS)
+    usual = float(np.median(grey[:-count]))
+    behind, ahead = float(np.mean(grey[-2 * count : -count])), float(np.mean(grey[-count:]))
+    return behind > 0.5 * usual and ahead < TIP_AHEAD * usual
 
 
 def _weak(share: Array, spread: float) -> bool:

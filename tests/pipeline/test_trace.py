@@ -20,6 +20,7 @@ from pipeline.trace.in_plane import near_rotation_plane
 from pipeline.trace.level import levelled
 from pipeline.trace.scene import build_scene
 from solver.grid import Grid
+from tests.bench.imaging.topology import earlier, plain
 from tests.pipeline import phantoms, tangles
 
 VOXEL = 0.3
@@ -329,3 +330,14 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
     outside = trace(frame, narrow, wire[0], wire[1] - wire[0], reference=reference)
     assert outside.status is FrameStatus.TRACE_LEFT_LUMEN
     assert outside.flagged.any()
+
+
+def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_confirms_it_up_to_the_tip():
+    """Seed 15: the crest pauses 5 voxels before the tip at CNR 2; seed 17: it does not."""
+    for seed, status in ((15, FrameStatus.TRACE_LOW_CONTRAST), (17, FrameStatus.OK)):
+        wire = plain(seed)
+        alone, _ = tangles.run(seed, 2.0, wire=wire)
+        assert alone.status is FrameStatus.TRACE_LOW_CONTRAST
+        curve, outcome = tangles.run(seed, 2.0, wire=wire, previous=earlier(seed, wire))
+        assert curve.status is status
+        assert outcome.right == (status is FrameStatus.OK)
