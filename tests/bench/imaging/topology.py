@@ -110,16 +110,16 @@ def report(quick):
         f"   turns in contact (1.4 voxels) from the previous frame: {right} of {len(few)} right, "
         f"{flagged} wrong but flagged"
     )
+    faint = range(700, 704 if quick else 712)
+    print(f"   low contrast, plain wires of seeds {faint[0]}-{faint[-1]}; a previous curve is 6 mm short and")
     print(
-        f"   low contrast, {len(few)} plain wires a row; a previous curve is 6 mm short and half a voxel off (right)"
+        "   half a voxel off (right) or 2 mm aside (wrong); it counts where its crest stands 3 sigmas out on 95 %"
     )
-    print(
-        "   or 2 mm aside (wrong); it counts where the crest along it stands 3 sigmas out of noise on 95 % of it"
-    )
+    print("   of it and ends where the curve does")
     print("   CNR  previous  right, ok  right, flagged  wrong, flagged  wrong, unflagged  statuses")
     for cnr in (3.0, 2.5, 2.0, 1.5):
         for prior in ("none", "right", "wrong"):
-            c, statuses = low_contrast(few, cnr, prior)
+            c, statuses = low_contrast(faint, cnr, prior)
             print(
                 f"   {cnr:.1f}  {prior:8s}  {c['right, ok']:9d}  {c['right, flagged']:14d}  "
                 f"{c['wrong, flagged']:14d}  {c['wrong, unflagged']:16d}  {dict(statuses)}"
