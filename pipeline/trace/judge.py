@@ -17,6 +17,8 @@ from pipeline.trace.tip import extended, resampled
 
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
+LEAST_WITH_PRIOR = 1.5
+"""and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
 LEAST_SEEN = 2.0
 """The same over what noise does to the fit: noise correlated over 0.8 voxel counts 2.4-fold. Below it the wire is
 followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
@@ -107,9 +109,8 @@ def judge(
     faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
     cnr = attempt.cnr(scene)
     status, note = FrameStatus.OK, ""
-    if cnr < LEAST_CNR and not (
-        attempt.from_previous and not _weak(share, spread) and _ends_there(scene, points)
-    ):
+    confirmed = attempt.from_previous and cnr > LEAST_WITH_PRIOR and not _weak(share, spread)
+    if cnr < LEAST_CNR and not (confirmed and _ends_there(scene, points)):
         status = FrameStatus.TRACE_LOW_CONTRAST
         got, allowed = (
             f"a wire {cnr:.1f} noises bright",

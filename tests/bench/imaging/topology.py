@@ -110,7 +110,7 @@ def report(quick):
         f"   turns in contact (1.4 voxels) from the previous frame: {right} of {len(few)} right, "
         f"{flagged} wrong but flagged"
     )
-    faint = range(700, 704 if quick else 712)
+    faint = range(720, 724 if quick else 732)
     print(f"   low contrast, plain wires of seeds {faint[0]}-{faint[-1]}; a previous curve is 6 mm short and")
     print(
         "   half a voxel off (right) or 2 mm aside (wrong); it counts where its crest stands 3 sigmas out on 95 %"
