@@ -75,6 +75,12 @@ def load_crop(header: Header, box: Box, config: LoadConfig) -> Volume:
     return load(header, box, config)
 
 
+def load_counters(header: Header, box: Box) -> dict[str, float]:
+    """What reading that box counts: voxels of the scan, read, and left alone."""
+    total, read = float(np.prod(header.shape)), float(np.prod(np.subtract(box[1], box[0])))
+    return {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
+
+
 def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np.uint8], ...]:
     """Maximum-intensity projections along the three array axes, 8 bit within the grey-value ``window``."""
     low, high = window

@@ -37,6 +37,7 @@ def segment_vessel(run: CaseRun) -> None:
     else:
         with run.timed("load"):
             volume = scans.load_crop(header, header.box, run.config.load)
+        run.count("load", scans.load_counters(header, header.box))
         with run.timed("segment"):
             run.lumen = segment(volume, np.array(run.case.lumen_seed_mm), run.config.segment)
         run.store.put("segment", key, *pack_lumen(run.lumen))

@@ -28,6 +28,7 @@ def trace_frames(run: CaseRun) -> None:
     if run.headers.reference is not None:
         with run.timed("load"):
             reference = scans.load_crop(run.headers.reference, box, run.config.load)
+        run.count("load", scans.load_counters(run.headers.reference, box))
     given = _given_traces(run)
     with run.timed("trace"):
         place = place_of(run.lumen, box, reference, run.config.load, run.config.trace, bool(given))
@@ -36,6 +37,7 @@ def trace_frames(run: CaseRun) -> None:
         try:
             with run.timed("load", frame):
                 volume = scans.load_crop(header, box, run.config.load)
+            run.count("load", scans.load_counters(header, box))
         except StageError as error:
             frame.fail_from("load", error)
             continue

@@ -13,7 +13,7 @@ import SimpleITK as sitk
 from pipeline.config import LoadConfig
 from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
 from pipeline.load.raw import read_mha_box
-from pipeline.scans import _expanded
+from pipeline.scans import _expanded, load_counters
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -54,6 +54,8 @@ def test_a_crop_is_the_same_voxels_at_the_same_place(tmp_path: Path, suffix: str
     crop = load(header, ((1, 2, 3), (4, 6, 8)))
     np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
     np.testing.assert_allclose(crop.to_mm([0, 0, 0]), header.grid.to_mm([1, 2, 3]), atol=1e-6)
+    counted = load_counters(header, ((1, 2, 3), (4, 6, 8)))
+    assert counted == {"voxels_total": 315.0, "voxels_read": 60.0, "voxels_skipped": 255.0}
 
 
 @pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.float32, np.float64])
