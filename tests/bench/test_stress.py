@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import time
@@ -209,7 +210,12 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
                 raise KeyboardInterrupt
             ran.append(index)
             yield Outcome(
-                index, ("roll", "hull"), "converged", "", 'a "word", and\na line', residual=1e-7 / 3
+                index,
+                ("roll", "hull"),
+                "converged",
+                "",
+                'a "word", and\na line',
+                residual=[1e-7 / 3, math.nan][index % 2],
             )
 
     monkeypatch.setattr("pipeline.benchmark.stress.study.run_isolated", runs)
@@ -223,6 +229,9 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
     assert list(rows["index"]) == [0, 1, 2, 3]
     whole = run_stress(5, range(4))
     pd.testing.assert_frame_equal(rows, whole, check_dtype=False)
+    # the table that the study leaves is one to go on from, too
+    rows.to_csv(path, index=False)
+    pd.testing.assert_frame_equal(run_stress(5, range(4), path=path), whole, check_dtype=False)
     # rows of another seed, or of another solver, are no rows of this study
     assert ran == [0, 1, 2, 3] * 2
     run_stress(6, range(4), path=path)

@@ -13,6 +13,9 @@ import pandas as pd
 
 import solver
 
+EMPTY = {name: ["", "nan"] for name in ("residual", "stretch")}
+"""Numbers that not every scene has, however they are written; an empty text is a text."""
+
 
 def version() -> str:
     """Ten hex digits of everything that decides how a scene ends: the solver's sources and the study's own."""
@@ -37,7 +40,7 @@ def rows_at(path: Path | None, seed: int, indices: Collection[int]) -> list[dict
     if not whole:
         return []
     text = io.StringIO(pd.DataFrame(whole.values()).to_csv(index=False))
-    table = pd.read_csv(text, dtype={"version": str}, keep_default_na=False, na_values=["nan"])
+    table = pd.read_csv(text, dtype={"version": str}, keep_default_na=False, na_values=EMPTY)
     return [{str(name): value for name, value in row.items()} for row in table.to_dict("records")]
 
 
