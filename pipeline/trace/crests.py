@@ -75,6 +75,7 @@ def find_crests(
     sample = smooth_voxels(scene.grey, taps, scene.region.within[::4])
     noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
     bright = above(scene.grey, scene.region.allowed, scene.region.runs, PREFILTER * scene.noise)
+    scene.counters["voxels_visited"] = scene.counters.get("voxels_visited", 0.0) + bright.size
     smooth = smooth_voxels(scene.grey, taps, bright)
     strong = np.flatnonzero(smooth > seed_sigmas * noise)
     strong = strong[np.argsort(-smooth[strong], kind="stable")]

@@ -70,5 +70,6 @@ def build_scene(frame: Volume, lumen: Lumen, reference: Volume | None) -> Scene:
     read = subtract(grid.values, background, region.corner, region.runs, grey)
     sample = grey.reshape(-1)[region.within]
     noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
-    counters = {"voxels_read": float(read), "voxels_total": float(np.prod(grid.shape)), "noise": noise}
+    total = float(np.prod(grid.shape))
+    counters = {"voxels_total": total, "voxels_read": float(read), "voxels_skipped": total - read, "noise": noise}
     return Scene(region, grey, max(noise, 1e-6), reference is None, counters)
