@@ -71,5 +71,10 @@ def build_scene(frame: Volume, lumen: Lumen, reference: Volume | None) -> Scene:
     sample = grey.reshape(-1)[region.within]
     noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
     total = float(np.prod(grid.shape))
-    counters = {"voxels_total": total, "voxels_read": float(read), "voxels_skipped": total - read, "noise": noise}
+    counters = {
+        "voxels_total": total,
+        "voxels_read": float(read),
+        "voxels_skipped": total - read,
+        "noise": noise,
+    }
     return Scene(region, grey, max(noise, 1e-6), reference is None, counters)
