@@ -29,6 +29,9 @@ THICK_SLICES = 1.5
 KNOTS_PER_PITCH = 2.0
 """Least distance between knots in lengths of wire from slice to slice: with one a slice the curve follows each slice's
 own error (0.15 mm of ripple at 2.5 mm slices)."""
+STREAK_SHARE = 0.2
+"""Crest grey, as a share of the wire's peak, below which a bright line is a streak of the wire: a second wire's crest
+has 0.6 to 0.9 of it, streaks of steel in a cone-beam scan reach a few hundredths."""
 NEAR_VOXELS = 2.5
 """Crests nearer than this to the curve belong to it."""
 FIRST_BLUR = 0.9
@@ -135,12 +138,15 @@ def dense(tube: Tube, step: float) -> Array:
     return evaluate(tube.controls, np.linspace(0, tube.intervals, max(3, round(length / step) + 1)))[0]
 
 
-def unexplained_mm(pieces: list[Tracklet], curve: Array, near: float) -> float:
+def unexplained_mm(pieces: list[Tracklet], curve: Array, near: float, tube: Tube) -> float:
     """Length of the crests that run further than ``near`` mm from the curve (n, 3); pieces under 1.5 ``near`` are
-    noise."""
+    noise, and pieces fainter than a share of the wire are its own streaks, not another device."""
     tree = cKDTree(curve)
+    least = STREAK_SHARE * float(np.median(tube.tint))
     total = 0.0
     for piece in pieces:
+        if float(np.median(piece.values)) < least:
+            continue
         far = tree.query(piece.points[::2], distance_upper_bound=near)[0]
         off = float(np.mean(~np.isfinite(far))) * piece.length
         total += off if off > 1.5 * near else 0.0
@@ -165,7 +171,7 @@ def cold(
     tube = _fitted(scene, points, cut, entry.direction)
     if tube is None:
         return None
-    left = unexplained_mm(pieces, np.concatenate([path.points, dense(tube, h)]), NEAR_VOXELS * h)
+    left = unexplained_mm(pieces, np.concatenate([path.points, dense(tube, h)]), NEAR_VOXELS * h, tube)
     return Attempt(tube, points, bridged, path.bridges, left, len(pieces), cut=cut)
 
 
@@ -214,7 +220,7 @@ def warm(scene: Scene, entry: Entry, previous: Curve, crests_voxel: float, gap_m
     final = _fitted(scene, points, False, entry.direction)
     if final is None:
         return None
-    left = unexplained_mm(rest.pieces, dense(final, h), NEAR_VOXELS * h)
+    left = unexplained_mm(rest.pieces, dense(final, h), NEAR_VOXELS * h, final)
     return Attempt(final, points, bridged, bridges, left, len(rest.pieces), True)
 
 
