@@ -1,7 +1,7 @@
 """Content-hash store of stage results: a stage whose inputs have not changed is not computed again.
 
-Key = SHA-256 of stage name, stage version, the stage's own settings and the contents of its inputs. Paths, times and
-performance settings never enter it, so moving a study or changing -j recomputes nothing.
+Key = SHA-256 of stage name, the code that computes it, the stage's own settings and the contents of its inputs. Paths,
+times and performance settings never enter it, so moving a study or changing -j recomputes nothing.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-STAGE_VERSION = {"segment": 1, "trace": 1}
-"""Raise a number when that stage's result changes for equal inputs."""
+PIPELINE = Path(__file__).parent
+IMAGING = tuple(PIPELINE / name for name in ("load", "segment", "trace", "register", "own_input", "_kernels"))
+"""Packages whose code decides what ``segment`` and ``trace`` return: a number raised by hand is forgotten."""
+WHOLE = (PIPELINE, PIPELINE.parent / "solver")
+"""Packages whose code decides what a case returns."""
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -27,6 +30,16 @@ def default_root() -> Path:
     """``$WIREVAL_CACHE``, else the user's cache folder."""
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(os.environ.get("WIREVAL_CACHE") or Path(home) / "wireval" / "stages")
+
+
+@functools.cache
+def code_of(packages: tuple[Path, ...]) -> str:
+    """SHA-256 of the sources of some packages, read once a process (a few milliseconds)."""
+    digest = hashlib.sha256()
+    for package in packages:
+        for item in sorted(package.rglob("*.py")):
+            digest.update(f"{item.relative_to(package.parent)}\0".encode() + item.read_bytes())
+    return digest.hexdigest()
 
 
 def file_hash(path: Path) -> str:
@@ -64,7 +77,7 @@ def _plain(value: Any) -> Any:
 
 def key_of(stage: str, *parts: Any) -> str:
     """Key of one stage result."""
-    text = json.dumps([stage, STAGE_VERSION[stage], _plain(parts)], sort_keys=True, separators=(",", ":"))
+    text = json.dumps([stage, code_of(IMAGING), _plain(parts)], sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
 

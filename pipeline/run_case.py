@@ -13,7 +13,7 @@ from typing import Any
 
 import solver
 from pipeline import results
-from pipeline.cache import STAGE_VERSION, Store, file_hash
+from pipeline.cache import WHOLE, Store, code_of, file_hash
 from pipeline.case import CaseRun, Stage, run_stages
 from pipeline.manifest import Case
 from pipeline.progress import CaseProgress
@@ -58,7 +58,7 @@ def job_key(job: Job) -> str:
     described = {f.name: str(getattr(job.case, f.name)) for f in fields(job.case) if f.name not in PATHS}
     contents = [file_hash(p) for p in inputs_of(job.case) if p.exists()]
     text = json.dumps(
-        [described, repr(job.settings.config), contents, job.until, package_version(), STAGE_VERSION],
+        [described, repr(job.settings.config), contents, job.until, package_version(), code_of(WHOLE)],
         sort_keys=True,
     )
     return hashlib.sha256(text.encode()).hexdigest()
