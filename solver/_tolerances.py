@@ -20,8 +20,6 @@ CONTROL_ANGLE = 2.8
 """Largest joint angle kept, rad: the rotation vector is singular at 2 pi and a reversal at pi is a fold."""
 FOLD_COSINE = 0.0
 """Two consecutive segments that turn by more than 90 degrees are a fold, not a bend."""
-FOLLOW = 1e-12
-"""Relative round-off when a wire is moved along its own curve."""
 ENTRY_MARGIN_VOXELS = 1.0
 """How far outside the lumen, in voxel diagonals, an entry point may lie before it is called outside."""
 SMALLEST_STEP = 2.0**-10
