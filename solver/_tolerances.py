@@ -8,6 +8,9 @@ ROUND_OFF = 1e-13
 """Energy differences below this fraction of the energy are rounding (1e-16 times a few hundred joints)."""
 ENERGY_FLOOR_ANGLE = 1e-7
 """Joint angle in rad whose bending energy is called nothing: the scale where the energy itself is zero."""
+REST_ANGLE = 1e-15
+"""All joint angles of an untouched wire, root of the sum of squares in rad, that are rounding: 1e-12 mm at the tip of
+a metre of it."""
 MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
@@ -71,3 +74,7 @@ LOOK_AHEAD_MM = 2.0
 FORETOLD = 100.0
 """A step that fell by D + T where the model said D leaves a decrement of about 2 to 10 T²/D (from the third and
 fourth order of the energy): below a tenth of the tolerance the next sweep would only confirm it."""
+MOST_FORESEEN = 1.5
+"""Longest step, over the one before, that starts with that step's change: further ahead it is a guess."""
+OVERSHOOT = 0.02
+"""How much longer than allowed a step may be rather than leave a remainder: the limits are round numbers."""

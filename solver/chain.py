@@ -91,9 +91,10 @@ class Buffers:
     def grow(self, capacity: int) -> None:
         """Make room for more segments, keeping joints, frames and controls of the current state."""
         points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
-        state = empty_state(capacity, points)
+        state, change = empty_state(capacity, points), np.zeros((capacity, 3))
         if self.capacity:
             old = self.problem.state
+            change[: self.capacity] = self.problem.scratch.change
             for new, was in ((state.u, old.u), (state.x, old.x), (state.r, old.r)):
                 new[:, : was.shape[1]] = was
         scratch = Scratch(
@@ -102,6 +103,8 @@ class Buffers:
             counter=self.counter,
             slide=np.zeros(3),
             weights=np.zeros((3, 3, 4)),
+            start=np.zeros((capacity, 3)),
+            change=change,
         )
         rubbing = points if self.friction else 0
         friction = Friction(
@@ -145,11 +148,13 @@ class Buffers:
         """Rolling a straight wire with one bending stiffness and a round hull changes nothing."""
         return self.wire.straight and (self.wall is None or self.wall.samples == 0)
 
-    def reserve(self, depth_mm: float) -> None:
-        """Make sure that there is room for the wire at a depth and one point more."""
+    def reserve(self, depth_mm: float) -> bool:
+        """Make sure that there is room for the wire at a depth and one point more; whether that took new arrays."""
         k, _ = self.wire.segments_at(depth_mm)
         if k >= self.capacity:
             self.grow(max(2 * self.capacity, k + 1))
+            return True
+        return False
 
     def lay_out(self, depth_mm: float) -> None:
         """Cut the wire at a depth into segments."""

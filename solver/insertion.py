@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
 from solver._kernels.advance import DEPTH, ROLL, SHRINK, Base, advance
+from solver._kernels.journey import Journey, bind
 from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
 from solver.errors import refuse
@@ -81,11 +82,12 @@ class Insertion:
             rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),
             margin=float(wire.radius_mm),
         )
-        self.at, self.goal = np.zeros(4), np.zeros(3)
+        self.at = np.zeros(5)
         self.at[SHRINK] = 1.0
         self.buffers.state.x[0, 0] = self.base.entry
         self.buffers.state.r[0, 0] = self.base.frame
         self._started = False
+        self._journey = self._bound()
         self._outside = wall is not None and self._entry_is_outside(wall)
 
     @property
@@ -117,6 +119,8 @@ class Insertion:
                     "finite depths >= 0 and rolls",
                     "mm from the entry",
                 )
+        # room for all of it at once
+        self._reserve(max((d for d in depths if self._refusal(d) is Status.CONVERGED), default=0.0))
         for depth, roll in zip(depths, rolls, strict=True):
             yield self._go(depth, roll)
 
@@ -129,17 +133,21 @@ class Insertion:
             self.at[ROLL], self._started = roll, True
         status, iterations = self._refusal(depth), 0
         if status is Status.CONVERGED:
-            b.reserve(depth)
-            self.goal[:] = depth, roll, self._budget(depth - self.at[DEPTH], roll - self.at[ROLL])
-            result = advance(b.problem, b.cut, self.base, self.orders, self.at, self.goal, b.report, b.force)
-            status, iterations, b.k = OUTCOMES[result[0]], result[1], result[2]
-        depth, roll, energy, _ = self.at.tolist()
+            self._reserve(depth)
+            outcome, iterations, b.k = advance(self._journey, depth, roll)
+            status = OUTCOMES[outcome]
+        depth, roll, energy, _, _ = self.at.tolist()
         return solution_of(b, status, iterations, energy, depth, roll)
 
-    def _budget(self, ahead: float, turn: float) -> float:
-        """Iterations that one depth may spend: a cap on the time that a hopeless scene can take."""
-        steps = abs(ahead) / self.base.step + abs(turn) / self.base.turn
-        return self.orders.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
+    def _reserve(self, depth: float) -> None:
+        """Make room for the wire at a depth, and a new handle of what is then elsewhere in memory."""
+        b = self.buffers
+        if b.reserve(depth):
+            self._journey = self._bound()
+
+    def _bound(self) -> Journey:
+        b = self.buffers
+        return bind(Journey(b.problem, b.cut, self.base, self.orders, self.at, b.report, b.force))
 
     def _refusal(self, depth: float) -> Status:
         """A status for depths that need not be tried."""

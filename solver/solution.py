@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.status import Status
+from solver.work import work_of
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ class Solution:
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
-    work : counters of what was computed and what was proven unnecessary.
+    counts : see ``work``.     start_energy_N_mm : what the last relaxation began with.
     """
 
     joints_mm: Array
@@ -41,7 +42,13 @@ class Solution:
     max_penetration_mm: float
     depth_mm: float
     roll_deg: float
-    work: Mapping[str, float]
+    counts: tuple[int, ...]
+    start_energy_N_mm: float
+
+    @property
+    def work(self) -> Mapping[str, float]:
+        """Counters of what was computed and what was proven unnecessary, by name."""
+        return work_of(self.counts, self.start_energy_N_mm)
 
     @property
     def converged(self) -> bool:

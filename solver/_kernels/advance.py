@@ -11,22 +11,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
+from solver._kernels.foresee import foresee, note_change
+from solver._kernels.journey import Journey
 from solver._kernels.layout import Cut, lay_out, segments_at
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED
 from solver._kernels.passage import free_way
 from solver._kernels.problem import ROLLS, SPENT, Problem
-from solver._kernels.settle import LEFT_GRID, Orders, measure, settle
+from solver._kernels.settle import LEFT_GRID, measure, settle
 
 # what an insertion remembers between depths
-DEPTH, ROLL, ENERGY, SHRINK = range(4)
+DEPTH, ROLL, ENERGY, SHRINK, AHEAD = range(5)
 NOW, TRIAL, LAST_GOOD = range(3)
 """States: where the wire is, work space, and where it was before the step."""
 
 SMALLEST = tol.SMALLEST_STEP
+BUDGET_STEPS = tol.BUDGET_STEPS
 MATCH = tol.MATCH_DEPTH_MM
+MOST_FORESEEN = tol.MOST_FORESEEN
+OVERSHOOT = tol.OVERSHOOT
 
 
 class Base(NamedTuple):
@@ -50,37 +55,46 @@ class Base(NamedTuple):
 
 
 @kernel
-def advance(
-    problem: Problem, cut: Cut, base: Base, orders: Orders, at: Any, goal: Any, report: Any, force: Any
-) -> tuple[int, int, int]:
+def advance(journey: Journey, to_depth: float, to_roll: float) -> tuple[int, int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome, the iterations and the segments.
 
-    at : (4,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, updated.     goal : (3,) depth, roll and the iterations allowed.
+    journey.at : (5,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, AHEAD mm, updated.
     """
+    problem, cut, base, orders = journey.problem, journey.cut, journey.base, journey.orders
+    at, report = journey.at, journey.report
+    # a cap on the time that a hopeless scene can take
+    steps = abs(to_depth - at[DEPTH]) / base.step + abs(to_roll - at[ROLL]) / base.turn
+    limit = orders.max_iterations * (BUDGET_STEPS + 4 * steps)
     outcome, iterations, shrink = CONVERGED, 0, at[SHRINK]
     now = 0 * orders.max_iterations
     kept = np.empty(report.size)
     while True:
-        if base.idle_roll and at[ROLL] != goal[ROLL]:
-            at[ROLL] = goal[ROLL]
+        if base.idle_roll and at[ROLL] != to_roll:
+            at[ROLL] = to_roll
             problem.scratch.counter[ROLLS] += 1
-        ahead, turn = goal[DEPTH] - at[DEPTH], goal[ROLL] - at[ROLL]
+        ahead, turn = to_depth - at[DEPTH], to_roll - at[ROLL]
         if abs(ahead) < MATCH and turn == 0.0:
             break
-        fraction = min(1.0, shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
+        fraction = evenly(shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
         depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
         k = set_out(problem, cut, base, at, depth, roll, report, kept)
         outcome, used, energy = CONVERGED, 0, 0.0
         if k > 0:
-            outcome, used, energy = settle(problem, now, k, orders, report)
+            start = foresee(problem, now, k, likeness(problem, at, depth, roll))
+            outcome, used, energy = settle(problem, start, k, orders, report)
+            if start != now:
+                copy_state(problem, start, now, k)
             if outcome == CONVERGED and problem.stiffness > 0.0 and left_grid(problem, base, k):
                 outcome = LEFT_GRID
         iterations += used
         if outcome == CONVERGED:
+            if k > 0:
+                note_change(problem, now, k)
+            at[AHEAD] = depth - at[DEPTH] if roll == at[ROLL] else 0.0
             at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
         else:
             take_back(problem, cut, at, report, kept)
-        if iterations > goal[2] or problem.scratch.counter[SPENT] >= orders.work:
+        if iterations > limit or problem.scratch.counter[SPENT] >= orders.work:
             outcome = EXHAUSTED
             break
         if outcome == CONVERGED:
@@ -92,7 +106,7 @@ def advance(
             break
     at[SHRINK] = max(shrink, 8 * SMALLEST)
     k, _ = segments_at(at[DEPTH], cut.segment)
-    measure(problem, cut.profile, k, max(cut.rule.hull.shape[0], 1), report, force)
+    measure(problem, cut, k, report, journey.force)
     return outcome, iterations, k
 
 
@@ -106,14 +120,25 @@ def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, 
         step = min(base.step, abs(ahead))
         if ahead > 0.0 and problem.stiffness > 0.0:
             k, _ = segments_at(depth, cut.segment)
-            tip, along, weights = (
-                problem.state.x[NOW, k],
-                problem.state.r[NOW, k, :, 2],
-                problem.scratch.weights,
-            )
-            step = free_way(problem.field, tip, along, step, problem.spacing, base.rise, weights)
+            tip, along = problem.state.x[NOW, k], problem.state.r[NOW, k, :, 2]
+            step = free_way(problem.field, tip, along, step, problem.spacing, base.rise)
         fraction = min(fraction, step / abs(ahead))
     return fraction
+
+
+@inlined
+def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
+    """How long this step is over the last one, or 0 where it is of another kind: rolled, back, or much longer."""
+    if not problem.switch.foresight or at[AHEAD] == 0.0 or roll != at[ROLL]:
+        return 0.0
+    share = (depth - at[DEPTH]) / at[AHEAD]
+    return share if 0.0 < share <= MOST_FORESEEN else 0.0
+
+
+@inlined
+def evenly(fraction: float) -> float:
+    """One share of the way in equal steps, none longer than ``fraction`` of it but for a small overshoot."""
+    return 1.0 / max(math.ceil((1.0 - OVERSHOOT) / fraction), 1.0)
 
 
 @kernel

@@ -16,7 +16,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.energy import total_energy
+from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.joint import jacobian
 from solver._kernels.minimise import (
@@ -33,7 +33,7 @@ from solver._kernels.minimise import (
 )
 from solver._kernels.newton import costate, sweep
 from solver._kernels.node import node_gradient
-from solver._kernels.problem import LOAD, ROLLOUTS, SWEEPS, Problem
+from solver._kernels.problem import LOAD, ROLLOUTS, START, SWEEPS, Problem
 from solver._kernels.rotation import bend_towards, turn
 from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9, store9, times
 
@@ -150,8 +150,8 @@ def minimise_closed_form(
 ) -> tuple[int, int, int, float]:
     """Relax state ``which`` by the seed's sweeps; arguments and results as ``minimise``, iterations are sweeps."""
     share = 1.0
-    energy = total_energy(problem, which, k)
-    report[18] = energy
+    energy = energy_of(problem.state.parts[which])
+    report[START] = energy
     check, before = 32, math.inf
     for count in range(max_sweeps):
         if not math.isfinite(energy):

@@ -5,7 +5,6 @@ U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ ½ k w_p max(0, φ(x_p) + ρ
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
-from solver._kernels.spline import in_grid, locate, set_basis, spline, to_world, trilinear, value
+from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
 
 
 @kernel
@@ -25,6 +24,12 @@ def total_energy(problem: Problem, which: int, k: int) -> float:
     parts[WALL] = wall_energy(problem, which, k) if problem.stiffness > 0.0 else 0.0
     parts[LOAD] = load_energy(problem.chain, state.x[which], k)
     parts[RUBBING] = friction_energy(problem, which, k) if problem.friction.coefficient > 0.0 else 0.0
+    return energy_of(parts)
+
+
+@inlined
+def energy_of(parts: Any) -> float:
+    """The total of a state's parts, N mm."""
     return float(parts[BENDING] + parts[WALL] + parts[LOAD] + parts[RUBBING])
 
 
@@ -77,24 +82,30 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
                 q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
                 q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
             depth[p] = 0.0
-            i, j, h, u, v, w = locate(c, m, o, q0, q1, q2)
-            inside = in_grid(u, v, w)
+            place = indices(m, o, q0, q1, q2)
+            inside = in_grid(c, place)
             # a point that moved less than its clearance since its last look-up cannot touch
-            if switch.clearance and inside and anchor[p, 3] < 0.0:
+            clearance = -anchor[p, 3] - reach
+            if switch.clearance and inside and clearance >= 0.0:
                 d0, d1, d2 = q0 - anchor[p, 0], q1 - anchor[p, 1], q2 - anchor[p, 2]
-                if anchor[p, 3] + slope * math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) + reach <= 0.0:
+                if slope * slope * (d0 * d0 + d1 * d1 + d2 * d2) <= clearance * clearance:
                     clear += 1
                     continue
+            # a point that touched is taken to touch still: its value alone is not asked first
+            touched = clearance < 0.0
             anchor[p, 0], anchor[p, 1], anchor[p, 2] = q0, q1, q2
-            if switch.cheap and inside:
+            i, j, h, u, v, w = locate(c, place)
+            if switch.cheap and inside and not touched:
                 phi = trilinear(c, i, j, h, u, v, w) + field.gap
                 if phi + reach <= 0.0:
                     cheap += 1
                     anchor[p, 3] = phi
                     continue
             full += 1
-            set_basis(u, v, w, weights)
-            d = penetration(c, m, i, j, h, weights, jet[p], reach)
+            d = -1.0 if touched else value(c, i, j, h, u, v, w) + reach
+            if touched or d > 0.0:
+                set_basis(u, v, w, weights)
+                d = penetration(c, m, i, j, h, weights, jet[p], reach)
             # a point outside the grid is no anchor: the slope is bounded inside only
             anchor[p, 3] = d - reach if inside else 1.0
             if d > 0.0:
@@ -107,14 +118,12 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
     return total
 
 
-@kernel
+@inlined
 def penetration(c: Any, m: Any, i: int, j: int, k: int, weights: Any, jet: Any, reach: float) -> float:
-    """How far the wire's hull is beyond the lumen, mm (negative inside); fills the point's jet where it is."""
-    d = value(c, i, j, k, weights) + reach
-    if d > 0.0:
-        spline(c, i, j, k, weights, jet)
-        to_world(m, jet)
-    return float(d)
+    """How far the wire's hull is beyond the lumen, mm (negative inside); fills the point's jet."""
+    spline(c, i, j, k, weights, jet)
+    to_world(m, jet)
+    return float(jet[0] + reach)
 
 
 @inlined

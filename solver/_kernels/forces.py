@@ -7,7 +7,7 @@ from typing import Any
 
 from solver._kernels.energy import slide_of
 from solver._kernels.flags import kernel
-from solver._kernels.layout import Profile
+from solver._kernels.layout import Cut
 from solver._kernels.problem import Problem
 from solver._kernels.rotation import turn
 from solver._kernels.small import load9, store9
@@ -55,13 +55,13 @@ def profile_at(at: Any, value: Any, s: float) -> float:
 
 
 @kernel
-def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: Any) -> float:
+def push_force(problem: Problem, cut: Cut, k: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
     The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
     share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
     """
-    chain, u = problem.chain, problem.state.u
+    chain, profile, u = problem.chain, cut.profile, problem.state.u
     depth = 0.0
     for j in range(k):
         depth += chain.length[j]
@@ -86,7 +86,7 @@ def push_force(problem: Problem, profile: Profile, k: int, hulls: int, report: A
         # half of node 1's cell lies on the first segment
         for p in range(chain.first[1], chain.first[2]):
             if chain.offset[p, 2] == 0.0:
-                force += 0.25 * problem.stiffness * problem.state.depth[0, p] ** 2 / hulls
+                force += 0.25 * problem.stiffness * problem.state.depth[0, p] ** 2 / cut.rule.hull.shape[0]
     return float(force)
 
 

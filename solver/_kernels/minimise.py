@@ -6,12 +6,23 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.energy import total_energy
+from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import kernel
 from solver._kernels.layout import Chain
 from solver._kernels.newton import costate, sweep
 from solver._kernels.passage import crossed
-from solver._kernels.problem import BENDING, IDLE, LEVENBERG, LOAD, ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
+from solver._kernels.problem import (
+    BENDING,
+    IDLE,
+    LEVENBERG,
+    LOAD,
+    ROLLOUTS,
+    RUBBING,
+    START,
+    SWEEPS,
+    WALL,
+    Problem,
+)
 from solver._kernels.rollout import place, rollout
 
 # how a relaxation ends
@@ -21,6 +32,7 @@ ROUND_OFF = tol.ROUND_OFF
 SUFFICIENT = tol.SUFFICIENT
 FLOOR = tol.ENERGY_FLOOR_ANGLE**2
 FLOOR_ANGLE = tol.ENERGY_FLOOR_ANGLE
+REST = 0.5 * tol.REST_ANGLE**2
 MOMENT = tol.MOMENT
 FIRST_DAMPING = tol.FIRST_DAMPING
 LEAST_DAMPING = tol.LEAST_DAMPING
@@ -182,20 +194,22 @@ def rounding_moment(problem: Problem, which: int, k: int) -> float:
 def minimise(
     problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:
-    """Relax state ``which`` with Newton's method (an argument: a literal 0 would compile everything twice).
+    """Relax state ``which``, whose energy is known, with Newton's method.
 
     Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
     ``costate``, at the result.
     """
     damping, last, patience, settled = 0.0, FIRST_DAMPING, 0, 0
-    energy = total_energy(problem, which, k)
-    report[18] = energy
     state, counter = problem.state, problem.scratch.counter
-    free = problem.switch.idle and state.parts[which, WALL] == 0.0 and unloaded(problem.chain, k)
-    if free and rest_shape(problem, which, k):
-        counter[IDLE] += 1
-        costate(problem, 1 - which, k, report)
-        return CONVERGED, 0, 1 - which, 0.0
+    energy = energy_of(state.parts[which])
+    report[START] = energy
+    if problem.switch.idle and state.parts[which, WALL] == 0.0 and unloaded(problem.chain, k):
+        resting = state.parts[which, RUBBING] == 0.0 and energy <= REST * stiffest(problem.chain, k)
+        if resting or rest_shape(problem, which, k):
+            counter[IDLE] += 1
+            # without a force or a bend there is no gradient
+            report[:START] = 0.0
+            return CONVERGED, 0, which if resting else 1 - which, 0.0
     for iteration in range(max_iterations):
         if not math.isfinite(energy):
             return BROKEN, iteration, which, energy

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.flags import kernel
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.problem import Problem
-from solver._kernels.spline import Field, locate, set_basis, value
+from solver._kernels.spline import Field, indices, locate, value
 
 HOP = tol.HOP_VOXELS
 LOOK_AHEAD = tol.LOOK_AHEAD_MM
@@ -36,34 +36,34 @@ def crossed(problem: Problem, which: int, k: int) -> bool:
 @kernel
 def hops(problem: Problem, a: Any, b: Any, way: float) -> bool:
     """Whether the straight way from a to b passes through wall."""
-    return free_fraction(problem.field, a, b, way, problem.spacing, problem.scratch.weights) < 1.0
+    return free_fraction(problem.field, a, b, way, problem.spacing) < 1.0
 
 
 @kernel
-def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float, weights: Any) -> float:
+def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float) -> float:
     """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
-    last = distance_at(field, a, 1.0, b, weights)
-    limit = max(distance_at(field, a, 0.0, b, weights), last, 0.0) + HOP * spacing
+    here, last = distance_at(field, a, 0.0, b), distance_at(field, a, 1.0, b)
+    limit = max(here, last, 0.0) + HOP * spacing
     steps = math.ceil(2 * way / spacing)
-    for i in range(1, steps):
-        if distance_at(field, a, i / steps, b, weights) > limit:
+    i = 1 + proven(field, here, way / steps) if steps > 0 else 1
+    while i < steps:
+        here = distance_at(field, a, i / steps, b)
+        if here > limit:
             return (i - 1) / steps
+        i += 1 + proven(field, here, way / steps)
     return 1.0
 
 
 @kernel
-def distance_at(field: Field, a: Any, t: float, b: Any, weights: Any) -> float:
+def distance_at(field: Field, a: Any, t: float, b: Any) -> float:
     """Signed distance, mm, at a + t (b - a)."""
     x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-    i, j, k, u, v, w = locate(field.coefficients, field.to_index, field.origin, x, y, z)
-    set_basis(u, v, w, weights)
-    return float(value(field.coefficients, i, j, k, weights))
+    i, j, k, u, v, w = locate(field.coefficients, indices(field.to_index, field.origin, x, y, z))
+    return float(value(field.coefficients, i, j, k, u, v, w))
 
 
 @kernel
-def free_way(
-    field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float, weights: Any
-) -> float:
+def free_way(field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float) -> float:
     """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall (or beyond it).
 
     Never less than a quarter of that, so that a jammed tip still presses on.
@@ -71,31 +71,49 @@ def free_way(
     end = np.empty(3)
     for a in range(3):
         end[a] = tip[a] + step * along[a]
-    before = distance_at(field, tip, 0.0, end, weights)
-    steps = 1 + math.ceil(2 * step / spacing)
+    free = way_below(field, tip, end, step, spacing, rise)
     # where no other vessel lies ahead there is nothing to tunnel into, and four times as deep is allowed
-    ease = 1.0 if ridge_ahead(field, tip, end, step, spacing, weights) else 4.0
-    limit = max(0.0, before) + ease * rise
-    free = 1.0
-    for i in range(1, steps + 1):
-        here = distance_at(field, tip, i / steps, end, weights)
-        if here > limit:
-            free = (i - 1 + max(limit - before, 0.0) / (here - before)) / steps
-            break
-        before = here
+    if free < 1.0 and not ridge_ahead(field, tip, end, step, spacing):
+        free = way_below(field, tip, end, step, spacing, 4 * rise)
     for a in range(3):
         end[a] = tip[a] + free * step * along[a]
-    free *= step * free_fraction(field, tip, end, free * step, spacing, weights)
+    free *= step * free_fraction(field, tip, end, free * step, spacing)
     return max(free, min(step, 0.25 * rise))
 
 
 @kernel
-def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float, weights: Any) -> bool:
+def way_below(field: Field, a: Any, b: Any, way: float, spacing: float, rise: float) -> float:
+    """Fraction of the way from a to b until it is ``rise`` mm deeper in the wall than it began."""
+    before = distance_at(field, a, 0.0, b)
+    steps = 1 + math.ceil(2 * way / spacing)
+    limit = max(0.0, before) + rise
+    i = 1 + proven(field, before, way / steps)
+    while i <= steps:
+        here = distance_at(field, a, i / steps, b)
+        if here > limit:
+            return (i - 1 + max(limit - before, 0.0) / (here - before)) / steps
+        before = here
+        i += 1 + proven(field, here, way / steps)
+    return 1.0
+
+
+@kernel
+def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float) -> bool:
     """Whether the distance on the ray from a through b rises above the surface and falls again, 2 mm past b."""
-    top = 0.0
-    for i in range(1, 2 + math.ceil(2 * (step + LOOK_AHEAD) / spacing)):
-        here = distance_at(field, a, 0.5 * i * spacing / step, b, weights)
+    top, i, last = 0.0, 1, 1 + math.ceil(2 * (step + LOOK_AHEAD) / spacing)
+    while i <= last:
+        here = distance_at(field, a, 0.5 * i * spacing / step, b)
         if top > 0.0 and here < top - HOP * spacing:
             return True
         top = max(top, here)
+        i += 1 + proven(field, here, 0.5 * spacing)
     return False
+
+
+@inlined
+def proven(field: Field, here: float, apart: float) -> int:
+    """How many places further on, mm apart, cannot be outside the lumen either: the field's slope is bounded."""
+    # written so that NaN proves nothing
+    if not (here < 0.0 and field.slope > 0.0):
+        return 0
+    return int(min(-here / (field.slope * apart), 1e6))

@@ -8,8 +8,8 @@ from solver._kernels.layout import Chain
 from solver._kernels.spline import Field
 
 # places in the work counters
-FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, SPENT = range(10)
-COUNTERS = 10
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, FORESEEN, SPENT = range(11)
+COUNTERS = 11
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 # places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``
@@ -33,13 +33,19 @@ class State(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights, a 3-vector."""
+    """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights, a 3-vector.
+
+    start : (k, 3) controls that the step began with, rad.     change : (k, 3) what relaxing them added in the last
+    step, from the tip inwards, rad.
+    """
 
     gain: Any
     anchor: Any
     counter: Any
     slide: Any
     weights: Any
+    start: Any
+    change: Any
 
 
 class Switch(NamedTuple):
@@ -47,7 +53,8 @@ class Switch(NamedTuple):
 
     clearance : no look-up for a point that moved less than its clearance.     cheap : trilinear look-up first.
     idle : the rest shape is the answer where it touches nothing.     roll : of a straight round wire is no step.
-    direction : of a straight round wire is its state, without the roll of its frames.
+    direction : of a straight round wire is its state, without the roll of its frames.     foresight : begin a step
+    with the change that the last one made.
     """
 
     clearance: bool = True
@@ -55,6 +62,7 @@ class Switch(NamedTuple):
     idle: bool = True
     roll: bool = True
     direction: bool = True
+    foresight: bool = True
 
 
 class Friction(NamedTuple):

@@ -14,6 +14,8 @@ Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 # Below this q a seven-term series is exact to 1e-17 and costs 5 ns; above it sin and cos cost 20 ns.
 SERIES_LIMIT = 0.25
+# Below this square of a sine (4 degrees) seven terms of the arcsine's series are exact to 1e-18.
+ARCSINE_LIMIT = 0.005
 
 
 @inlined
@@ -77,14 +79,22 @@ def turn(rest: float, u0: float, u1: float, u2: float) -> Nine:
 def bend_towards(rest: float, t0: float, t1: float, t2: float) -> tuple[float, float]:
     """Return the twist-free control (u0, u1) whose turn E = B exp(û) takes e3 to the unit vector t.
 
-    t is given in the frame before the turn. The angle comes from atan2, exact down to zero; a reversal
-    (t opposite to the rest direction) turns about axis 1.
+    t is given in the frame before the turn. The angle comes from atan2, exact down to zero, or, where it is
+    small, from the series of the arcsine, exact to 1e-17 at a quarter of the time; a reversal (t opposite to the
+    rest direction) turns about axis 1.
     """
-    c = math.cos(rest)
-    d = math.sin(rest)
-    p0 = c * t0 - d * t2
-    p2 = d * t0 + c * t2
-    sine = math.sqrt(p0 * p0 + t1 * t1)
+    p0, p2 = t0, t2
+    if rest != 0.0:
+        c = math.cos(rest)
+        d = math.sin(rest)
+        p0 = c * t0 - d * t2
+        p2 = d * t0 + c * t2
+    q = p0 * p0 + t1 * t1
+    if q < ARCSINE_LIMIT and p2 > 0.0:
+        rest_of_it = 1 + q * 25 / 42 * (1 + q * 49 / 72 * (1 + q * 81 / 110 * (1 + q * 121 / 156)))
+        ratio = 1 + q / 6 * (1 + q * 9 / 20 * rest_of_it)
+        return -t1 * ratio, p0 * ratio
+    sine = math.sqrt(q)
     angle = math.atan2(sine, p2)
     if sine < 1e-300:
         return (angle, 0.0)

@@ -9,7 +9,7 @@ from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.energy import lag_friction, point_at, total_energy
 from solver._kernels.flags import kernel
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
-from solver._kernels.layout import Profile
+from solver._kernels.layout import Cut
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
 from solver._kernels.problem import DEEPEST, PUSH, SPENT, Problem
 
@@ -36,18 +36,19 @@ class Orders(NamedTuple):
 
 @kernel
 def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
-    """Relax state ``which`` in place; return the outcome, iterations and the energy, N mm.
+    """Relax state ``which``, whose energy is known, in place; return the outcome, iterations and the energy, N mm.
 
     With friction the contact loads are taken from the last relaxation until they settle.
     """
     rubs = problem.friction.coefficient > 0.0
     if rubs:
         problem.friction.load[:] = 0.0
-        total_energy(problem, which, k)
         lag_friction(problem, which, k)
     outcome, iterations, energy = UNSETTLED, 0, 0.0
     counter, cost = problem.scratch.counter, k + problem.chain.first[k + 1]
     for _ in range(ROUNDS):
+        if rubs:
+            total_energy(problem, which, k)
         limit = min(orders.max_iterations, max(orders.work - counter[SPENT], 0) // cost)
         if orders.closed_form:
             result = minimise_closed_form(problem, which, k, orders.tolerance, limit, report)
@@ -66,6 +67,20 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
 
 
 @kernel
+def relax_once(
+    problem: Problem, cut: Cut, k: int, orders: Orders, report: Any, force: Any
+) -> tuple[int, int, float]:
+    """Relax state 0 and measure it; friction acts against leaving where it is now."""
+    now = 0 * k
+    if problem.friction.coefficient > 0.0:
+        hold(problem, k)
+    total_energy(problem, now, k)
+    result = settle(problem, now, k, orders, report)
+    measure(problem, cut, k, report, force)
+    return result
+
+
+@kernel
 def hold(problem: Problem, k: int) -> None:
     """Friction holds every look-up point where it is now."""
     now = 0 * k
@@ -75,7 +90,7 @@ def hold(problem: Problem, k: int) -> None:
 
 
 @kernel
-def measure(problem: Problem, profile: Profile, k: int, hulls: int, report: Any, force: Any) -> None:
+def measure(problem: Problem, cut: Cut, k: int, report: Any, force: Any) -> None:
     """Forces of the wire at rest in state 0: force (capacity + 1, 3) N per joint; deepest contact and push force."""
     for n in range(k + 1):
         force[n, 0] = force[n, 1] = force[n, 2] = 0.0
@@ -84,4 +99,4 @@ def measure(problem: Problem, profile: Profile, k: int, hulls: int, report: Any,
         return
     if problem.stiffness > 0.0:
         report[DEEPEST] = contact_forces(problem, k, force)
-    report[PUSH] = push_force(problem, profile, k, hulls, report)
+    report[PUSH] = push_force(problem, cut, k, report)

@@ -11,6 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver._kernels.flags import inlined, kernel
+from solver._kernels.small import Three
+
+Four = tuple[float, float, float, float]
 
 # Cells along an edge of the blocks over which bounds are taken: small enough to stay local, large enough to be cheap.
 BLOCK = 4
@@ -72,20 +75,31 @@ def cell_of(f: float, last: int) -> tuple[int, float]:
 
 
 @inlined
-def locate(c: Any, m: Any, o: Any, x: float, y: float, z: float) -> tuple[int, int, int, float, float, float]:
-    """Cell of a point in mm and its place in it; c, m, o are a field's coefficients, to_index and origin."""
-    shape = c.shape
+def indices(m: Any, o: Any, x: float, y: float, z: float) -> Three:
+    """Continuous indices of a point in mm; m and o are a field's to_index and origin."""
     d0, d1, d2 = x - o[0], y - o[1], z - o[2]
-    i, r = cell_of(m[0, 0] * d0 + m[0, 1] * d1 + m[0, 2] * d2, shape[0] - 4)
-    j, s = cell_of(m[1, 0] * d0 + m[1, 1] * d1 + m[1, 2] * d2, shape[1] - 4)
-    k, t = cell_of(m[2, 0] * d0 + m[2, 1] * d1 + m[2, 2] * d2, shape[2] - 4)
+    return (
+        m[0, 0] * d0 + m[0, 1] * d1 + m[0, 2] * d2,
+        m[1, 0] * d0 + m[1, 1] * d1 + m[1, 2] * d2,
+        m[2, 0] * d0 + m[2, 1] * d1 + m[2, 2] * d2,
+    )
+
+
+@inlined
+def locate(c: Any, f: Three) -> tuple[int, int, int, float, float, float]:
+    """Cell of continuous indices in a field's coefficients c, and the place in it."""
+    shape = c.shape
+    i, r = cell_of(f[0], shape[0] - 4)
+    j, s = cell_of(f[1], shape[1] - 4)
+    k, t = cell_of(f[2], shape[2] - 4)
     return i, j, k, r, s, t
 
 
 @inlined
-def in_grid(r: float, s: float, t: float) -> bool:
-    """Whether a place in a cell is in it."""
-    return 0.0 <= r <= 1.0 and 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0
+def in_grid(c: Any, f: Three) -> bool:
+    """Whether continuous indices lie among a field's nodes."""
+    shape = c.shape
+    return bool(0.0 <= f[0] <= shape[0] - 3 and 0.0 <= f[1] <= shape[1] - 3 and 0.0 <= f[2] <= shape[2] - 3)
 
 
 @inlined
@@ -164,19 +178,42 @@ def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
     jet[4], jet[5], jet[6], jet[7], jet[8], jet[9] = hxx, hyy, hzz, hxy, hxz, hyz
 
 
+@inlined
+def cubic(t: float) -> Four:
+    """The first row of ``basis``."""
+    if t < 0.0 or t > 1.0:
+        return 0.0, 1 - t, t, 0.0
+    r = 1 - t
+    return r * r * r / 6, 2.0 / 3 - t * t * (1 - 0.5 * t), 2.0 / 3 - r * r * (1 - 0.5 * r), t * t * t / 6
+
+
+@inlined
+def row(c: Any, i: int, j: int, k: int, r: Four) -> float:
+    """Four coefficients along the last axis, weighted."""
+    return float(c[i, j, k] * r[0] + c[i, j, k + 1] * r[1] + c[i, j, k + 2] * r[2] + c[i, j, k + 3] * r[3])
+
+
+@inlined
+def plane(c: Any, i: int, j: int, k: int, q: Four, r: Four) -> float:
+    """Four rows, weighted."""
+    return (
+        row(c, i, j, k, r) * q[0]
+        + row(c, i, j + 1, k, r) * q[1]
+        + row(c, i, j + 2, k, r) * q[2]
+        + row(c, i, j + 3, k, r) * q[3]
+    )
+
+
 @kernel
-def value(c: Any, i: int, j: int, k: int, weights: Any) -> float:
-    """The spline alone, without derivatives: a third of the cost."""
-    p, q, r = weights[0, 0], weights[1, 0], weights[2, 0]
-    total = 0.0
-    for a in range(4):
-        plane = 0.0
-        for b in range(4):
-            row = c[i + a, j + b, k] * r[0] + c[i + a, j + b, k + 1] * r[1]
-            row += c[i + a, j + b, k + 2] * r[2] + c[i + a, j + b, k + 3] * r[3]
-            plane += q[b] * row
-        total += p[a] * plane
-    return total
+def value(c: Any, i: int, j: int, k: int, u: float, v: float, w: float) -> float:
+    """The spline alone at a place in a cell, without derivatives: a third of the cost."""
+    p, q, r = cubic(u), cubic(v), cubic(w)
+    return (
+        plane(c, i, j, k, q, r) * p[0]
+        + plane(c, i + 1, j, k, q, r) * p[1]
+        + plane(c, i + 2, j, k, q, r) * p[2]
+        + plane(c, i + 3, j, k, q, r) * p[3]
+    )
 
 
 @inlined
@@ -201,7 +238,7 @@ def look_up(field: Field, points: Any, jets: Any) -> None:
     weights = np.empty((3, 3, 4))
     c, m, o = field.coefficients, field.to_index, field.origin
     for n in range(points.shape[0]):
-        i, j, k, r, s, t = locate(c, m, o, points[n, 0], points[n, 1], points[n, 2])
+        i, j, k, r, s, t = locate(c, indices(m, o, points[n, 0], points[n, 1], points[n, 2]))
         set_basis(r, s, t, weights)
         spline(c, i, j, k, weights, jets[n])
         to_world(m, jets[n])

@@ -113,6 +113,7 @@ SWITCHES = {
     "idle": (Switch(idle=False), "rest_shapes"),
     "roll": (Switch(roll=False), "rolls_proven_idle"),
     "direction": (Switch(direction=False), "sweeps_without_roll"),
+    "foresight": (Switch(foresight=False), "starts_foreseen"),
 }
 
 

@@ -1,0 +1,49 @@
+"""A better start for a step: what relaxing the last one changed will change again, counted from the tip.
+
+A wire pushed on goes straight ahead of its tip into the wall and has to be bent there, much as in the step before.
+"""
+
+from __future__ import annotations
+
+from solver._kernels.energy import total_energy
+from solver._kernels.flags import kernel
+from solver._kernels.passage import crossed
+from solver._kernels.problem import FORESEEN, WALL, Problem
+from solver._kernels.rollout import place
+
+
+@kernel
+def foresee(problem: Problem, which: int, k: int, share: float) -> int:
+    """Return the state to start from: ``which``, or the other one, with a share of the last change, if it is lower.
+
+    Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
+    """
+    state, scratch = problem.state, problem.scratch
+    u, tried = state.u[which], state.u[1 - which]
+    for j in range(k):
+        for a in range(3):
+            scratch.start[j, a] = u[j, a]
+            tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
+    energy = total_energy(problem, which, k)
+    if share == 0.0 or state.parts[which, WALL] == 0.0:
+        return which
+    for a in range(3):
+        state.x[1 - which, 0, a] = state.x[which, 0, a]
+        for b in range(3):
+            state.r[1 - which, 0, a, b] = state.r[which, 0, a, b]
+    place(problem.chain, state, 1 - which, k)
+    if total_energy(problem, 1 - which, k) < energy and not crossed(problem, which, k):
+        scratch.counter[FORESEEN] += 1
+        return 1 - which
+    return which
+
+
+@kernel
+def note_change(problem: Problem, which: int, k: int) -> None:
+    """Remember how relaxing changed the start of this step."""
+    u, scratch = problem.state.u[which], problem.scratch
+    for j in range(k):
+        for a in range(3):
+            scratch.change[k - 1 - j, a] = u[j, a] - scratch.start[j, a]
+    for m in range(k, scratch.change.shape[0]):
+        scratch.change[m, 0] = scratch.change[m, 1] = scratch.change[m, 2] = 0.0
