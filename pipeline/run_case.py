@@ -99,9 +99,10 @@ def run_case(job: Job) -> str:
         progress("compare", 1, 1, "unchanged since the last run, kept")
         return job.case.id
     (job.folder / "result.json").unlink(missing_ok=True)
-    load_kernels(progress)
-    clock = perf_counter()
     run = CaseRun(job.case, job.settings.config, Store(job.cache), progress, job.until)
+    if run.wants("simulate"):
+        load_kernels(progress)
+    clock = perf_counter()
     run_stages(run)
     progress.close()
     row = case_row(run, perf_counter() - clock, peak_memory_mib())

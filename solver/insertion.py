@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.advance import DEPTH, ROLL, SHRINK, Base, advance
+from solver._kernels.advance import AT, DEPTH, ROLL, SHRINK, Base, advance
 from solver._kernels.journey import Journey, bind
 from solver._kernels.problem import Switch
 from solver.chain import base_frame, unit
@@ -82,7 +82,7 @@ class Insertion:
             rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),
             margin=float(wire.radius_mm),
         )
-        self.at = np.zeros(5)
+        self.at = np.zeros(AT)
         self.at[SHRINK] = 1.0
         self.buffers.state.x[0, 0] = self.base.entry
         self.buffers.state.r[0, 0] = self.base.frame
@@ -134,7 +134,7 @@ class Insertion:
         status, iterations = self._refusal(depth), 0
         if status is Status.CONVERGED:
             self._reserve(depth)
-            outcome, iterations, b.k = advance(self._journey, depth, roll)
+            outcome, iterations, b.k = advance(self._journey, depth, roll, 0)
             status = OUTCOMES[outcome]
         depth, roll, energy, _, _ = self.at.tolist()
         return solution_of(b, status, iterations, energy, depth, roll)

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
+from solver._kernels.advance import AT, ENERGY, Base, advance
 from solver._kernels.follow import follow
+from solver._kernels.journey import Journey, bind
 from solver._kernels.layout import Rule
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
 from solver._kernels.problem import (
@@ -20,7 +22,7 @@ from solver._kernels.problem import (
     WALL,
     Switch,
 )
-from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders, relax_once
+from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
 from solver.solution import Solution
@@ -115,8 +117,12 @@ def buffers_for(wire: GuideWire, wall: VesselWall | None, settings: Settings) ->
 
 def relax_buffers(b: Buffers, settings: Settings) -> tuple[Status, int, float]:
     """Relax the current state of a work space in place; return status, iterations and energy, N mm."""
-    outcome, iterations, energy = relax_once(b.problem, b.cut, b.k, settings.orders, b.report, b.force)
-    return OUTCOMES[outcome], iterations, energy
+    nowhere = Base(np.zeros(3), np.eye(3), np.zeros(3), False, False, 1.0, 1.0, 0.0, 0.0)
+    at = np.zeros(AT)
+    depth = float(b.chain.length[: b.k].sum())
+    journey = bind(Journey(b.problem, b.cut, nowhere, settings.orders, at, b.report, b.force))
+    outcome, iterations, _ = advance(journey, depth, 0.0, b.k)
+    return OUTCOMES[outcome], iterations, float(at[ENERGY])
 
 
 def solution_of(

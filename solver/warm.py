@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from solver.grid import Grid
@@ -11,8 +15,25 @@ from solver.wall import VesselWall
 from solver.wire import GuideWire
 
 
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Without the garbage collector: the compiler makes millions of objects, and looking through them is an eighth."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
 def warm_up() -> None:
     """Compile every kernel (about half a minute, once per installation; later calls read the cache)."""
+    with no_collection():
+        _call_every_door()
+
+
+def _call_every_door() -> None:
     axis = np.arange(-2.0, 2.5, 0.5)
     x, y, _ = np.meshgrid(axis, axis, np.arange(-1.0, 4.0, 0.5), indexing="ij")
     grid = Grid(

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.energy import hold
+from solver._kernels.flags import door, inlined, kernel, once
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.foresee import foresee, note_change
@@ -24,6 +25,7 @@ from solver._kernels.settle import LEFT_GRID, measure, settle
 
 # what an insertion remembers between depths
 DEPTH, ROLL, ENERGY, SHRINK, AHEAD = range(5)
+AT = 5
 NOW, TRIAL, LAST_GOOD = range(3)
 """States: where the wire is, work space, and where it was before the step."""
 
@@ -54,11 +56,12 @@ class Base(NamedTuple):
     margin: float
 
 
-@kernel
-def advance(journey: Journey, to_depth: float, to_roll: float) -> tuple[int, int, int]:
+@door
+def advance(journey: Journey, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome, the iterations and the segments.
 
     journey.at : (5,) DEPTH mm, ROLL deg, ENERGY N mm, SHRINK, AHEAD mm, updated.
+    laid : segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
     problem, cut, base, orders = journey.problem, journey.cut, journey.base, journey.orders
     at, report = journey.at, journey.report
@@ -75,25 +78,30 @@ def advance(journey: Journey, to_depth: float, to_roll: float) -> tuple[int, int
         ahead, turn = to_depth - at[DEPTH], to_roll - at[ROLL]
         if abs(ahead) < MATCH and turn == 0.0:
             break
-        fraction = evenly(shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
-        depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
-        k = set_out(problem, cut, base, at, depth, roll, report, kept)
+        depth, roll, k = to_depth, to_roll, laid
+        if laid > 0:
+            hold(problem, k)
+        else:
+            fraction = evenly(shrink * allowed(problem, cut, base, at[DEPTH], ahead, turn))
+            depth, roll = at[DEPTH] + fraction * ahead, at[ROLL] + fraction * turn
+            k = set_out(problem, cut, base, at, depth, roll, report, kept)
         outcome, used, energy = CONVERGED, 0, 0.0
         if k > 0:
             start = foresee(problem, now, k, likeness(problem, at, depth, roll))
             outcome, used, energy = settle(problem, start, k, orders, report)
             if start != now:
                 copy_state(problem, start, now, k)
-            if outcome == CONVERGED and problem.stiffness > 0.0 and left_grid(problem, base, k):
-                outcome = LEFT_GRID
         iterations += used
-        if outcome == CONVERGED:
-            if k > 0:
-                note_change(problem, now, k)
+        if laid == 0 and outcome == CONVERGED and problem.stiffness > 0.0 and left_grid(problem, base, k):
+            outcome = LEFT_GRID
+        if laid > 0 or outcome == CONVERGED:
+            note_change(problem, now, k)
             at[AHEAD] = depth - at[DEPTH] if roll == at[ROLL] else 0.0
             at[DEPTH], at[ROLL], at[ENERGY] = depth, roll, energy
         else:
             take_back(problem, cut, at, report, kept)
+        if laid > 0:
+            break
         if iterations > limit or problem.scratch.counter[SPENT] >= orders.work:
             outcome = EXHAUSTED
             break
@@ -110,7 +118,7 @@ def advance(journey: Journey, to_depth: float, to_roll: float) -> tuple[int, int
     return outcome, iterations, k
 
 
-@kernel
+@once
 def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, turn: float) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
     fraction = 1.0
@@ -141,7 +149,7 @@ def evenly(fraction: float) -> float:
     return 1.0 / max(math.ceil((1.0 - OVERSHOOT) / fraction), 1.0)
 
 
-@kernel
+@once
 def set_out(
     problem: Problem, cut: Cut, base: Base, at: Any, depth: float, roll: float, report: Any, kept: Any
 ) -> int:
@@ -163,7 +171,7 @@ def set_out(
     return k
 
 
-@kernel
+@once
 def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> None:
     """Put the last good state back."""
     now = 0 * report.size
@@ -175,13 +183,13 @@ def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> No
         report[i] = kept[i]
 
 
-@kernel
+@once
 def left_grid(problem: Problem, base: Base, k: int) -> bool:
     """Whether a joint is further outside the grid than it may be."""
     return bool(furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin)
 
 
-@kernel
+@once
 def clamp(problem: Problem, base: Base, roll: float) -> None:
     """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
     angle = math.radians(roll)
@@ -214,7 +222,7 @@ def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: f
         anchor_friction(problem, state.x[LAST_GOOD], was, k, ahead)
 
 
-@kernel
+@once
 def begin(base: Base, curve: Any) -> int:
     """Straight on from the entry, as two points."""
     for a in range(3):
@@ -236,7 +244,7 @@ def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) ->
     return max(count, 2)
 
 
-@kernel
+@once
 def keep_twist(u: Any, was: int, k: int) -> None:
     """Twist stays with the material, which is counted from the tip."""
     common = min(was, k)
@@ -251,18 +259,22 @@ def anchor_friction(problem: Problem, curve: Any, was: int, k: int, ahead: float
     curve : (was + 1, 3), the wire before the step, which continues straight back into the introducer.
     """
     chain, start, back = problem.chain, problem.friction.start, problem.state.r[NOW, 0, :, 2]
-    arcs = np.zeros(was + 1)
+    arcs = np.empty(was + 1)
+    arcs[0] = 0.0
     for n in range(was):
         square = 0.0
         for a in range(3):
             square += (curve[n + 1, a] - curve[n, a]) ** 2
         arcs[n + 1] = arcs[n] + math.sqrt(square)
-    arc = 0.0
+    arc, m = 0.0, 0
     for n in range(1, k + 1):
         arc += chain.length[n - 1]
         for p in range(chain.first[n], chain.first[n + 1]):
             s = arc + chain.offset[p, 2] - ahead
-            m = min(max(np.searchsorted(arcs, s, side="right") - 1, 0), max(was - 1, 0))
+            while m + 1 < was and arcs[m + 1] <= s:
+                m += 1
+            while m > 0 and arcs[m] > s:
+                m -= 1
             span = arcs[m + 1] - arcs[m] if was > 0 else 0.0
             t = min(max((s - arcs[m]) / span, 0.0), 1.0) if span > 0.0 else 0.0
             for a in range(3):

@@ -17,7 +17,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.flags import inlined, kernel, once
 from solver._kernels.joint import jacobian
 from solver._kernels.minimise import (
     BROKEN,
@@ -34,6 +34,7 @@ from solver._kernels.minimise import (
 from solver._kernels.newton import costate, sweep
 from solver._kernels.node import node_gradient
 from solver._kernels.problem import LOAD, ROLLOUTS, START, SWEEPS, Problem
+from solver._kernels.rollout import copy_base
 from solver._kernels.rotation import bend_towards, turn
 from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9, store9, times
 
@@ -51,7 +52,7 @@ def keep_direction(jac: Nine, incoming: Three) -> tuple[float, float, float]:
     return v0, v1, incoming[2] + jac[6] * v0 + jac[7] * v1
 
 
-@kernel
+@once
 def gradients(problem: Problem, which: int, k: int) -> None:
     """Fill gain[i, 0:2, 0] with minus the gradient and gain[i, 2, 0] with ρ_i - G^P of turning segment i alone.
 
@@ -99,14 +100,13 @@ def after(problem: Problem, which: int, k: int, j: int, axis: int) -> float:
     return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
 
 
-@kernel
+@once
 def propose(problem: Problem, which: int, k: int, share: float) -> None:
     """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     new = 1 - which
     u, x, r = state.u[new], state.x[new], state.r[new]
-    x[0, :] = state.x[which, 0]
-    r[0, :, :] = state.r[which, 0]
+    copy_base(state, which, new)
     frame = load9(r[0])
     for i in range(k):
         rho = gain[i, 2, 0]

@@ -5,11 +5,10 @@ U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ ½ k w_p max(0, φ(x_p) + ρ
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-import numpy as np
-
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.flags import inlined, kernel, once
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
 from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
@@ -140,7 +139,18 @@ def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
     for a in range(3):
         slide[a] -= across * normal[a]
         size += slide[a] * slide[a]
-    return float(np.sqrt(size))
+    return float(math.sqrt(size))
+
+
+@once
+def hold(problem: Problem, k: int) -> None:
+    """Friction, where there is any, holds every look-up point where it is now."""
+    if problem.friction.coefficient == 0.0:
+        return
+    now = 0 * k
+    for n in range(1, k + 1):
+        for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
+            point_at(problem, now, n, p, problem.friction.start[p])
 
 
 @kernel
@@ -168,7 +178,7 @@ def lag_friction(problem: Problem, which: int, k: int) -> float:
         load = 0.0
         if d != 0.0:
             jet = state.jet[which, p]
-            slope = np.sqrt(jet[1] * jet[1] + jet[2] * jet[2] + jet[3] * jet[3])
+            slope = math.sqrt(jet[1] * jet[1] + jet[2] * jet[2] + jet[3] * jet[3])
             load = problem.stiffness * chain.weight[p] * d * slope
             for a in range(3):
                 friction.normal[p, a] = jet[1 + a] / max(slope, 1e-12)

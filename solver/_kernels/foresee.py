@@ -6,10 +6,10 @@ A wire pushed on goes straight ahead of its tip into the wall and has to be bent
 from __future__ import annotations
 
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import kernel
+from solver._kernels.flags import kernel, once
 from solver._kernels.passage import crossed
 from solver._kernels.problem import FORESEEN, WALL, Problem
-from solver._kernels.rollout import place
+from solver._kernels.rollout import copy_base, place
 
 
 @kernel
@@ -27,10 +27,7 @@ def foresee(problem: Problem, which: int, k: int, share: float) -> int:
     energy = total_energy(problem, which, k)
     if share == 0.0 or state.parts[which, WALL] == 0.0:
         return which
-    for a in range(3):
-        state.x[1 - which, 0, a] = state.x[which, 0, a]
-        for b in range(3):
-            state.r[1 - which, 0, a, b] = state.r[which, 0, a, b]
+    copy_base(state, which, 1 - which)
     place(problem.chain, state, 1 - which, k)
     if total_energy(problem, 1 - which, k) < energy and not crossed(problem, which, k):
         scratch.counter[FORESEEN] += 1
@@ -38,7 +35,7 @@ def foresee(problem: Problem, which: int, k: int, share: float) -> int:
     return which
 
 
-@kernel
+@once
 def note_change(problem: Problem, which: int, k: int) -> None:
     """Remember how relaxing changed the start of this step."""
     u, scratch = problem.state.u[which], problem.scratch

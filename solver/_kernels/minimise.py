@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import kernel
+from solver._kernels.flags import kernel, once
 from solver._kernels.layout import Chain
 from solver._kernels.newton import costate, sweep
 from solver._kernels.passage import crossed
@@ -23,7 +23,7 @@ from solver._kernels.problem import (
     WALL,
     Problem,
 )
-from solver._kernels.rollout import place, rollout
+from solver._kernels.rollout import copy_base, place, rollout
 
 # how a relaxation ends
 CONVERGED, EXHAUSTED, STALLED, BROKEN = range(4)
@@ -73,7 +73,7 @@ def admissible(problem: Problem, which: int, k: int) -> bool:
     return problem.stiffness == 0.0 or not crossed(problem, which, k)
 
 
-@kernel
+@once
 def search(problem: Problem, which: int, k: int, energy: float, decrement: float, noise: float) -> float:
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
@@ -88,12 +88,14 @@ def search(problem: Problem, which: int, k: int, energy: float, decrement: float
     return math.inf
 
 
-@kernel
+@once
 def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
     gain = problem.scratch.gain
-    gain[j, :, :] = 0.0
+    for a in range(3):
+        for b in range(7):
+            gain[j, a, b] = 0.0
     for i in range(j + 1, k):
         gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
     size = 0.3
@@ -111,14 +113,13 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
     return math.inf
 
 
-@kernel
+@once
 def rest_shape(problem: Problem, which: int, k: int) -> bool:
     """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
     state = problem.state
     for j in range(k):
         state.u[1 - which, j, 0] = state.u[1 - which, j, 1] = state.u[1 - which, j, 2] = 0.0
-    state.x[1 - which, 0, :] = state.x[which, 0]
-    state.r[1 - which, 0, :, :] = state.r[which, 0]
+    copy_base(state, which, 1 - which)
     place(problem.chain, state, 1 - which, k)
     total_energy(problem, 1 - which, k)
     parts = state.parts[1 - which]
@@ -134,7 +135,7 @@ def unloaded(chain: Chain, k: int) -> bool:
     return True
 
 
-@kernel
+@once
 def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
     rollout(problem, which, k, 0 * k, 1.0)
@@ -152,7 +153,7 @@ def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
     return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
 
 
-@kernel
+@once
 def polish(
     problem: Problem, which: int, k: int, energy: float, noise: float, report: Any
 ) -> tuple[int, float]:
@@ -208,7 +209,8 @@ def minimise(
         if resting or rest_shape(problem, which, k):
             counter[IDLE] += 1
             # without a force or a bend there is no gradient
-            report[:START] = 0.0
+            for i in range(START):
+                report[i] = 0.0
             return CONVERGED, 0, which if resting else 1 - which, 0.0
     for iteration in range(max_iterations):
         if not math.isfinite(energy):

@@ -29,6 +29,15 @@ def place(chain: Chain, state: State, which: int, k: int) -> None:
             x[j + 1, a] = x[j, a] + length * r[j + 1, a, 2]
 
 
+@inlined
+def copy_base(state: State, source: int, target: int) -> None:
+    """Copy the entry point and the base frame of one state to another."""
+    for a in range(3):
+        state.x[target, 0, a] = state.x[source, 0, a]
+        for b in range(3):
+            state.r[target, 0, a, b] = state.r[source, 0, a, b]
+
+
 @kernel
 def rollout(problem: Problem, which: int, k: int, near: int, fraction: float) -> None:
     """Take a fraction of Newton's step forward with feedback, from joint ``near`` on: the trial state.

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
 from solver._kernels.closed_form import minimise_closed_form
-from solver._kernels.energy import lag_friction, point_at, total_energy
-from solver._kernels.flags import kernel
+from solver._kernels.energy import lag_friction, total_energy
+from solver._kernels.flags import once
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Cut
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
@@ -34,7 +34,7 @@ class Orders(NamedTuple):
     work: int
 
 
-@kernel
+@once
 def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
     """Relax state ``which``, whose energy is known, in place; return the outcome, iterations and the energy, N mm.
 
@@ -42,7 +42,8 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
     """
     rubs = problem.friction.coefficient > 0.0
     if rubs:
-        problem.friction.load[:] = 0.0
+        for p in range(problem.friction.load.size):
+            problem.friction.load[p] = 0.0
         lag_friction(problem, which, k)
     outcome, iterations, energy = UNSETTLED, 0, 0.0
     counter, cost = problem.scratch.counter, k + problem.chain.first[k + 1]
@@ -66,30 +67,7 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
     return outcome, iterations, energy
 
 
-@kernel
-def relax_once(
-    problem: Problem, cut: Cut, k: int, orders: Orders, report: Any, force: Any
-) -> tuple[int, int, float]:
-    """Relax state 0 and measure it; friction acts against leaving where it is now."""
-    now = 0 * k
-    if problem.friction.coefficient > 0.0:
-        hold(problem, k)
-    total_energy(problem, now, k)
-    result = settle(problem, now, k, orders, report)
-    measure(problem, cut, k, report, force)
-    return result
-
-
-@kernel
-def hold(problem: Problem, k: int) -> None:
-    """Friction holds every look-up point where it is now."""
-    now = 0 * k
-    for n in range(1, k + 1):
-        for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
-            point_at(problem, now, n, p, problem.friction.start[p])
-
-
-@kernel
+@once
 def measure(problem: Problem, cut: Cut, k: int, report: Any, force: Any) -> None:
     """Forces of the wire at rest in state 0: force (capacity + 1, 3) N per joint; deepest contact and push force."""
     for n in range(k + 1):

@@ -6,11 +6,12 @@ vanish on the faces; the linear continuation outside is therefore C² as well, a
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.flags import door, inlined, kernel
 from solver._kernels.small import Three
 
 Four = tuple[float, float, float, float]
@@ -45,7 +46,7 @@ def solve_natural(line: Any, scratch: Any) -> None:
         line[i] -= scratch[i] * line[i + 1]
 
 
-@kernel
+@door
 def prefilter(values: Any) -> None:
     """Turn node values into spline coefficients, in place, along the three axes."""
     nx, ny, nz = values.shape
@@ -56,14 +57,18 @@ def prefilter(values: Any) -> None:
             solve_natural(values[i, j], scratch)
     for i in range(nx):
         for k in range(nz):
-            line[:ny] = values[i, :, k]
+            for j in range(ny):
+                line[j] = values[i, j, k]
             solve_natural(line[:ny], scratch)
-            values[i, :, k] = line[:ny]
+            for j in range(ny):
+                values[i, j, k] = line[j]
     for j in range(ny):
         for k in range(nz):
-            line[:nx] = values[:, j, k]
+            for i in range(nx):
+                line[i] = values[i, j, k]
             solve_natural(line[:nx], scratch)
-            values[:, j, k] = line[:nx]
+            for i in range(nx):
+                values[i, j, k] = line[i]
 
 
 @inlined
@@ -232,7 +237,7 @@ def to_world(m: Any, jet: Any) -> None:
         jet[4 + n] = m[0, a] * h0 + m[1, a] * h1 + m[2, a] * h2
 
 
-@kernel
+@door
 def look_up(field: Field, points: Any, jets: Any) -> None:
     """Value, gradient and second derivatives (n, 10), per mm, at points (n, 3) in mm."""
     weights = np.empty((3, 3, 4))
@@ -244,7 +249,7 @@ def look_up(field: Field, points: Any, jets: Any) -> None:
         to_world(m, jets[n])
 
 
-@kernel
+@door
 def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients c.
 
@@ -265,7 +270,7 @@ def bounds(c: Any, to_index: Any) -> tuple[float, float]:
                 for a in range(3):
                     scale = to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2
                     square += first[a] ** 2 * scale
-                slope = max(slope, np.sqrt(square))
+                slope = max(slope, math.sqrt(square))
                 gap = max(gap, (second[0] + second[1] + second[2]) / 6)
     return gap, slope
 
@@ -275,9 +280,9 @@ def largest_differences(c: Any, i0: int, j0: int, k0: int, first: Any, second: A
     """Largest first and second differences (3,) in the support of a block of cells; return its least value."""
     n = BLOCK + 3
     i1, j1, k1 = min(i0 + n, c.shape[0]), min(j0 + n, c.shape[1]), min(k0 + n, c.shape[2])
-    least = np.inf
-    first[:] = 0.0
-    second[:] = 0.0
+    least = math.inf
+    for a in range(3):
+        first[a] = second[a] = 0.0
     for i in range(i0, i1):
         for j in range(j0, j1):
             for k in range(k0, k1):

@@ -11,14 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from solver import Grid, GuideWire, Status, VesselWall
-from solver._kernels.closed_form import gradients
-from solver._kernels.energy import total_energy
-from solver._kernels.follow import aim
-from solver._kernels.newton import costate, sweep
-from solver._kernels.rollout import place
-from solver._kernels.rotation import jacobian_terms, sine_terms
 from solver.chain import Buffers, base_frame
 from solver.relax import Settings, buffers_for, relax_buffers, set_loads
+from tests.solver.doors import aim, costate, gradients, jacobian_terms, place, sine_terms, sweep, total_energy
 from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
 
 Array = NDArray[np.float64]

@@ -1,0 +1,52 @@
+"""Ways from Python into kernels that have none of their own; compiled anew in every session, so never stale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from solver._kernels import closed_form, energy, follow, newton, rollout, rotation
+from solver._kernels.flags import FAST
+
+door = numba.njit(**FAST)
+
+
+@door
+def total_energy(problem: Any, which: int, k: int) -> float:
+    return energy.total_energy(problem, which, k)
+
+
+@door
+def place(chain: Any, state: Any, which: int, k: int) -> None:
+    rollout.place(chain, state, which, k)
+
+
+@door
+def sweep(problem: Any, which: int, k: int, damping: float, report: Any) -> bool:
+    return newton.sweep(problem, which, k, damping, report)
+
+
+@door
+def costate(problem: Any, which: int, k: int, report: Any) -> None:
+    newton.costate(problem, which, k, report)
+
+
+@door
+def gradients(problem: Any, which: int, k: int) -> None:
+    closed_form.gradients(problem, which, k)
+
+
+@door
+def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
+    follow.aim(chain, u, x, r, j)
+
+
+@door
+def sine_terms(q: float) -> Any:
+    return rotation.sine_terms(q)
+
+
+@door
+def jacobian_terms(q: float, s: float, a: float) -> Any:
+    return rotation.jacobian_terms(q, s, a)
