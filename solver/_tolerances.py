@@ -71,10 +71,6 @@ WORK_PER_ITERATION = 2_500
 """The same, for each of max_iterations on top: raising max_iterations must help."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
-UNMOVED = 1e-3
-"""Change of a joint in a step, over the largest one, below which the joints up to it are left alone for a while."""
-WORTHWHILE = 0.125
-"""Share of the joints that must be left alone for that to save more than looking at all of them again costs."""
 FORETOLD = 100.0
 """A step that fell by D + T where the model said D leaves a decrement of about 2 to 10 T²/D (from the third and
 fourth order of the energy): below a tenth of the tolerance the next sweep would only confirm it."""

@@ -13,7 +13,6 @@ from solver._kernels.problem import (
     LEVENBERG,
     ROLLOUTS,
     ROLLS,
-    STILL,
     STRAIGHT,
     SWEEPS,
 )
@@ -29,7 +28,6 @@ NAMES = {
     "rolls_proven_idle": ROLLS,
     "sweeps_without_roll": STRAIGHT,
     "starts_foreseen": FORESEEN,
-    "joints_left_still": STILL,
 }
 
 

@@ -132,7 +132,7 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
 @kernel
 def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any) -> bool:
     """Whether a state is a minimum: no way down left in Newton's decrement, and no moment to speak of."""
-    minimal = sweep(problem, which, 0 * k, k, 0.0, report)
+    minimal = sweep(problem, which, k, 0.0, report)
     problem.scratch.counter[SWEEPS] += 1
     costate(problem, which, k, report)
     scale = scale_of(problem, which, k)
@@ -171,7 +171,7 @@ def minimise_closed_form(
         while share > SMALLEST:
             propose(problem, which, k, share)
             problem.scratch.counter[ROLLOUTS] += 1
-            trial = total_energy(problem, 1 - which, 0 * k, k)
+            trial = total_energy(problem, 1 - which, k)
             if trial <= energy and admissible(problem, which, k):
                 break
             trial = math.inf

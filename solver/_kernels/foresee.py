@@ -24,12 +24,12 @@ def foresee(problem: Problem, which: int, k: int, share: float) -> int:
         for a in range(3):
             scratch.start[j, a] = u[j, a]
             tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
-    energy = total_energy(problem, which, 0 * k, k)
+    energy = total_energy(problem, which, k)
     if share == 0.0 or state.parts[which, WALL] == 0.0:
         return which
     copy_base(state, which, 1 - which)
     place(problem.chain, state, 1 - which, k)
-    if total_energy(problem, 1 - which, 0 * k, k) < energy and not crossed(problem, which, k):
+    if total_energy(problem, 1 - which, k) < energy and not crossed(problem, which, k):
         scratch.counter[FORESEEN] += 1
         return 1 - which
     return which

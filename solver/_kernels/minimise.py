@@ -19,7 +19,6 @@ from solver._kernels.problem import (
     ROLLOUTS,
     RUBBING,
     START,
-    STILL,
     SWEEPS,
     WALL,
     Problem,
@@ -40,8 +39,6 @@ LEAST_DAMPING = tol.LEAST_DAMPING
 WORST_DAMPING = tol.WORST_DAMPING
 SEARCHES = tol.SEARCHES
 POLISHES = tol.POLISHES
-UNMOVED = tol.UNMOVED
-WORTHWHILE = tol.WORTHWHILE
 FORETOLD = tol.FORETOLD
 
 
@@ -77,15 +74,13 @@ def admissible(problem: Problem, which: int, k: int) -> bool:
 
 
 @once
-def search(
-    problem: Problem, which: int, near: int, k: int, energy: float, decrement: float, noise: float
-) -> float:
+def search(problem: Problem, which: int, k: int, energy: float, decrement: float, noise: float) -> float:
     """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
     fraction = 1.0
     for _ in range(SEARCHES):
-        rollout(problem, which, k, near, fraction)
+        rollout(problem, which, k, 0 * k, fraction)
         problem.scratch.counter[ROLLOUTS] += 1
-        trial = total_energy(problem, 1 - which, near, k)
+        trial = total_energy(problem, 1 - which, k)
         enough = trial <= energy - SUFFICIENT * fraction * decrement
         if (enough or (decrement <= noise and trial <= energy)) and admissible(problem, which, k):
             return trial
@@ -111,7 +106,7 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
             gain[j, 2, 0] = side * size * report[19]
             rollout(problem, which, k, j, 1.0)
             problem.scratch.counter[ROLLOUTS] += 1
-            trial = total_energy(problem, 1 - which, 0 * k, k)
+            trial = total_energy(problem, 1 - which, k)
             if trial < energy - 0.1 * abs(report[5]) * size * size and admissible(problem, which, k):
                 return trial
         size *= 0.25
@@ -126,7 +121,7 @@ def rest_shape(problem: Problem, which: int, k: int) -> bool:
         state.u[1 - which, j, 0] = state.u[1 - which, j, 1] = state.u[1 - which, j, 2] = 0.0
     copy_base(state, which, 1 - which)
     place(problem.chain, state, 1 - which, k)
-    total_energy(problem, 1 - which, 0 * k, k)
+    total_energy(problem, 1 - which, k)
     parts = state.parts[1 - which]
     return parts[WALL] == 0.0 and parts[RUBBING] == 0.0 and admissible(problem, which, k)
 
@@ -141,11 +136,11 @@ def unloaded(chain: Chain, k: int) -> bool:
 
 
 @once
-def finish(problem: Problem, which: int, near: int, k: int, energy: float, report: Any) -> tuple[int, float]:
+def finish(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
-    rollout(problem, which, k, near, 1.0)
+    rollout(problem, which, k, 0 * k, 1.0)
     problem.scratch.counter[ROLLOUTS] += 1
-    trial = total_energy(problem, 1 - which, near, k)
+    trial = total_energy(problem, 1 - which, k)
     if trial <= energy and admissible(problem, which, k):
         which, energy = 1 - which, trial
     costate(problem, which, k, report)
@@ -163,38 +158,23 @@ def polish(
     problem: Problem, which: int, k: int, energy: float, noise: float, report: Any
 ) -> tuple[int, float]:
     """Newton's steps where the energy is flat to its last place: the fall that is left to foretell decides."""
-    definite = sweep(problem, which, 0 * k, k, 0.0, report)
+    definite = sweep(problem, which, k, 0.0, report)
     for _ in range(POLISHES):
         left = report[0]
         if not definite or at_rest(problem, which, k, report):
             break
         rollout(problem, which, k, 0 * k, 1.0)
         problem.scratch.counter[ROLLOUTS] += 1
-        trial = total_energy(problem, 1 - which, 0 * k, k)
+        trial = total_energy(problem, 1 - which, k)
         if not (trial <= energy + noise and admissible(problem, which, k)):
             break
-        definite = sweep(problem, 1 - which, 0 * k, k, 0.0, report)
+        definite = sweep(problem, 1 - which, k, 0.0, report)
         problem.scratch.counter[SWEEPS] += 1
         if not (definite and report[0] < left):
             break
         which, energy = 1 - which, trial
         costate(problem, which, k, report)
     return which, energy
-
-
-@once
-def still(problem: Problem, which: int, k: int) -> int:
-    """Joints from the base on that the last step left as they were, all but; 0 where that is no good part of them."""
-    new, old = problem.state.u[which], problem.state.u[1 - which]
-    largest = 0.0
-    for j in range(k):
-        for a in range(3):
-            largest = max(largest, abs(new[j, a] - old[j, a]))
-    for j in range(k):
-        for a in range(3):
-            if abs(new[j, a] - old[j, a]) > UNMOVED * largest:
-                return j if j > WORTHWHILE * k else 0
-    return 0
 
 
 @kernel
@@ -232,27 +212,17 @@ def minimise(
             for i in range(START):
                 report[i] = 0.0
             return CONVERGED, 0, which if resting else 1 - which, 0.0
-    near = 0 * k
     for iteration in range(max_iterations):
         if not math.isfinite(energy):
             return BROKEN, iteration, which, energy
-        definite = sweep(problem, which, near, k, damping, report)
+        definite = sweep(problem, which, k, damping, report)
         counter[SWEEPS] += 1
-        counter[STILL] += near
         noise = ROUND_OFF * (scale_of(problem, which, k) + abs(state.parts[which, LOAD]))
-        little = definite and report[0] <= max(tolerance * scale_of(problem, which, k), noise)
-        if near > 0 and not definite:
-            near = 0
-            continue
-        if damping == 0.0 and little:
+        if damping == 0.0 and definite and report[0] <= max(tolerance * scale_of(problem, which, k), noise):
             before = energy
-            which, energy = finish(problem, which, near, k, energy, report)
+            which, energy = finish(problem, which, k, energy, report)
             if at_rest(problem, which, k, report):
                 return CONVERGED, iteration, which, energy
-            if near > 0:
-                # the whole gradient says what its part did not
-                near = 0
-                continue
             if report[0] <= noise:
                 which, energy = polish(problem, which, k, energy, noise, report)
                 flat = report[1] <= rounding_moment(problem, which, k)
@@ -267,7 +237,7 @@ def minimise(
             continue
         trial = math.inf
         if definite:
-            trial = search(problem, which, near, k, energy, report[0], noise)
+            trial = search(problem, which, k, energy, report[0], noise)
         elif damping == 0.0:
             costate(problem, which, k, report)
             if at_rest(problem, which, k, report):
@@ -282,12 +252,9 @@ def minimise(
                 costate(problem, which, k, report)
                 if at_rest(problem, which, k, report):
                     return CONVERGED, iteration + 1, which, energy
-            near = still(problem, which, k) if problem.switch.window and definite and damping == 0.0 else 0
             last, patience = max(damping, LEAST_DAMPING), patience - 1
             if patience <= 0:
                 damping = 0.2 * damping if damping > LEAST_DAMPING else 0.0
-        elif near > 0:
-            near = 0
         else:
             counter[LEVENBERG] += 1
             patience = 2

@@ -113,7 +113,6 @@ SWITCHES = {
     "idle": (Switch(idle=False), "rest_shapes"),
     "roll": (Switch(roll=False), "rolls_proven_idle"),
     "direction": (Switch(direction=False), "sweeps_without_roll"),
-    "window": (Switch(window=False), "joints_left_still"),
     "foresight": (Switch(foresight=False), "starts_foreseen"),
 }
 
