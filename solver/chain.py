@@ -150,11 +150,10 @@ class Buffers:
 
     def reserve(self, depth_mm: float) -> bool:
         """Make sure that there is room for the wire at a depth and one point more; whether that took new arrays."""
-        k, _ = self.wire.segments_at(depth_mm)
-        if k >= self.capacity:
-            self.grow(max(2 * self.capacity, k + 1))
-            return True
-        return False
+        if depth_mm < (self.capacity - 1) * self.wire.segment_mm:
+            return False
+        self.grow(max(2 * self.capacity, self.wire.segments_at(depth_mm)[0] + 2))
+        return True
 
     def lay_out(self, depth_mm: float) -> None:
         """Cut the wire at a depth into segments."""

@@ -87,6 +87,8 @@ class Insertion:
         self.buffers.state.x[0, 0] = self.base.entry
         self.buffers.state.r[0, 0] = self.base.frame
         self._started = False
+        # the depth at which ``segments_at`` counts one joint too many
+        self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
         self._journey = self._bound()
         self._outside = wall is not None and self._entry_is_outside(wall)
 
@@ -120,7 +122,7 @@ class Insertion:
                     "mm from the entry",
                 )
         # room for all of it at once
-        self._reserve(max((d for d in depths if self._refusal(d) is Status.CONVERGED), default=0.0))
+        self._reserve(max((d for d in depths if d < self._too_long), default=0.0))
         for depth, roll in zip(depths, rolls, strict=True):
             yield self._go(depth, roll)
 
@@ -151,7 +153,7 @@ class Insertion:
 
     def _refusal(self, depth: float) -> Status:
         """A status for depths that need not be tried."""
-        if self.wire.segments_at(depth)[0] > self.max_joints:
+        if depth >= self._too_long:
             return Status.TOO_LONG
         return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
 

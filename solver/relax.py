@@ -133,7 +133,7 @@ def solution_of(
     report, parts = b.report.tolist(), state.parts[0].tolist()
     kept = [state.x[0, :n].copy(), state.r[0, :n].copy(), b.force[:n].copy(), b.report[6:9].copy()]
     for array in kept:
-        array.flags.writeable = False
+        array.setflags(write=False)
     solution = object.__new__(Solution)
     # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take
     vars(solution).update(

@@ -12,7 +12,7 @@ from solver import Insertion, relax
 
 NAME = "wireval newton"
 PACKAGE = "wireval"
-REPEATS = 5
+REPEATS = 9
 
 
 def cantilever(n: int) -> Answer:
@@ -34,7 +34,7 @@ def bend(n: int, steps: int = STEPS_B, pushes: int | None = None) -> Answer:
     """Scene B: pushed in from the entry; the wire is n segments long at the end only."""
     scene = scenes.bend(DEPTH_B_MM)
     runs = []
-    for _ in range(3):
+    for _ in range(REPEATS):
         insertion = Insertion(scene.wire(DEPTH_B_MM / n), scene.wall(), scene.entry_mm, scene.direction)
         seconds, solutions = [], insertion.to_depths([DEPTH_B_MM * (i + 1) / steps for i in range(steps)])
         for _ in range(pushes or steps):
