@@ -29,7 +29,7 @@ def leaving(a: Any, b: Any, centre: Any, radius: float) -> float:
     root = ab * ab - bb * (aa - radius * radius)
     if root < 0.0:
         return 2.0
-    return (-ab + math.sqrt(root)) / bb
+    return float((-ab + math.sqrt(root)) / bb)
 
 
 @door
