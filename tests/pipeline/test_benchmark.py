@@ -14,7 +14,8 @@ from pipeline.benchmark import outputs, scenes, statics
 from pipeline.benchmark.clock import timed
 from pipeline.benchmark.errors import arc_samples, resampled, shape_error
 from pipeline.benchmark.insert import Setting, insert
-from pipeline.benchmark.peers.judge import bending_energy
+from pipeline.benchmark.peers.judge import bending_energy, row_of
+from pipeline.benchmark.peers.run import ask
 from pipeline.benchmark.peers.table import sentences
 from pipeline.benchmark.reference import reference
 from pipeline.benchmark.study import settings, study
@@ -199,3 +200,25 @@ def test_peers_are_compared_within_one_run() -> None:
     assert "last step 200 times" in text
     assert "20 %" in text
     assert "expert" in text
+
+
+@pytest.mark.peers
+def test_mujoco_comes_to_the_same_bend() -> None:
+    pytest.importorskip("mujoco", reason="needs the extra [peers]")
+    answer = ask("mujoco_cable", "bend", 30, 1)
+    assert "error" not in answer, answer
+    row = row_of(answer, "bend", 30, 1)
+    # what 30 segments of any solver are off: 0.036 mm of shape, 0.10 mm at the tip
+    assert row["shape_error_mm"] < 0.05
+    assert row["tip_error_mm"] < 0.15
+
+
+@pytest.mark.peers
+def test_mujoco_that_flies_apart_is_no_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="needs the extra [peers]")
+    from pipeline.benchmark.peers import mujoco_cable
+
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file where it stands
+    monkeypatch.setattr(mujoco_cable, "WALL_SAFETY", 0.02)
+    with pytest.raises(RuntimeError, match="unstable"):
+        mujoco_cable.bend(30, pushes=50)
