@@ -35,8 +35,8 @@ WORK: dict[str, Sequence[tuple[str, int]]] = {
     ],
     "exudyn_plain": [*(("bend", n) for n in (30, 60, 120))],
     "pypbd_rod": [*(("cantilever", n) for n in (20, 50, 100)), *(("bend", n) for n in (30, 60, 120))],
-    "pyelastica_rod": [("cantilever", 20), ("cantilever", 50), ("bend", 30)],
-    "mujoco_cable": [("cantilever", 20), ("cantilever", 50), ("bend", 30)],
+    "pyelastica_rod": [("cantilever", 20), ("cantilever", 50), ("bend", 30), ("bend", 60)],
+    "mujoco_cable": [("cantilever", 20), ("cantilever", 50), ("bend", 30), ("bend", 60)],
 }
 QUICK_WORK = (("cantilever", 20), ("bend", 30))
 SUB_STEPS = (1, 2, 3, 4, 8)
