@@ -15,7 +15,7 @@ from time import perf_counter
 from pipeline.cli import main
 from solver.warm import no_collection
 
-SOLVER = "from solver import warm_up; warm_up()"
+SOLVER = "from solver import warm_up; warm_up(beside=True)"
 
 
 def warm_up() -> float:

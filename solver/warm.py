@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import gc
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
+from solver._kernels.follow import follow
 from solver.grid import Grid
 from solver.insertion import Insertion
-from solver.relax import METHODS
+from solver.relax import Settings, buffers_for
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
@@ -27,20 +30,40 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def warm_up() -> None:
-    """Compile every kernel (about half a minute, once per installation; later calls read the cache)."""
+def warm_up(*, beside: bool = False) -> None:
+    """Compile every kernel (about half a minute, once per installation; later calls read the cache).
+
+    beside : what does not relax a wire is compiled by a process of its own, at the same time.
+    """
     with no_collection():
-        _call_every_door()
+        if not beside:
+            _lesser_doors()
+            _insert()
+            return
+        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm._lesser_doors()"]):
+            _insert()
 
 
-def _call_every_door() -> None:
+def _wire() -> GuideWire:
+    return GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
+
+
+def _insert() -> None:
+    """The way to a depth, nine tenths of it all; a wall has no types of its own."""
+    for _ in Insertion(_wire(), None, [0, 0, 0], [0, 0, 1]).to_depths([1.0]):
+        pass
+
+
+def _lesser_doors() -> None:
+    """Make a wall and ask it, and lay a wire along a curve."""
     axis = np.arange(-2.0, 2.5, 0.5)
     x, y, _ = np.meshgrid(axis, axis, np.arange(-1.0, 4.0, 0.5), indexing="ij")
     grid = Grid(
         (np.hypot(x - 0.1, y) - 0.5).astype(np.float32), np.full(3, 0.5), np.array([-2.0, -2.0, -1.0])
     )
-    wire = GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
-    for method in METHODS:
-        wall = VesselWall(grid, 1.0, friction=0.1)
-        for _ in Insertion(wire, wall, [0, 0, 0], [0, 0, 1], method=method).to_depths([2.0, 1.0]):
-            pass
+    wall = VesselWall(grid, 1.0, friction=0.1)
+    wall.look_up([[0.0, 0.0, 0.0]])
+    buffers = buffers_for(_wire(), wall, Settings())
+    buffers.lay_out(1.0)
+    state = buffers.state
+    follow(np.eye(3)[1:], 2, buffers.chain, state.u[0], state.x[0], state.r[0], buffers.k)

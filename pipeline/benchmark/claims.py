@@ -188,7 +188,7 @@ COLD = """
 from time import perf_counter, process_time
 from solver import warm_up
 wall, cpu = perf_counter(), process_time()
-warm_up()
+warm_up(beside=True)
 print(perf_counter() - wall, process_time() - cpu)
 """
 
