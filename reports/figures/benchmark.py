@@ -148,11 +148,15 @@ def _styles(rows: pd.DataFrame) -> dict[str, tuple[str, str]]:
 
 
 def _name_segments(axes: Axes, front: pd.DataFrame) -> None:
-    if has(front, "segment_mm"):
-        for x, y, segment in zip(
-            front["shape_error_mm"], front["ms_per_mm"], front["segment_mm"], strict=True
-        ):
+    """Segment lengths in mm along the front, each once and none upon another."""
+    if not has(front, "segment_mm"):
+        return
+    last, at = None, (0.0, 0.0)
+    for x, y, segment in zip(front["shape_error_mm"], front["ms_per_mm"], front["segment_mm"], strict=True):
+        apart = max(np.log10(x / at[0]), abs(np.log10(y / at[1]))) if last is not None else 1.0
+        if segment != last and apart > 0.1:
             axes.annotate(f"{segment:g}", (x, y), xytext=(3, 4), textcoords="offset points", fontsize=7)
+            last, at = segment, (x, y)
 
 
 def _slope(axes: Axes, rows: pd.DataFrame) -> None:
