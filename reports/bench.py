@@ -96,10 +96,14 @@ def pareto_front(
 
 
 def recommended(rows: pd.DataFrame) -> pd.DataFrame:
-    """The fastest row of each scene within each target error, the row itself unchanged; none where none is."""
-    found = []
+    """The fastest row of each scene within each target error, the row itself unchanged; none where none is.
+
+    All shorter segments with the same other settings must be within it too: where a wire may come to rest in several
+    places, a long one can be right by luck.
+    """
+    found, worst = [], _worst_from_here(rows)
     for target in TARGETS_MM:
-        within = rows[(rows["shape_error_mm"] <= target) & rows["ms_per_mm"].notna()]
+        within = rows[(worst <= target) & rows["ms_per_mm"].notna()]
         if len(within):
             fastest = rows.loc[within.groupby("scene", sort=False)["ms_per_mm"].idxmin()]
             found.append(fastest.drop(columns="on_front", errors="ignore").assign(target_mm=target))
@@ -107,6 +111,15 @@ def recommended(rows: pd.DataFrame) -> pd.DataFrame:
         return pd.DataFrame(columns=["target_mm", *rows.columns])
     table = pd.concat(found, ignore_index=True)
     return table[["target_mm", *[c for c in table.columns if c != "target_mm"]]]
+
+
+def _worst_from_here(rows: pd.DataFrame) -> pd.Series[float]:
+    """Largest shape error of each row and of the shorter segments with the same other settings; a failure is inf."""
+    same = [c for c in ("scene", "method", "hull", "quadrature", "tolerance") if c in rows]
+    error = rows["shape_error_mm"].fillna(np.inf)
+    order = rows.sort_values("segment_mm").index
+    worst = error[order].groupby([rows.loc[order, c] for c in same], dropna=False, sort=False).cummax()
+    return worst.reindex(rows.index)
 
 
 def _numeric(rows: pd.DataFrame) -> pd.DataFrame:

@@ -82,6 +82,22 @@ def test_recommendations_are_the_fastest_rows_within_the_target(tmp_path: Path) 
     assert bench.recommended(rows.assign(shape_error_mm=9.0)).empty
 
 
+def test_a_long_segment_that_is_right_by_luck_is_not_recommended() -> None:
+    rows = pd.DataFrame(
+        {
+            "scene": "siphon",
+            "method": "newton",
+            "tolerance": 1e-9,
+            "segment_mm": [2.0, 1.0, 0.5, 0.25],
+            "shape_error_mm": [0.05, 0.9, 0.02, 0.005],
+            "ms_per_mm": [0.1, 0.2, 0.3, 0.6],
+        }
+    )
+    best = bench.recommended(rows).set_index("target_mm")["segment_mm"]
+    assert best.to_dict() == {0.1: 0.5, 0.01: 0.25}
+    assert bench.recommended(rows.assign(shape_error_mm=[0.05, 0.05, 0.05, np.nan])).empty
+
+
 def test_the_page_has_everything_and_keeps_extra_columns(tmp_path: Path) -> None:
     page = bench.render_bench(*_swap(fake_bench(tmp_path), tmp_path), note="one core of <some> machine")
     text = page.read_text(encoding="utf-8")
