@@ -121,8 +121,9 @@ class Insertion:
                     "finite depths >= 0 and rolls",
                     "mm from the entry",
                 )
-        # room for all of it at once
-        self._reserve(max((d for d in depths if d < self._too_long), default=0.0))
+        # room for all of it at once, and a new handle of what is then elsewhere in memory
+        if self.buffers.reserve(max((d for d in depths if d < self._too_long), default=0.0)):
+            self._journey = self._bound()
         for depth, roll in zip(depths, rolls, strict=True):
             yield self._go(depth, roll)
 
@@ -135,17 +136,10 @@ class Insertion:
             self.at[ROLL], self._started = roll, True
         status, iterations = self._refusal(depth), 0
         if status is Status.CONVERGED:
-            self._reserve(depth)
             outcome, iterations, b.k = advance(self._journey, depth, roll, 0)
             status = OUTCOMES[outcome]
         depth, roll, energy, _, _ = self.at.tolist()
         return solution_of(b, status, iterations, energy, depth, roll)
-
-    def _reserve(self, depth: float) -> None:
-        """Make room for the wire at a depth, and a new handle of what is then elsewhere in memory."""
-        b = self.buffers
-        if b.reserve(depth):
-            self._journey = self._bound()
 
     def _bound(self) -> Journey:
         b = self.buffers

@@ -113,7 +113,7 @@ def advance(journey: Journey, to_depth: float, to_roll: float, laid: int) -> tup
             # outside the grid or without a finite energy a shorter step does not help either
             break
     at[SHRINK] = max(shrink, 8 * SMALLEST)
-    k, _ = segments_at(at[DEPTH], cut.segment)
+    k = laid if laid > 0 else segments_at(at[DEPTH], cut.segment)[0]
     measure(problem, cut, k, report, journey.force)
     return outcome, iterations, k
 

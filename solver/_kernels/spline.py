@@ -120,16 +120,12 @@ def trilinear(c: Any, i: int, j: int, k: int, r: float, s: float, t: float) -> f
 @inlined
 def basis(t: float, weights: Any) -> None:
     """Fill (3, 4) weights: value, first and second derivative per index of the four coefficients around t."""
+    weights[0, 0], weights[0, 1], weights[0, 2], weights[0, 3] = cubic(t)
     if t < 0.0 or t > 1.0:
-        weights[0, 0], weights[0, 1], weights[0, 2], weights[0, 3] = 0.0, 1 - t, t, 0.0
         weights[1, 0], weights[1, 1], weights[1, 2], weights[1, 3] = 0.0, -1.0, 1.0, 0.0
         weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3] = 0.0, 0.0, 0.0, 0.0
         return
     r = 1 - t
-    weights[0, 0] = r * r * r / 6
-    weights[0, 1] = 2.0 / 3 - t * t * (1 - 0.5 * t)
-    weights[0, 2] = 2.0 / 3 - r * r * (1 - 0.5 * r)
-    weights[0, 3] = t * t * t / 6
     weights[1, 0] = -0.5 * r * r
     weights[1, 1] = t * (1.5 * t - 2)
     weights[1, 2] = r * (2 - 1.5 * r)
@@ -185,7 +181,7 @@ def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
 
 @inlined
 def cubic(t: float) -> Four:
-    """The first row of ``basis``."""
+    """Weights of the four coefficients around t, the first row of ``basis``: linear beyond the grid."""
     if t < 0.0 or t > 1.0:
         return 0.0, 1 - t, t, 0.0
     r = 1 - t

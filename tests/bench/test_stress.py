@@ -108,11 +108,11 @@ def test_the_judge_sees(fault: str, spoil: Any) -> None:
 
 def test_every_relaxation_of_an_insertion_knows_its_start() -> None:
     plan, wire, wall, _ = _solved()
-    plan.way, plan.depths, plan.rolls = "insertion", [6.0, 14.0, 20.0, 9.0], [0.0, 0.0, 40.0, 40.0]
+    plan.way, plan.depths, plan.rolls = "insertion", [4.0, 14.0, 20.0, 9.0], [0.0, 0.0, 40.0, 40.0]
     pairs = solve(plan, wire, wall)
     assert all(start >= solution.energy_N_mm > 0.0 for solution, start in pairs)
-    # a foreseen start is a good one: 4 % above its minimum here
-    assert pairs[0][1] > 1.01 * pairs[0][0].energy_N_mm
+    # so early that the step before foresees little of this one
+    assert pairs[0][1] > 1.1 * pairs[0][0].energy_N_mm
     solution, start = pairs[2]
     risen = replace(solution, energy_N_mm=start * (1 + 1e-6))
     assert judge(plan, wire, wall, risen, start, False).fault == "energy_rose"
