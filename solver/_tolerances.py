@@ -35,10 +35,21 @@ FIRST_DAMPING = 1e-3
 """Levenberg term tried first: holds a bend of 20 segments' length back by about its own stiffness."""
 LEAST_DAMPING = 1e-7
 """Levenberg term below which it is dropped."""
+SOFTER = 0.04
+"""Levenberg term tried next, over the last, where that held the wire so hard that no step was worth taking: the softest
+mode of k joints is k⁴ times softer than a joint, 4e-11 of it in 400 mm of wire in a sheath."""
 WORST_DAMPING = 1e9
 """Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
 SEARCHES = 6
 """Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
+FINE = 1e-5
+"""Fall foretold, over the energy, below which whole steps may lead uphill for a while: the shape hardly changes."""
+VENTURES = 8
+"""Whole steps that may lead uphill before the energy must be lower than where they began."""
+RISE = 0.01
+"""How far uphill they may lead, over the energy."""
+DARING = 3
+"""Failures in a row after which a relaxation tries them no more."""
 POLISHES = 20
 """Newton's steps beyond the energy's last place: where a stiff wall holds a long lever each may only halve the rest."""
 SLIP_MM = 1e-3
@@ -71,9 +82,16 @@ WORK_PER_ITERATION = 2_500
 """The same, for each of max_iterations on top: raising max_iterations must help."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
+UNMOVED = 1e-4
+"""Change of a joint in a step, over the largest one, below which the joints up to it are left alone for a while."""
+WORTHWHILE = 0.25
+"""Share of the joints that must be left alone for that to save more than looking at all of them again costs."""
 FORETOLD = 100.0
 """A step that fell by D + T where the model said D leaves a decrement of about 2 to 10 T²/D (from the third and
 fourth order of the energy): below a tenth of the tolerance the next sweep would only confirm it."""
+WORTH_FORESEEING = 0.5
+"""Energy of a foreseen start above that of the wire before the step, over the same of the slid one: with less to gain
+the last change is a guess, and costs sweeps (in a winding vessel at steps shorter than a segment 1.2 times as many)."""
 MOST_FORESEEN = 1.5
 """Longest step, over the one before, that starts with that step's change: further ahead it is a guess."""
 OVERSHOOT = 0.02

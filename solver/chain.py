@@ -105,6 +105,7 @@ class Buffers:
             weights=np.zeros((3, 3, 4)),
             start=np.zeros((capacity, 3)),
             change=change,
+            keep=np.zeros((capacity, 3)),
         )
         rubbing = points if self.friction else 0
         friction = Friction(

@@ -13,6 +13,7 @@ from solver._kernels.problem import (
     LEVENBERG,
     ROLLOUTS,
     ROLLS,
+    STILL,
     STRAIGHT,
     SWEEPS,
 )
@@ -28,6 +29,7 @@ NAMES = {
     "rolls_proven_idle": ROLLS,
     "sweeps_without_roll": STRAIGHT,
     "starts_foreseen": FORESEEN,
+    "joints_left_still": STILL,
 }
 
 

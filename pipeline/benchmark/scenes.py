@@ -123,6 +123,34 @@ def bend(depth_mm: float = 60.0, wall_stiffness: float = 1.0) -> BenchScene:
     return BenchScene("bend", why, depth_mm, wall_stiffness=wall_stiffness, distance=bend_distance, box=box)
 
 
+SHEATH_MM, MOUTH_MM = 400.0, 4.0
+"""Length of the sheath, and over how much of its end it opens into the vessel."""
+
+
+@cache
+def sheath(bore_mm: float = 0.25, wall_stiffness: float = 1.0) -> BenchScene:
+    """400 mm of straight sheath with little room in it, then scene B: 60 mm deep beyond its mouth."""
+
+    def distance(points: Array) -> Array:
+        z = points[..., 2]
+        t = np.clip((z + 0.5 * MOUTH_MM) / MOUTH_MM, 0.0, 1.0)
+        bore = bore_mm + (BEND_LUMEN_MM - bore_mm) * t * t * (3.0 - 2.0 * t)
+        tube = np.hypot(points[..., 0], points[..., 1]) - bore
+        return np.asarray(np.where(z < MOUTH_MM, tube, bend_distance(points)))
+
+    why = "a wire in a long sheath: what the tip meets dies out along it, and pushed hard the wire buckles in it"
+    box = ((-4.0, -3.0, -SHEATH_MM - 3.0), (BEND_TURN_MM + 4.0, 3.0, BEND_INLET_MM + BEND_TURN_MM + 6.0))
+    return BenchScene(
+        "sheath",
+        why,
+        SHEATH_MM + 60.0,
+        entry_mm=(0.0, 0.0, -SHEATH_MM),
+        wall_stiffness=wall_stiffness,
+        distance=distance,
+        box=box,
+    )
+
+
 @cache
 def cantilever(segments_load: float = 5.0) -> BenchScene:
     """Scene A: 200 mm, dead tip load with P L² / EI = 5: a closed form exists."""

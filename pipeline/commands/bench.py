@@ -73,7 +73,8 @@ def run_study(args: Namespace, chosen: Sequence[BenchScene]) -> None:
 
 def run_claims(args: Namespace) -> bool:
     """What the solver promises, measured; False where a promise is broken."""
-    from pipeline.benchmark.claims import Claim, claims
+    from pipeline.benchmark.claim import Claim
+    from pipeline.benchmark.claims import claims
 
     def tick(claim: Claim) -> None:
         verdict = {None: "", True: "met", False: "NOT MET"}[claim.met]

@@ -87,7 +87,7 @@ def advance(journey: Journey, to_depth: float, to_roll: float, laid: int) -> tup
             k = set_out(problem, cut, base, at, depth, roll, report, kept)
         outcome, used, energy = CONVERGED, 0, 0.0
         if k > 0:
-            start = foresee(problem, now, k, likeness(problem, at, depth, roll))
+            start = foresee(problem, now, k, likeness(problem, at, depth, roll), at[ENERGY])
             outcome, used, energy = settle(problem, start, k, orders, report)
             if start != now:
                 copy_state(problem, start, now, k)

@@ -19,18 +19,8 @@ from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import inlined, kernel, once
 from solver._kernels.joint import jacobian
-from solver._kernels.minimise import (
-    BROKEN,
-    CONVERGED,
-    EXHAUSTED,
-    MOMENT,
-    ROUND_OFF,
-    STALLED,
-    admissible,
-    largest_moment,
-    scale_of,
-    stiffest,
-)
+from solver._kernels.judge import MOMENT, ROUND_OFF, admissible, largest_moment, scale_of, stiffest
+from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
 from solver._kernels.newton import costate, sweep
 from solver._kernels.node import node_gradient
 from solver._kernels.problem import LOAD, ROLLOUTS, START, SWEEPS, Problem
@@ -132,7 +122,7 @@ def propose(problem: Problem, which: int, k: int, share: float) -> None:
 @kernel
 def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any) -> bool:
     """Whether a state is a minimum: no way down left in Newton's decrement, and no moment to speak of."""
-    minimal = sweep(problem, which, k, 0.0, report)
+    minimal = sweep(problem, which, 0 * k, k, 0.0, report)
     problem.scratch.counter[SWEEPS] += 1
     costate(problem, which, k, report)
     scale = scale_of(problem, which, k)
@@ -171,7 +161,7 @@ def minimise_closed_form(
         while share > SMALLEST:
             propose(problem, which, k, share)
             problem.scratch.counter[ROLLOUTS] += 1
-            trial = total_energy(problem, 1 - which, k)
+            trial = total_energy(problem, 1 - which, 0 * k, k)
             if trial <= energy and admissible(problem, which, k):
                 break
             trial = math.inf

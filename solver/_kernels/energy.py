@@ -15,12 +15,15 @@ from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, 
 
 
 @kernel
-def total_energy(problem: Problem, which: int, k: int) -> float:
-    """Total energy of a state, N mm; its parts go to the state. The wall is not asked where there is none."""
+def total_energy(problem: Problem, which: int, near: int, k: int) -> float:
+    """Total energy of a state, N mm; its parts go to the state. The wall is not asked where there is none.
+
+    Up to node ``near`` (0 for none) the two states agree, and what the wall said to the other one holds.
+    """
     state = problem.state
     parts = state.parts[which]
     parts[BENDING] = bending_energy(problem.chain, state.u[which], k)
-    parts[WALL] = wall_energy(problem, which, k) if problem.stiffness > 0.0 else 0.0
+    parts[WALL] = wall_energy(problem, which, near, k) if problem.stiffness > 0.0 else 0.0
     parts[LOAD] = load_energy(problem.chain, state.x[which], k)
     parts[RUBBING] = friction_energy(problem, which, k) if problem.friction.coefficient > 0.0 else 0.0
     return energy_of(parts)
@@ -62,9 +65,9 @@ def point_at(problem: Problem, which: int, n: int, p: int, q: Any) -> None:
 
 
 @kernel
-def wall_energy(problem: Problem, which: int, k: int) -> float:
-    """Eq. 6 and 7: look every point up and add its share, N mm."""
-    total = 0.0
+def wall_energy(problem: Problem, which: int, near: int, k: int) -> float:
+    """Eq. 6 and 7: look every point beyond node ``near`` up and add its share, N mm; take over the others."""
+    total = taken_over(problem, which, near) if near > 0 else 0.0
     # bound once: inside the loop every member would be taken out of the tuple again, with its reference count
     field, switch, chain, state = problem.field, problem.switch, problem.chain, problem.state
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
@@ -72,7 +75,7 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
     x, r, depth, anchor = state.x[which], state.r[which], state.depth[which], problem.scratch.anchor
     jet, weights = state.jet[which], problem.scratch.weights
     clear, cheap, full = 0, 0, 0
-    for n in range(1, k + 1):
+    for n in range(near + 1, k + 1):
         for p in range(first[n], first[n + 1]):
             q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
             o0, o1, o2 = offset[p, 0], offset[p, 1], offset[p, 2]
@@ -114,6 +117,26 @@ def wall_energy(problem: Problem, which: int, k: int) -> float:
     counter[CLEAR] += clear
     counter[CHEAP] += cheap
     counter[FULL] += full
+    return total
+
+
+@kernel
+def taken_over(problem: Problem, which: int, near: int) -> float:
+    """Wall energy of nodes 1 to ``near``, as the other state has it, N mm."""
+    chain, state, total = problem.chain, problem.state, 0.0
+    depth, jet, source, from_jet = (
+        state.depth[which],
+        state.jet[which],
+        state.depth[1 - which],
+        state.jet[1 - which],
+    )
+    for p in range(chain.first[1], chain.first[near + 1]):
+        d = source[p]
+        depth[p] = d
+        if d > 0.0:
+            total += 0.5 * problem.stiffness * chain.weight[p] * d * d
+            for a in range(10):
+                jet[p, a] = from_jet[p, a]
     return total
 
 

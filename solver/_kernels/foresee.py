@@ -5,18 +5,22 @@ A wire pushed on goes straight ahead of its tip into the wall and has to be bent
 
 from __future__ import annotations
 
+from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import kernel, once
 from solver._kernels.passage import crossed
 from solver._kernels.problem import FORESEEN, WALL, Problem
 from solver._kernels.rollout import copy_base, place
 
+WORTH_IT = tol.WORTH_FORESEEING
+
 
 @kernel
-def foresee(problem: Problem, which: int, k: int, share: float) -> int:
+def foresee(problem: Problem, which: int, k: int, share: float, last: float) -> int:
     """Return the state to start from: ``which``, or the other one, with a share of the last change, if it is lower.
 
     Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
+    last : energy of the wire before the step, N mm; what ``which`` has more must at least be halved.
     """
     state, scratch = problem.state, problem.scratch
     u, tried = state.u[which], state.u[1 - which]
@@ -24,12 +28,13 @@ def foresee(problem: Problem, which: int, k: int, share: float) -> int:
         for a in range(3):
             scratch.start[j, a] = u[j, a]
             tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
-    energy = total_energy(problem, which, k)
+    energy = total_energy(problem, which, 0 * k, k)
     if share == 0.0 or state.parts[which, WALL] == 0.0:
         return which
     copy_base(state, which, 1 - which)
     place(problem.chain, state, 1 - which, k)
-    if total_energy(problem, 1 - which, k) < energy and not crossed(problem, which, k):
+    better = total_energy(problem, 1 - which, 0 * k, k) - last < WORTH_IT * (energy - last)
+    if better and not crossed(problem, which, k):
         scratch.counter[FORESEEN] += 1
         return 1 - which
     return which

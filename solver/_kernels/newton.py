@@ -82,8 +82,8 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
 
 
 @kernel
-def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> bool:
-    """One backward Riccati recursion from the tip to the base; gains go to scratch.gain, see ``rollout``.
+def sweep(problem: Problem, which: int, near: int, k: int, damping: float, report: Any) -> bool:
+    """One backward Riccati recursion from the tip to joint ``near`` (0 is the base); gains go to scratch.gain.
 
     damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
     leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
@@ -93,13 +93,13 @@ def sweep(problem: Problem, which: int, k: int, damping: float, report: Any) -> 
     """
     if problem.straight:
         problem.scratch.counter[STRAIGHT] += 1
-        return sweep_straight(problem, which, k, damping, report)
+        return sweep_straight(problem, which, near, k, damping, report)
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
     p, c, h, f, g = ZERO6, ZERO9, ZERO6, ZERO3, ZERO3
     decrement = 0.0
     report[2] = -1.0
-    for n in range(k, 0, -1):
+    for n in range(k, near, -1):
         j = n - 1
         frame = load9(state.r[which, n])
         df, dg = node_gradient(problem, which, n, frame)

@@ -8,8 +8,8 @@ from solver._kernels.layout import Chain
 from solver._kernels.spline import Field
 
 # places in the work counters
-FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, FORESEEN, SPENT = range(11)
-COUNTERS = 11
+FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, FORESEEN, STILL, SPENT = range(12)
+COUNTERS = 12
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 # places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``
@@ -36,7 +36,7 @@ class Scratch(NamedTuple):
     """Work space: gains (k, 3, 7), anchors (p, 4) for the clearance skip, counters, spline weights, a 3-vector.
 
     start : (k, 3) controls that the step began with, rad.     change : (k, 3) what relaxing them added in the last
-    step, from the tip inwards, rad.
+    step, from the tip inwards, rad.     keep : (k, 3) controls to come back to, rad.
     """
 
     gain: Any
@@ -46,6 +46,7 @@ class Scratch(NamedTuple):
     weights: Any
     start: Any
     change: Any
+    keep: Any
 
 
 class Switch(NamedTuple):
@@ -54,7 +55,7 @@ class Switch(NamedTuple):
     clearance : no look-up for a point that moved less than its clearance.     cheap : trilinear look-up first.
     idle : the rest shape is the answer where it touches nothing.     roll : of a straight round wire is no step.
     direction : of a straight round wire is its state, without the roll of its frames.     foresight : begin a step
-    with the change that the last one made.
+    with the change that the last one made.     window : leave the part near the base that no longer moves.
     """
 
     clearance: bool = True
@@ -63,6 +64,7 @@ class Switch(NamedTuple):
     roll: bool = True
     direction: bool = True
     foresight: bool = True
+    window: bool = True
 
 
 class Friction(NamedTuple):

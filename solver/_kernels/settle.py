@@ -49,7 +49,7 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
     counter, cost = problem.scratch.counter, k + problem.chain.first[k + 1]
     for _ in range(ROUNDS):
         if rubs:
-            total_energy(problem, which, k)
+            total_energy(problem, which, 0 * k, k)
         limit = min(orders.max_iterations, max(orders.work - counter[SPENT], 0) // cost)
         if orders.closed_form:
             result = minimise_closed_form(problem, which, k, orders.tolerance, limit, report)

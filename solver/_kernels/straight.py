@@ -59,14 +59,14 @@ def block(bend: float, u: Pair, jac: Six, h: Three, g: Pair, b: float, db: float
 
 
 @kernel
-def sweep_straight(problem: Problem, which: int, k: int, damping: float, report: Any) -> bool:
+def sweep_straight(problem: Problem, which: int, near: int, k: int, damping: float, report: Any) -> bool:
     """``newton.sweep`` of a straight wire; same arguments, gains, report and result."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     bend, length, r, controls = chain.bend, chain.length, state.r[which], state.u[which]
     p, c, h, f, g = ZERO6, ZERO6, ZERO3, ZERO3, (0.0, 0.0)
     decrement = 0.0
     report[2] = -1.0
-    for n in range(k, 0, -1):
+    for n in range(k, near, -1):
         j = n - 1
         frame = load9(r[n])
         df, dg = node_gradient(problem, which, n, frame)

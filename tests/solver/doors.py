@@ -14,7 +14,7 @@ door = numba.njit(**FAST)
 
 @door
 def total_energy(problem: Any, which: int, k: int) -> float:
-    return energy.total_energy(problem, which, k)
+    return energy.total_energy(problem, which, 0, k)
 
 
 @door
@@ -24,7 +24,7 @@ def place(chain: Any, state: Any, which: int, k: int) -> None:
 
 @door
 def sweep(problem: Any, which: int, k: int, damping: float, report: Any) -> bool:
-    return newton.sweep(problem, which, k, damping, report)
+    return newton.sweep(problem, which, 0, k, damping, report)
 
 
 @door

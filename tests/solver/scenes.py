@@ -23,6 +23,15 @@ def bend_distance(points: ArrayLike, radius: float = 30.0, inlet: float = 30.0, 
     return np.where(z < 0, np.hypot(x, y), np.where(x > radius, outlet, ring)) - lumen
 
 
+def sheath_distance(points: ArrayLike, bore: float) -> Array:
+    """A straight sheath along +z that opens within 4 mm about z = 0 into the inlet of the bend."""
+    p = np.asarray(points, dtype=np.float64)
+    z = p[..., 2]
+    t = np.clip((z + 2.0) / 4.0, 0.0, 1.0)
+    tube = np.hypot(p[..., 0], p[..., 1]) - (bore + (2.0 - bore) * t * t * (3.0 - 2.0 * t))
+    return np.where(z < 4.0, tube, bend_distance(p))
+
+
 def tube_distance(points: ArrayLike, lumen: float = 2.0) -> Array:
     """A straight tube along z."""
     p = np.asarray(points, dtype=np.float64)
@@ -56,6 +65,13 @@ def sampled(
 def bend_grid(spacing: float = 0.3, dtype: str = "float32") -> Grid:
     """The bend of radius 30 mm, inlet 30 mm, lumen radius 2 mm."""
     return sampled(bend_distance, spacing, (-5.0, -5.0, -5.0), (55.0, 5.0, 65.0), dtype)
+
+
+@cache
+def sheath_grid(bore: float, length: float) -> Grid:
+    """The bend behind a sheath of this bore radius and length, mm."""
+    low, high = (-4.0, -3.0, -length - 3.0), (34.0, 3.0, 66.0)
+    return sampled(lambda p: sheath_distance(p, bore), 0.3, low, high, "float32")
 
 
 @cache

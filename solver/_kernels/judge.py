@@ -1,0 +1,82 @@
+"""When a state counts as a minimum: what its energy, moments and rounding are measured by."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels.flags import kernel
+from solver._kernels.layout import Chain
+from solver._kernels.passage import crossed
+from solver._kernels.problem import BENDING, LOAD, RUBBING, WALL, Problem
+
+ROUND_OFF = tol.ROUND_OFF
+FLOOR = tol.ENERGY_FLOOR_ANGLE**2
+FLOOR_ANGLE = tol.ENERGY_FLOOR_ANGLE
+MOMENT = tol.MOMENT
+
+
+@kernel
+def scale_of(problem: Problem, which: int, k: int) -> float:
+    """The energy that tolerances are relative to, N mm."""
+    parts = problem.state.parts[which]
+    return float(parts[BENDING] + parts[WALL] + parts[RUBBING] + FLOOR * stiffest(problem.chain, k))
+
+
+@kernel
+def noise_of(problem: Problem, which: int, k: int) -> float:
+    """Energy below which a difference is rounding, N mm."""
+    return float(ROUND_OFF * (scale_of(problem, which, k) + abs(problem.state.parts[which, LOAD])))
+
+
+@kernel
+def stiffest(chain: Chain, k: int) -> float:
+    """Largest joint stiffness, N mm/rad."""
+    largest = 0.0
+    for j in range(k):
+        largest = max(largest, chain.bend[j])
+    return largest
+
+
+@kernel
+def largest_moment(chain: Chain, u: Any, k: int) -> float:
+    """Largest bending moment in the wire, N mm, with a floor."""
+    largest = 0.0
+    for j in range(k):
+        largest = max(largest, chain.bend[j] * max(abs(u[j, 0]), abs(u[j, 1]), FLOOR_ANGLE))
+    return largest
+
+
+@kernel
+def admissible(problem: Problem, which: int, k: int) -> bool:
+    """Whether the trial state can be reached from the current one without passing through a wall."""
+    return problem.stiffness == 0.0 or not crossed(problem, which, k)
+
+
+@kernel
+def unloaded(chain: Chain, k: int) -> bool:
+    """No dead load on any joint."""
+    for n in range(k + 1):
+        if chain.load[n, 0] != 0.0 or chain.load[n, 1] != 0.0 or chain.load[n, 2] != 0.0:
+            return False
+    return True
+
+
+@kernel
+def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
+    """Whether the residual moments that ``costate`` left are nothing beside the moments in the wire."""
+    return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
+
+
+@kernel
+def rounding_moment(problem: Problem, which: int, k: int) -> float:
+    """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
+    chain, depth = problem.chain, problem.state.depth
+    force, lever = 0.0, 0.0
+    for n in range(1, k + 1):
+        lever += chain.length[n - 1]
+        for a in range(3):
+            force += abs(chain.load[n, a])
+        for i in range(chain.first[n], chain.first[n + 1]):
+            force += problem.stiffness * chain.weight[i] * depth[which, i]
+    return ROUND_OFF * force * lever
