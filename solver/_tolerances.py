@@ -48,8 +48,6 @@ VENTURES = 8
 """Whole steps that may lead uphill before the energy must be lower than where they began."""
 RISE = 0.01
 """How far uphill they may lead, over the energy."""
-DARING = 3
-"""Failures in a row after which a relaxation tries them no more."""
 POLISHES = 20
 """Newton's steps beyond the energy's last place: where a stiff wall holds a long lever each may only halve the rest."""
 SLIP_MM = 1e-3

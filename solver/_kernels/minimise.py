@@ -22,7 +22,6 @@ LEAST_DAMPING = tol.LEAST_DAMPING
 WORST_DAMPING = tol.WORST_DAMPING
 SOFTER = tol.SOFTER
 SEARCHES = tol.SEARCHES
-DARING = tol.DARING
 FINE = tol.FINE
 FORETOLD = tol.FORETOLD
 
@@ -36,7 +35,7 @@ def minimise(
     Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
     ``costate``, at the result.
     """
-    damping, last, patience, settled, daring = 0.0, FIRST_DAMPING, 0, 0, DARING
+    damping, last, patience, settled = 0.0, FIRST_DAMPING, 0, 0
     state, counter = problem.state, problem.scratch.counter
     energy = energy_of(state.parts[which])
     report[START] = energy
@@ -85,12 +84,11 @@ def minimise(
         if definite:
             trial = search(problem, which, near, k, 1.0, 1, energy, report[0])
             if trial == math.inf:
-                if damping == 0.0 and near == 0 and daring > 0 and report[0] <= FINE * scale:
+                if damping == 0.0 and near == 0 and report[0] <= FINE * scale:
                     there, trial = venture(problem, which, k, energy, report[0], report)
                     if trial < math.inf:
-                        which, energy, daring = there, trial, DARING
+                        which, energy = there, trial
                         continue
-                    daring -= 1
                 trial = search(problem, which, near, k, 0.4, SEARCHES - 1, energy, report[0])
         elif damping == 0.0:
             costate(problem, which, k, report)
