@@ -82,14 +82,14 @@ def minimise(
             continue
         trial = math.inf
         if definite:
-            trial = search(problem, which, near, k, 1.0, 1, energy, report[0])
+            trial = search(problem, which, near, k, 1.0, energy, report[0])
             if trial == math.inf:
                 if damping == 0.0 and near == 0 and report[0] <= FINE * scale:
                     there, trial = venture(problem, which, k, energy, report[0], report)
                     if trial < math.inf:
                         which, energy = there, trial
                         continue
-                trial = search(problem, which, near, k, 0.4, SEARCHES - 1, energy, report[0])
+                trial = search(problem, which, near, k, 0.4, energy, report[0])
         elif damping == 0.0:
             costate(problem, which, k, report)
             if at_rest(problem, which, k, report):

@@ -32,18 +32,11 @@ def step(problem: Problem, which: int, near: int, k: int, fraction: float) -> fl
 
 @kernel
 def search(
-    problem: Problem,
-    which: int,
-    near: int,
-    k: int,
-    fraction: float,
-    tries: int,
-    energy: float,
-    decrement: float,
+    problem: Problem, which: int, near: int, k: int, fraction: float, energy: float, decrement: float
 ) -> float:
-    """Shorten Newton's step until the energy falls enough; return the new energy, or inf when it never does."""
+    """Try Newton's whole step, or shorten it until the energy falls enough; return the new energy, or inf."""
     noise = noise_of(problem, which, k)
-    for _ in range(tries):
+    for _ in range(1 if fraction == 1.0 else SEARCHES - 1):
         trial = step(problem, which, near, k, fraction)
         enough = trial <= energy - SUFFICIENT * fraction * decrement
         if (enough or (decrement <= noise and trial <= energy)) and admissible(problem, which, k):
