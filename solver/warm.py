@@ -7,15 +7,26 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, cast
 
+import numba
 import numpy as np
 
+from solver._kernels.advance import lay_along
+from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.follow import follow
+from solver._kernels.forces import contact_forces, push_force
+from solver._kernels.minimise import minimise
 from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.relax import Settings, buffers_for
 from solver.wall import VesselWall
 from solver.wire import GuideWire
+
+untyped: Any = numba
+typeof = untyped.typeof
+WHOLE, REAL = numba.int64, numba.float64
+REPORT, FORCES = typeof(np.zeros(1)), typeof(np.zeros((1, 3)))
 
 
 @contextmanager
@@ -33,15 +44,36 @@ def no_collection() -> Iterator[None]:
 def warm_up(*, beside: bool = False) -> None:
     """Compile every kernel (about half a minute, once per installation; later calls read the cache).
 
-    beside : what does not relax a wire is compiled by a process of its own, at the same time.
+    beside : all but the minimiser and the way to a depth is compiled by a process of its own, at the same time.
     """
     with no_collection():
-        if not beside:
+        if not beside or untyped.config.DISABLE_JIT:
+            _insert()
             _lesser_doors()
-            _insert()
             return
-        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm._lesser_doors()"]):
+        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_the_rest()"]):
+            insertion = Insertion(_wire(), None, [0, 0, 0], [0, 0, 1])
+            problem = typeof(insertion.buffers.problem)
+            # while the other process makes what ``advance`` needs besides
+            cast(Any, minimise).compile((problem, WHOLE, WHOLE, REAL, WHOLE, REPORT))
             _insert()
+
+
+def compile_the_rest() -> None:
+    """Kernels that are kept on disk and can wait there for ``advance``, then the lesser doors."""
+    with no_collection():
+        insertion = Insertion(_wire(), None, [0, 0, 0], [0, 0, 1])
+        problem, cut, base = (
+            typeof(part) for part in (insertion.buffers.problem, insertion.buffers.cut, insertion.base)
+        )
+        for part, types in (
+            (minimise_closed_form, (problem, WHOLE, WHOLE, REAL, WHOLE, REPORT)),
+            (lay_along, (problem, cut, base, WHOLE, WHOLE, REAL, REAL)),
+            (contact_forces, (problem, WHOLE, FORCES)),
+            (push_force, (problem, cut, WHOLE, REPORT)),
+        ):
+            cast(Any, part).compile(types)
+        _lesser_doors()
 
 
 def _wire() -> GuideWire:
@@ -49,7 +81,7 @@ def _wire() -> GuideWire:
 
 
 def _insert() -> None:
-    """The way to a depth, nine tenths of it all; a wall has no types of its own."""
+    """The way to a depth; a wall has no types of its own."""
     for _ in Insertion(_wire(), None, [0, 0, 0], [0, 0, 1]).to_depths([1.0]):
         pass
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver import _tolerances as tol
 from solver._kernels.energy import hold
-from solver._kernels.flags import door, inlined, kernel, once
+from solver._kernels.flags import door, inlined, kept, kernel, once
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.foresee import foresee, note_change
@@ -201,7 +201,7 @@ def clamp(problem: Problem, base: Base, roll: float) -> None:
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, base.frame[a, 2]
 
 
-@kernel
+@kept
 def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: float, ahead: float) -> None:
     """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
     chain, state = problem.chain, problem.state

@@ -17,7 +17,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import inlined, kernel, once
+from solver._kernels.flags import inlined, kept, kernel, once
 from solver._kernels.joint import jacobian
 from solver._kernels.judge import MOMENT, ROUND_OFF, admissible, largest_moment, scale_of, stiffest
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
@@ -134,7 +134,7 @@ def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any)
     return bool(report[1] <= max(share * largest_moment(problem.chain, problem.state.u[which], k), nothing))
 
 
-@kernel
+@kept
 def minimise_closed_form(
     problem: Problem, which: int, k: int, tolerance: float, max_sweeps: int, report: Any
 ) -> tuple[int, int, int, float]:

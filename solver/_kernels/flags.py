@@ -48,6 +48,8 @@ def _within(**how: Any) -> Callable[[F], F]:
 
 # For what other kernels call.
 kernel = _within()
+# For what another process can compile meanwhile: kept on disk as well.
+kept = _within(cache=True)
 # For what is called per joint or per point: the tuples it takes never leave the registers.
 inlined = _within(forceinline=True)
 # For a part of one other kernel: merged into it before anything is compiled, or it would be compiled twice.
