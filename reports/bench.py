@@ -1,6 +1,6 @@
 """The page of a benchmark: run time against error, the settings to use, and the outcomes of a stress study.
 
-Reads two tidy CSV files; what they hold in excess of the named columns is kept in the tables of the page.
+Reads tidy CSV files; what they hold in excess of the named columns is kept in the tables of the page.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pandas as pd
 
 from reports._format import number
 from reports._pages import write_page
-from reports.figures.benchmark import BenchFiles, convergence, pareto, stress_outcomes
+from reports.figures.benchmark import BenchFiles, convergence, orders, pareto, stress_outcomes
 from reports.schema import Column
 from reports.sections import draw_sections
 from reports.tables import empty_table, read_table, write_table
@@ -40,19 +40,46 @@ STRESS_COLUMNS: tuple[Column, ...] = (
     Column("seconds_max", "s", "processor time of the slowest scene"),
     Column("slowest", "-", "number of that scene", "integer"),
 )
-BENCH_FIGURES = {"pareto": pareto, "convergence": convergence, "stress_outcomes": stress_outcomes}
+CLAIM_COLUMNS: tuple[Column, ...] = (
+    Column("claim", "-", "what is promised", "text"),
+    Column("value", "1", "what was measured, in the row's unit"),
+    Column("unit", "-", "unit of the value", "text"),
+    Column("aim", "-", "what it should be, empty where it is only reported", "text"),
+    Column("met", "-", "whether it is", "boolean"),
+)
+ORDER_COLUMNS: tuple[Column, ...] = (
+    Column("against", "-", "scene and error: what was made smaller, with its unit", "text"),
+    Column("size", "mm", "how large it was"),
+    Column("error", "-", "the error there, in the row's unit", "float", "low"),
+    Column("unit", "-", "unit of the error", "text"),
+    Column("order", "1", "slope of the logarithms over all its rows"),
+    Column("aim", "-", "what the order should be", "text"),
+)
+BENCH_FIGURES = {
+    "pareto": pareto,
+    "convergence": convergence,
+    "orders": orders,
+    "stress_outcomes": stress_outcomes,
+}
 TARGETS_MM = (0.1, 0.01)
 
 
 def render_bench(
-    bench_csv: Path, out_dir: Path, stress_csv: Path | None = None, note: str = "", embed: bool = False
+    bench_csv: Path,
+    out_dir: Path,
+    stress_csv: Path | None = None,
+    claims_csv: Path | None = None,
+    orders_csv: Path | None = None,
+    *,
+    note: str = "",
+    embed: bool = False,
 ) -> Path:
     """Draw the figures and write bench.html into ``out_dir``; returns its path.
 
     note : what the reader must know of machine and reference. Also writes recommended.csv: the fastest setting of
     each scene whose shape error is at most 0.1 mm and 0.01 mm.
     """
-    bench = read_bench(bench_csv, stress_csv)
+    bench = read_bench(bench_csv, stress_csv, claims_csv, orders_csv)
     best = recommended(bench.rows)
     write_table(out_dir / "recommended.csv", best)
     counts = bench.stress.groupby(["axis", "outcome"], sort=False)["count"].sum().reset_index()
@@ -61,6 +88,7 @@ def render_bench(
         "note": note,
         "sections": draw_sections("bench", BENCH_FIGURES, bench, out_dir, embed),
         "recommended": _grid(best) if len(best) else None,
+        "claims": _claims(bench.claims) if len(bench.claims) else None,
         "rows": _grid(bench.rows.drop(columns="on_front")),
         "stress": _grid(_crosstab(counts)) if len(counts) else None,
         "stress_numbers": _numbers(bench.stress),
@@ -69,17 +97,29 @@ def render_bench(
     return write_page("bench.html.j2", page, out_dir / "bench.html")
 
 
-def read_bench(bench_csv: Path, stress_csv: Path | None = None) -> BenchFiles:
-    """Read the rows of a benchmark, marking the Pareto front of each scene, and the stress outcomes if any."""
+def read_bench(
+    bench_csv: Path,
+    stress_csv: Path | None = None,
+    claims_csv: Path | None = None,
+    orders_csv: Path | None = None,
+) -> BenchFiles:
+    """Read the rows of a benchmark, marking the Pareto front of each scene, and what else there is of it."""
     rows = _numeric(read_table(bench_csv, BENCH_COLUMNS))
     rows["on_front"] = False
     for _, mine in rows.groupby("scene", sort=False):
         rows.loc[mine.index, "on_front"] = pareto_front(
             mine["shape_error_mm"].to_numpy(), mine["ms_per_mm"].to_numpy()
         )
-    stress = read_table(stress_csv, STRESS_COLUMNS) if stress_csv else empty_table(STRESS_COLUMNS)
+    stress, claims, points = (
+        read_table(path, columns) if path else empty_table(columns)
+        for path, columns in (
+            (stress_csv, STRESS_COLUMNS),
+            (claims_csv, CLAIM_COLUMNS),
+            (orders_csv, ORDER_COLUMNS),
+        )
+    )
     stress["count"] = stress["count"].fillna(1).astype(int)
-    return BenchFiles(rows, stress)
+    return BenchFiles(rows, stress, claims, points)
 
 
 def pareto_front(
@@ -143,8 +183,18 @@ def _numbers(stress: pd.DataFrame) -> dict[str, Any] | None:
     return _grid(whole) if len(whole) and whole["iterations_max"].notna().any() else None
 
 
+def _claims(claims: pd.DataFrame) -> dict[str, Any]:
+    """The table of promises; a broken one is marked."""
+    words = {True: "met", False: "NOT MET"}
+    verdicts = ["" if pd.isna(met) else words[bool(met)] for met in claims["met"]]
+    grid = _grid(claims.assign(met=pd.array(verdicts, dtype="string")).fillna({"aim": ""}))
+    for row, verdict in zip(grid["rows"], verdicts, strict=True):
+        row["bad"] = verdict == words[False]
+    return grid
+
+
 def _grid(table: pd.DataFrame) -> dict[str, Any]:
-    meanings = {c.name: c.meaning for c in (*BENCH_COLUMNS, *STRESS_COLUMNS)}
+    meanings = {c.name: c.meaning for c in (*BENCH_COLUMNS, *STRESS_COLUMNS, *CLAIM_COLUMNS)}
     kept = [str(c) for c in table.columns if table[c].notna().any()]
     text = {c: not pd.api.types.is_numeric_dtype(table[c]) for c in kept}
     heads = [{"name": c, "meaning": meanings.get(c, ""), "text": text[c]} for c in kept]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
@@ -11,14 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from pipeline.benchmark import scenes
 from pipeline.benchmark.claim import Claim
 from pipeline.benchmark.clock import timed
-from pipeline.benchmark.errors import resampled, shape_error
 from pipeline.benchmark.insert import Run, Setting, insert
-from pipeline.benchmark.reference import Reference, reference
+from pipeline.benchmark.orders import SOFT, errors_of, orders, voxel_order
+from pipeline.benchmark.reference import reference
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.benchmark.skips import skips
 from solver import Insertion
@@ -31,24 +29,19 @@ SUB_STEPS = (1, 2, 3, 4, 8)
 def claims(
     studies: Sequence[Callable[[], Iterator[Claim]]] | None = None,
     tick: Callable[[Claim], None] = lambda _: None,
-) -> pd.DataFrame:
-    """Measure everything: claim, value, unit, aim, met."""
-    rows = []
+) -> list[Claim]:
+    """Measure everything, or the studies given."""
+    found = []
     for measure in studies or STUDIES:
         for claim in measure():
-            rows.append(vars(claim))
+            found.append(claim)
             tick(claim)
-    return pd.DataFrame(rows)
-
-
-def _soft_bend(depth_mm: float = 100.0) -> BenchScene:
-    """The bend of the order plots: 100 mm of wire, wall 0.1 N/mm²."""
-    return scenes.bend(depth_mm, 0.1)
+    return found
 
 
 def step_time() -> Iterator[Claim]:
     """A 1 mm step at 200 joints in the bend, and what four times the joints cost."""
-    scene, seconds = _soft_bend(), {}
+    scene, seconds = scenes.bend(100.0, SOFT), {}
     wall = scene.wall()
     for joints in (200, 400, 800):
         seconds[joints] = min(_last_steps(scene, wall, 100.0 / joints) for _ in range(3))
@@ -74,7 +67,7 @@ def _last_steps(scene: BenchScene, wall: Any, segment_mm: float, steps: int = 20
 
 def against_closed_form() -> Iterator[Claim]:
     """The seed's method against Newton's, both to the same energy."""
-    scene = _soft_bend(60.0)
+    scene = scenes.bend(60.0, SOFT)
     wall = scene.wall()
     common = {"segment_mm": 1.0, "quadrature": "joints"}
     fast, newton = timed(lambda: insert(scene, Setting(**common), wall))  # type: ignore[arg-type]
@@ -103,77 +96,10 @@ def scene_b() -> Iterator[Claim]:
     """Shape error at 60 joints on a soft and on a hard wall."""
     for stiffness in (1.0, 100.0):
         scene = scenes.bend(60.0, stiffness)
-        rms, tip, _ = _error(scene, 1.0, reference(scene))
+        rms, tip, _ = errors_of(scene, 1.0, reference(scene))
         name = f"scene B, 60 joints, wall {stiffness:g} N/mm²: RMS shape error"
         yield Claim(name, rms, "mm", f"at most {PEERS_RMS_MM / 3:.4f}", rms <= PEERS_RMS_MM / 3)
         yield Claim(f"scene B, 60 joints, wall {stiffness:g} N/mm²: tip error", tip, "mm")
-
-
-def _error(
-    scene: BenchScene, segment_mm: float, limit: Reference, **setting: Any
-) -> tuple[float, float, float]:
-    """RMS and tip error, mm, and relative energy error (inf where the depth is not reached)."""
-    run = insert(scene, Setting(segment_mm, **setting))
-    if not run.reached:
-        return math.inf, math.inf, math.inf
-    points = resampled(run.joints_mm, run.arcs_mm, limit.arcs_mm)
-    return *shape_error(points, limit.points_mm), abs(run.energy_N_mm / limit.energy_N_mm - 1.0)
-
-
-def orders() -> Iterator[Claim]:
-    """Errors against segment length: free, in the soft bend, and with the tip in contact."""
-    free = scenes.cantilever()
-    yield from _order(
-        "free cantilever, tip", free, (10.0, 5.0, 2.5), 1, lambda p: abs(p - 2) <= 0.05, "2.00 ± 0.05"
-    )
-    soft = _soft_bend()
-    limit = reference(soft)
-    yield from _order(
-        "soft bend, energy", soft, (5.0, 2.5, 1.25), 2, lambda p: p >= 1.9, "at least 1.9", limit
-    )
-    tip = _error(soft, 2.5, limit)[1]
-    yield Claim("soft bend, tip error at 2.5 mm segments", tip, "mm", "at most 0.01", tip <= 0.01)
-    hard = scenes.bend(60.0)
-    yield from _order("scene B, shape", hard, (2.0, 1.0, 0.5), 0, lambda p: p >= 1.8, "at least 1.8")
-    yield from _order("scene B, energy", hard, (2.0, 1.0, 0.5), 2, lambda p: p >= 1.8, "at least 1.8")
-
-
-def _order(
-    name: str,
-    scene: BenchScene,
-    segments: tuple[float, ...],
-    which: int,
-    good: Callable[[float], bool],
-    aim: str,
-    limit: Reference | None = None,
-) -> Iterator[Claim]:
-    """Observed order over a range of segment lengths, by a straight line through the logarithms."""
-    limit = limit or reference(scene)
-    found = [_error(scene, s, limit)[which] for s in segments]
-    order = float(np.polyfit(np.log(segments), np.log(np.maximum(found, 1e-300)), 1)[0])
-    yield Claim(f"order of the {name} over {segments} mm", order, "1", aim, good(order))
-
-
-VOXELS_MM = (0.8, 0.4, 0.2, 0.1)
-"""Sizes of the wall's voxels; the finest one is the limit."""
-
-
-def voxel_order() -> Iterator[Claim]:
-    """Errors against the voxel size of scene B's wall, on grids off its lattice: the tube is exact, its ends bend.
-
-    The lumen's curvature jumps where the bend begins and ends, so the fourth order of cubic splines is not reached.
-    """
-    scene, found = scenes.bend(60.0), []
-    low, high = scene.box or ((), ())
-    for voxel in VOXELS_MM:
-        shifted = tuple(float(a) - OFF_LATTICE * voxel for a in low)
-        wall = scene.with_(box=(shifted, high), grids={}).wall(voxel_mm=voxel)
-        found.append(insert(scene, Setting(0.5, tolerance=1e-13), wall).joints_mm)
-    errors = [shape_error(points, found[-1])[0] for points in found[:-1]]
-    order = float(np.polyfit(np.log(VOXELS_MM[:-1]), np.log(errors), 1)[0])
-    sizes = ", ".join(f"{v:g}" for v in VOXELS_MM[:-1])
-    yield Claim(f"order in the wall's voxel size over {sizes} mm, scene B, shape", order, "1", "reported")
-    yield Claim("scene B, 120 joints, voxels of 0.4 mm: RMS shape error by the voxels", errors[1], "mm")
 
 
 def in_a_sheath() -> Iterator[Claim]:
@@ -189,8 +115,6 @@ def in_a_sheath() -> Iterator[Claim]:
 
 SHEATHS = ((0.25, 1.0), (0.3, 1.0), (0.5, 1.0), (0.3, 100.0), (0.5, 100.0))
 """Bore radius, mm, and wall stiffness, N/mm². The wire's own radius is 0.18 mm."""
-OFF_LATTICE = 0.37
-"""Of a voxel: a node on the axis of the tube would be luck."""
 
 COLD = """
 from time import perf_counter, process_time

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pandas as pd
 
+from pipeline.benchmark.claim import Claim
 from pipeline.provenance import collect
-from reports.bench import BENCH_COLUMNS, recommended, render_bench
+from reports.bench import BENCH_COLUMNS, ORDER_COLUMNS, recommended, render_bench
 
 SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"
-CLAIMS_CSV, STRESS_CSV, SCENES_CSV = "claims.csv", "stress.csv", "stress_scenes.csv"
+CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
+STRESS_CSV, SCENES_CSV = "stress.csv", "stress_scenes.csv"
 TARGETS_MM = (0.1, 0.01)
 
 
@@ -36,14 +38,35 @@ def note() -> str:
     )
 
 
+def write_claims(found: Sequence[Claim], out: Path) -> None:
+    """claims.csv, a row a claim, and orders.csv, a row for each point that an order was fitted to."""
+    kept = ("claim", "value", "unit", "aim", "met")
+    pd.DataFrame([{name: getattr(c, name) for name in kept} for c in found]).to_csv(
+        out / CLAIMS_CSV, index=False
+    )
+    points = [
+        {
+            "against": c.against,
+            "size": size,
+            "error": error,
+            "unit": c.error_unit,
+            "order": c.value,
+            "aim": c.aim,
+        }
+        for c in found
+        for size, error in zip(c.sizes, c.errors, strict=True)
+    ]
+    pd.DataFrame(points, columns=[c.name for c in ORDER_COLUMNS]).to_csv(out / ORDERS_CSV, index=False)
+
+
 def write_page(out: Path) -> Path:
     """Join what lies in the folder into bench.csv and render it."""
     parts = [pd.read_csv(out / name) for name in (SOLVER_CSV, PEERS_CSV) if (out / name).exists()]
     empty = pd.DataFrame(columns=[c.name for c in BENCH_COLUMNS])
     table = pd.concat(parts, ignore_index=True) if parts else empty
     table.to_csv(out / BENCH_CSV, index=False)
-    stress = out / STRESS_CSV
-    return render_bench(out / BENCH_CSV, out, stress if stress.exists() else None, note())
+    others = [out / name if (out / name).exists() else None for name in (STRESS_CSV, CLAIMS_CSV, ORDERS_CSV)]
+    return render_bench(out / BENCH_CSV, out, *others, note=note())
 
 
 def advice(rows: pd.DataFrame) -> Iterator[str]:

@@ -82,9 +82,9 @@ def run_claims(args: Namespace) -> bool:
             f"{claim.claim}: {claim.value:.4g} {claim.unit if claim.unit != '1' else ''} [{claim.aim}] {verdict}"
         )
 
-    table = claims(tick=tick)
-    table.to_csv(args.out / outputs.CLAIMS_CSV, index=False)
-    return not bool((table["met"] == False).any())  # noqa: E712  (None is no verdict)
+    found = claims(tick=tick)
+    outputs.write_claims(found, args.out)
+    return all(claim.met is not False for claim in found)
 
 
 def run_stress_study(args: Namespace) -> bool:

@@ -36,10 +36,15 @@ _MAX_COLUMNS = 3
 
 @dataclass(frozen=True, eq=False)
 class BenchFiles:
-    """rows: one row per scene, method and setting, with ``on_front``; stress: one row per axis and outcome."""
+    """rows: one row per scene, method and setting, with ``on_front``; stress: one row per axis and outcome.
+
+    claims: one row per promise, measured; orders: one row per point that an order of convergence was fitted to.
+    """
 
     rows: pd.DataFrame
     stress: pd.DataFrame
+    claims: pd.DataFrame
+    orders: pd.DataFrame
 
 
 def pareto(bench: BenchFiles) -> Drawing | None:
@@ -96,6 +101,27 @@ def convergence(bench: BenchFiles) -> Drawing | None:
         _log_axes(axes)
     _method_legend(figure, panels)
     return Drawing(figure, best)
+
+
+def orders(bench: BenchFiles) -> Drawing | None:
+    """Errors against what was made smaller, and the line whose slope is the order of convergence."""
+    if bench.orders.empty:
+        return None
+    rows = bench.orders.rename(columns={"against": "scene"})
+    figure, panels = _panels(rows)
+    for axes, (against, mine) in zip(panels, rows.groupby("scene", sort=False), strict=False):
+        title, _, size = str(against).partition(": ")
+        order, aim, unit = mine["order"].iloc[0], mine["aim"].iloc[0], mine["unit"].iloc[0]
+        sizes, errors = mine["size"].to_numpy(float), mine["error"].to_numpy(float)
+        level = np.exp(np.mean(np.log(errors) - order * np.log(sizes)))
+        axes.plot(sizes, errors, "o", color=BLUE, markersize=5, label="measured")
+        axes.plot(sizes, level * sizes**order, ":", color="0.4", linewidth=1.0, label="fitted order")
+        axes.set_title(f"{title}\norder {order:.3f} (aim: {aim})", loc="left", fontsize=9)
+        axes.set_xlabel(size)
+        axes.set_ylabel("error, mm" if unit == "mm" else "relative error")
+        _log_axes(axes)
+    _method_legend(figure, panels)
+    return Drawing(figure, bench.orders)
 
 
 def stress_outcomes(bench: BenchFiles) -> Drawing | None:

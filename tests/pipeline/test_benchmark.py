@@ -11,9 +11,11 @@ import pytest
 from scipy.optimize import check_grad
 
 from pipeline.benchmark import outputs, scenes, statics
+from pipeline.benchmark.claim import Claim
 from pipeline.benchmark.clock import timed
 from pipeline.benchmark.errors import arc_samples, resampled, shape_error
 from pipeline.benchmark.insert import Setting, insert
+from pipeline.benchmark.orders import fitted
 from pipeline.benchmark.peers.judge import bending_energy, row_of
 from pipeline.benchmark.peers.run import ask
 from pipeline.benchmark.peers.table import sentences
@@ -155,6 +157,35 @@ def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.Capture
     )
     assert command.main(missing) == 2
     assert "none.toml" in capsys.readouterr().err
+
+
+def test_orders_are_fitted_drawn_and_a_broken_promise_is_marked(tmp_path: Path) -> None:
+    sizes = (4.0, 2.0, 1.0)
+    errors = tuple(0.003 * size**1.5 for size in sizes)
+    order = fitted(sizes, errors)
+    assert order == pytest.approx(1.5)
+    outputs.write_claims(
+        [
+            Claim(
+                "order of it",
+                order,
+                "1",
+                "at least 1.9",
+                False,
+                "it, tip: segment length, mm",
+                sizes,
+                errors,
+                "mm",
+            ),
+            Claim("time of it", 0.25, "ms"),
+        ],
+        tmp_path,
+    )
+    text = outputs.write_page(tmp_path).read_text(encoding="utf-8")
+    assert (tmp_path / "figures" / "orders.png").exists()
+    assert 'id="orders"' in text
+    assert text.count("NOT MET") == 1
+    assert text.index('<tr class="bad">') < text.index("order of it") < text.index("time of it")
 
 
 def test_insert_reports_what_it_did() -> None:

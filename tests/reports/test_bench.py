@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from reports import bench
 from reports.figures._style import Drawing
-from reports.figures.benchmark import convergence, pareto, stress_outcomes
+from reports.figures.benchmark import convergence, orders, pareto, stress_outcomes
 
 
 def fake_bench(folder: Path) -> tuple[Path, Path]:
@@ -121,7 +121,7 @@ def _swap(files: tuple[Path, Path], folder: Path) -> tuple[Path, Path, Path]:
     return files[0], folder / "out", files[1]
 
 
-@pytest.mark.parametrize("draw", [pareto, convergence, stress_outcomes])
+@pytest.mark.parametrize("draw", [pareto, convergence, orders, stress_outcomes])
 def test_nothing_to_show_is_no_figure(draw: object, tmp_path: Path) -> None:
     pd.DataFrame({"scene": ["bend"], "method": ["newton"]}).to_csv(tmp_path / "b.csv", index=False)
     result: Drawing | None = draw(bench.read_bench(tmp_path / "b.csv"))  # type: ignore[operator]
