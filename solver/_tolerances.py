@@ -72,6 +72,10 @@ RISE_RADII = 0.5
 only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
 BUDGET_STEPS = 20
 """Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
+NO_FRICTION = 1e-200
+"""Coefficient of friction that is computed and changes nothing: for the test of leaving friction out."""
+RIGID = 1e9
+"""Torsional over bending stiffness of a wire that turns as one: for the test of leaving twist out."""
 WORK = 8_000_000
 """Joints and look-up points that all iterations or sweeps of one depth may pass, whatever max_iterations: 80,000
 sweeps of 50 joints with one look-up each (the closed form needs up to 75,000 for a step in a bend), or 2,000 of

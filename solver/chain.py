@@ -82,6 +82,12 @@ class Buffers:
         self.field = wall.field if wall is not None else no_field()
         self.stiffness = wall.stiffness_N_mm2 if wall is not None else 0.0
         self.friction = wall.friction if wall is not None else 0.0
+        if wall is not None and not switch.friction:
+            self.friction = max(self.friction, tol.NO_FRICTION)
+        self.twisting = wire.twists or not switch.twist
+        self.profile = wire.profile
+        if self.twisting and not wire.twists:
+            self.profile = wire.profile._replace(twist=tol.RIGID * float(wire.profile.stiffness.max()))
         self.spacing = float(wall.distance.spacing_mm.min()) if wall is not None else 1.0
         self.k, self.capacity = 0, 0
         self.counter = np.zeros(COUNTERS, dtype=np.int64)
@@ -125,12 +131,12 @@ class Buffers:
             state=state,
             scratch=scratch,
             switch=self.switch,
-            twisting=self.wire.twists,
-            straight=self.rollable and self.switch.direction and not self.wire.twists,
+            twisting=self.twisting,
+            straight=self.rollable and self.switch.direction and not self.twisting,
         )
         table = np.zeros((capacity + 1, 2))
-        tabulate(self.wire.profile, self.wire.segment_mm, table)
-        self.cut = Cut(self.wire.profile, self.rule, table, float(self.wire.segment_mm))
+        tabulate(self.profile, self.wire.segment_mm, table)
+        self.cut = Cut(self.profile, self.rule, table, float(self.wire.segment_mm), self.switch.profile)
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 

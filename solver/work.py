@@ -11,11 +11,15 @@ from solver._kernels.problem import (
     FULL,
     IDLE,
     LEVENBERG,
+    RESTED,
     ROLLOUTS,
     ROLLS,
+    SMOOTH,
     STILL,
     STRAIGHT,
     SWEEPS,
+    TABLED,
+    TWISTLESS,
 )
 
 NAMES = {
@@ -30,6 +34,10 @@ NAMES = {
     "sweeps_without_roll": STRAIGHT,
     "starts_foreseen": FORESEEN,
     "joints_left_still": STILL,
+    "starts_at_rest": RESTED,
+    "relaxations_without_friction": SMOOTH,
+    "relaxations_without_twist": TWISTLESS,
+    "joints_without_profile_look_up": TABLED,
 }
 
 

@@ -20,7 +20,7 @@ from solver._kernels.journey import Journey
 from solver._kernels.layout import Cut, lay_out, segments_at
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED
 from solver._kernels.passage import free_way
-from solver._kernels.problem import ROLLS, SPENT, Problem
+from solver._kernels.problem import ROLLS, SPENT, TABLED, Problem
 from solver._kernels.settle import LEFT_GRID, measure, settle
 
 # what an insertion remembers between depths
@@ -161,6 +161,8 @@ def set_out(
         kept[i] = report[i]
     k, first = segments_at(depth, cut.segment)
     clamp(problem, base, roll)
+    if k > 2 and cut.tabled:
+        problem.scratch.counter[TABLED] += k - 2
     if k > 0:
         lay_along(problem, cut, base, was, k, first, depth - at[DEPTH])
         return k

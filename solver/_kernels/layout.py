@@ -41,12 +41,16 @@ class Rule(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """What a wire is cut from at any depth. table : see ``tabulate``.     segment : length of one, mm."""
+    """What a wire is cut from at any depth.
+
+    table : see ``tabulate``.     segment : length of one, mm.     tabled : whether the table is used.
+    """
 
     profile: Profile
     rule: Rule
     table: Any
     segment: float
+    tabled: bool
 
 
 class Chain(NamedTuple):
@@ -139,7 +143,7 @@ def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
             inner = depth - 0.5 * first_mm
         elif j == 1:
             outer = depth - 0.5 * first_mm
-        if j < 2:
+        if j < 2 or not cut.tabled:
             cell(profile, inner, outer, own)
         else:
             own[0], own[1] = table[k - j, 0], table[k - j, 1]

@@ -11,7 +11,7 @@ from solver._kernels.flags import kept
 from solver._kernels.judge import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
 from solver._kernels.moves import ease, finish, leave_saddle, polish, rest_shape, search, still, venture
 from solver._kernels.newton import costate, sweep
-from solver._kernels.problem import IDLE, LEVENBERG, RUBBING, START, STILL, SWEEPS, WALL, Problem
+from solver._kernels.problem import IDLE, LEVENBERG, RESTED, RUBBING, START, STILL, SWEEPS, WALL, Problem
 
 # how a relaxation ends
 CONVERGED, EXHAUSTED, STALLED, BROKEN = range(4)
@@ -61,11 +61,14 @@ def minimise(
         if damping == 0.0 and definite and report[0] <= max(tolerance * scale, noise):
             before = energy
             which, energy = finish(problem, which, near, k, energy, report)
-            if at_rest(problem, which, k, report):
+            if at_rest(problem, which, k, report) and (iteration > 0 or problem.switch.rest):
+                counter[RESTED] += iteration == 0
                 return CONVERGED, iteration, which, energy
             if near > 0:
                 # the whole gradient says what its part did not
                 near = 0
+                continue
+            if iteration == 0 and not problem.switch.rest:
                 continue
             if report[0] <= noise:
                 which, energy = polish(problem, which, k, energy, noise, report)

@@ -9,7 +9,8 @@ from solver._kernels.spline import Field
 
 # places in the work counters
 FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, FORESEEN, STILL, SPENT = range(12)
-COUNTERS = 12
+RESTED, SMOOTH, TWISTLESS, TABLED = range(12, 16)
+COUNTERS = 16
 # places in the list of energies
 BENDING, WALL, LOAD, RUBBING = range(4)
 # places in the report of a relaxation, see ``newton.sweep``, ``newton.costate`` and ``settle.measure``
@@ -56,6 +57,8 @@ class Switch(NamedTuple):
     idle : the rest shape is the answer where it touches nothing.     roll : of a straight round wire is no step.
     direction : of a straight round wire is its state, without the roll of its frames.     foresight : begin a step
     with the change that the last one made.     window : leave the part near the base that no longer moves.
+    rest : a start within tolerance is the answer.     friction, twist : carry none where there is none.     profile :
+    stiffness and rest bend of all joints but two from a table made once.
     """
 
     clearance: bool = True
@@ -65,6 +68,10 @@ class Switch(NamedTuple):
     direction: bool = True
     foresight: bool = True
     window: bool = True
+    rest: bool = True
+    friction: bool = True
+    twist: bool = True
+    profile: bool = True
 
 
 class Friction(NamedTuple):

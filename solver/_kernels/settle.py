@@ -11,7 +11,7 @@ from solver._kernels.flags import once
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Cut
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
-from solver._kernels.problem import DEEPEST, PUSH, SPENT, Problem
+from solver._kernels.problem import DEEPEST, PUSH, SMOOTH, SPENT, TWISTLESS, Problem
 
 # how a relaxation ends, beyond the ways of ``minimise``
 UNSETTLED, FOLDED, LEFT_GRID = range(BROKEN + 1, BROKEN + 4)
@@ -41,6 +41,8 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
     With friction the contact loads are taken from the last relaxation until they settle.
     """
     rubs = problem.friction.coefficient > 0.0
+    problem.scratch.counter[SMOOTH] += not rubs
+    problem.scratch.counter[TWISTLESS] += not problem.twisting
     if rubs:
         for p in range(problem.friction.load.size):
             problem.friction.load[p] = 0.0

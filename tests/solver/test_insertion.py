@@ -133,7 +133,15 @@ SWITCHES = {
     "direction": (Switch(direction=False), "sweeps_without_roll"),
     "window": (Switch(window=False), "joints_left_still"),
     "foresight": (Switch(foresight=False), "starts_foreseen"),
+    "rest": (Switch(roll=False, rest=False), "starts_at_rest"),
+    "friction": (Switch(friction=False), "relaxations_without_friction"),
+    "twist": (Switch(twist=False), "relaxations_without_twist"),
+    "profile": (Switch(profile=False), "joints_without_profile_look_up"),
 }
+
+
+EXACT = ("clearance", "cheap", "profile")
+"""Skips of look-ups: bit by bit the same. The others save iterations, or (friction) a second round of them."""
 
 
 @pytest.mark.parametrize("skip", SWITCHES)
@@ -146,18 +154,21 @@ def test_skips_change_nothing_and_are_counted(skip: str) -> None:
     depths = [*(behind + np.arange(1.0, 56.0)), behind + 55.0]
     rolls = [0.0] * 55 + [77.0]
     both = []
-    for switch in (Switch(), off):
+    # a wire that is rolled though it is round starts each step at rest
+    on = Switch(roll=skip != "rest")
+    for switch in (on, off):
         # tight, so that where an iteration stops does not show: 1e-9, the default, leaves 2e-6 mm
         insertion = Insertion(wire, wall, [0, 0, -behind], [0, 0, 1], tolerance=1e-13, switch=switch)
         both.append(list(insertion.to_depths(depths, rolls)))
     on_count, off_count = (sum(s.work[counter] for s in run) for run in both)
     assert on_count > off_count == 0
     # look-ups are skipped exactly; iterations are saved within the solver's tolerance
-    tolerance = 1e-12 if skip in ("clearance", "cheap") else 1e-6
+    tolerance = 1e-12 if skip in EXACT else 1e-6
     for with_skip, without in zip(*both, strict=True):
         np.testing.assert_allclose(with_skip.joints_mm, without.joints_mm, atol=tolerance)
-    if skip in ("clearance", "cheap"):
+    if skip in EXACT:
         assert all(a.energy_N_mm == b.energy_N_mm for a, b in zip(*both, strict=True))
+    if skip in ("clearance", "cheap"):
         saved = [sum(s.work["wall_look_ups"] for s in run) for run in both]
         assert saved[0] < saved[1]
 
