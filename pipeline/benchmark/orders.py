@@ -16,6 +16,7 @@ from pipeline.benchmark.scenes import BenchScene
 
 SOFT = 0.1
 """Stiffness of the soft bend's wall, N/mm²."""
+Errors = dict[float, tuple[float, float, float]]
 SHAPE, TIP, ENERGY = range(3)
 UNITS = ("mm", "mm", "1")
 VOXELS_MM = (0.8, 0.4, 0.2, 0.1)
@@ -35,33 +36,27 @@ def errors_of(scene: BenchScene, segment_mm: float, limit: Reference) -> tuple[f
 
 def orders() -> Iterator[Claim]:
     """Errors against segment length: free, in the soft bend, and with the tip in contact."""
-    free, soft, hard = scenes.cantilever(), scenes.bend(100.0, SOFT), scenes.bend(60.0)
-    second = (lambda p: abs(p - 2) <= 0.05, "2.00 ± 0.05")
-    yield _by_segment("free cantilever, tip", free, (10.0, 5.0, 2.5), TIP, *second)
-    at_least = (lambda p: p >= 1.9, "at least 1.9")
-    yield _by_segment("soft bend, energy", soft, (5.0, 2.5, 1.25), ENERGY, *at_least)
-    tip = errors_of(soft, 2.5, reference(soft))[TIP]
+    free = _errors(scenes.cantilever(), (10.0, 5.0, 2.5))
+    yield _order("free cantilever, tip", free, TIP, lambda p: abs(p - 2) <= 0.05, "2.00 ± 0.05")
+    soft = _errors(scenes.bend(100.0, SOFT), (5.0, 2.5, 1.25))
+    yield _order("soft bend, energy", soft, ENERGY, lambda p: p >= 1.9, "at least 1.9")
+    tip = soft[2.5][TIP]
     yield Claim("soft bend, tip error at 2.5 mm segments", tip, "mm", "at most 0.01", tip <= 0.01)
-    contact = (lambda p: p >= 1.8, "at least 1.8")
-    yield _by_segment("scene B, shape", hard, (2.0, 1.0, 0.5), SHAPE, *contact)
-    yield _by_segment("scene B, energy", hard, (2.0, 1.0, 0.5), ENERGY, *contact)
+    hard = _errors(scenes.bend(60.0), (2.0, 1.0, 0.5))
+    for name, which in (("shape", SHAPE), ("energy", ENERGY)):
+        yield _order(f"scene B, {name}", hard, which, lambda p: p >= 1.8, "at least 1.8")
 
 
-def _by_segment(
-    name: str,
-    scene: BenchScene,
-    segments: tuple[float, ...],
-    which: int,
-    good: Callable[[float], bool],
-    aim: str,
-) -> Claim:
+def _errors(scene: BenchScene, segments: Sequence[float]) -> Errors:
     limit = reference(scene)
-    found = tuple(errors_of(scene, s, limit)[which] for s in segments)
+    return {segment: errors_of(scene, segment, limit) for segment in segments}
+
+
+def _order(name: str, errors: Errors, which: int, good: Callable[[float], bool], aim: str) -> Claim:
+    segments, found = tuple(errors), tuple(error[which] for error in errors.values())
     order = fitted(segments, found)
-    claim = f"order of the {name} over {segments} mm"
-    return Claim(
-        claim, order, "1", aim, good(order), f"{name}: segment length, mm", segments, found, UNITS[which]
-    )
+    claim, against = f"order of the {name} over {segments} mm", f"{name}: segment length, mm"
+    return Claim(claim, order, "1", aim, good(order), against, segments, found, UNITS[which])
 
 
 def fitted(sizes: Sequence[float], errors: Sequence[float]) -> float:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from pipeline.benchmark.claim import Claim
 from pipeline.provenance import collect
-from reports.bench import BENCH_COLUMNS, ORDER_COLUMNS, recommended, render_bench
+from reports.bench import BENCH_COLUMNS, CLAIM_COLUMNS, ORDER_COLUMNS, recommended, render_bench
 
 SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"
 CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
@@ -40,10 +40,8 @@ def note() -> str:
 
 def write_claims(found: Sequence[Claim], out: Path) -> None:
     """claims.csv, a row a claim, and orders.csv, a row for each point that an order was fitted to."""
-    kept = ("claim", "value", "unit", "aim", "met")
-    pd.DataFrame([{name: getattr(c, name) for name in kept} for c in found]).to_csv(
-        out / CLAIMS_CSV, index=False
-    )
+    rows = [{column.name: getattr(c, column.name) for column in CLAIM_COLUMNS} for c in found]
+    pd.DataFrame(rows).to_csv(out / CLAIMS_CSV, index=False)
     points = [
         {
             "against": c.against,

@@ -46,7 +46,8 @@ def _within(**how: Any) -> Callable[[F], F]:
     return decorate
 
 
-# For what other kernels call.
+# For what other kernels call. Mind that a literal argument is a type of its own to numba, and compiles the callee
+# again: pass 0 * k, or a number that is computed.
 kernel = _within()
 # For what another process can compile meanwhile: kept on disk as well.
 kept = _within(cache=True)

@@ -24,9 +24,9 @@ def scale_of(problem: Problem, which: int, k: int) -> float:
 
 
 @kernel
-def noise_of(problem: Problem, which: int, k: int) -> float:
-    """Energy below which a difference is rounding, N mm."""
-    return float(ROUND_OFF * (scale_of(problem, which, k) + abs(problem.state.parts[which, LOAD])))
+def noise_of(problem: Problem, which: int, scale: float) -> float:
+    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``."""
+    return float(ROUND_OFF * (scale + abs(problem.state.parts[which, LOAD])))
 
 
 @kernel

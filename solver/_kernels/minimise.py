@@ -23,6 +23,7 @@ WORST_DAMPING = tol.WORST_DAMPING
 SOFTER = tol.SOFTER
 SEARCHES = tol.SEARCHES
 FINE = tol.FINE
+RISE = tol.RISE
 FORETOLD = tol.FORETOLD
 
 
@@ -54,21 +55,22 @@ def minimise(
         definite = sweep(problem, which, near, k, damping, report)
         counter[SWEEPS] += 1
         counter[STILL] += near
-        noise, scale = noise_of(problem, which, k), scale_of(problem, which, k)
+        scale = scale_of(problem, which, k)
+        noise = noise_of(problem, which, scale)
         if near > 0 and not definite:
             near = 0
             continue
         if damping == 0.0 and definite and report[0] <= max(tolerance * scale, noise):
             before = energy
             which, energy = finish(problem, which, near, k, energy, report)
-            if at_rest(problem, which, k, report) and (iteration > 0 or problem.switch.rest):
+            if iteration == 0 and not problem.switch.rest:
+                continue
+            if at_rest(problem, which, k, report):
                 counter[RESTED] += iteration == 0
                 return CONVERGED, iteration, which, energy
             if near > 0:
                 # the whole gradient says what its part did not
                 near = 0
-                continue
-            if iteration == 0 and not problem.switch.rest:
                 continue
             if report[0] <= noise:
                 which, energy = polish(problem, which, k, energy, noise, report)
@@ -80,23 +82,23 @@ def minimise(
             # the full step does not help, as where a contact opens and closes again: search as usual
         if damping > 0.0 and definite and report[0] <= noise and settled < SEARCHES:
             # nothing left to gain with the wire held back: look at it free, then held less, before it is judged
-            which, energy = ease(problem, which, k, energy, report)
+            which, energy = ease(problem, which, k, energy, noise, report)
             damping, patience, settled, last = 0.0, 0, settled + 1, SOFTER * last
             continue
         trial = math.inf
         if definite:
-            trial = search(problem, which, near, k, 1.0, energy, report[0])
+            trial = search(problem, which, near, k, 1.0, energy, report[0], noise)
             if trial == math.inf:
                 if damping == 0.0 and near == 0 and report[0] <= FINE * scale:
-                    there, trial = venture(problem, which, k, energy, report[0], report)
+                    there, trial = venture(problem, which, k, energy, report[0], RISE * scale, report)
                     if trial < math.inf:
                         which, energy = there, trial
                         continue
-                trial = search(problem, which, near, k, 0.4, energy, report[0])
+                trial = search(problem, which, near, k, 0.4, energy, report[0], noise)
         elif damping == 0.0:
             costate(problem, which, k, report)
             if at_rest(problem, which, k, report):
-                trial = leave_saddle(problem, which, k, energy, report)
+                trial = leave_saddle(problem, which, k, energy, noise, report)
                 if trial == math.inf:
                     # the way down is shorter than rounding can tell
                     return CONVERGED, iteration, which, energy

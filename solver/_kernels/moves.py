@@ -8,7 +8,7 @@ from typing import Any
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import kernel, once
-from solver._kernels.judge import admissible, at_rest, noise_of, scale_of
+from solver._kernels.judge import admissible, at_rest
 from solver._kernels.newton import costate, sweep
 from solver._kernels.problem import ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
 from solver._kernels.rollout import copy_base, place, rollout
@@ -17,7 +17,6 @@ SUFFICIENT = tol.SUFFICIENT
 SEARCHES = tol.SEARCHES
 POLISHES = tol.POLISHES
 VENTURES = tol.VENTURES
-RISE = tol.RISE
 UNMOVED = tol.UNMOVED
 WORTHWHILE = tol.WORTHWHILE
 
@@ -32,10 +31,16 @@ def step(problem: Problem, which: int, near: int, k: int, fraction: float) -> fl
 
 @kernel
 def search(
-    problem: Problem, which: int, near: int, k: int, fraction: float, energy: float, decrement: float
+    problem: Problem,
+    which: int,
+    near: int,
+    k: int,
+    fraction: float,
+    energy: float,
+    decrement: float,
+    noise: float,
 ) -> float:
     """Try Newton's whole step, or shorten it until the energy falls enough; return the new energy, or inf."""
-    noise = noise_of(problem, which, k)
     for _ in range(1 if fraction == 1.0 else SEARCHES - 1):
         trial = step(problem, which, near, k, fraction)
         enough = trial <= energy - SUFFICIENT * fraction * decrement
@@ -47,23 +52,23 @@ def search(
 
 @once
 def venture(
-    problem: Problem, which: int, k: int, energy: float, decrement: float, report: Any
+    problem: Problem, which: int, k: int, energy: float, decrement: float, rise: float, report: Any
 ) -> tuple[int, float]:
     """Follow whole steps of Newton uphill until the energy is below where it started; inf and back if it never is.
 
     Close to a minimum a step fails because contacts open and close on its way. The model of the energy is a
     quadratic for each set of contacts; whole steps find the right set within a few, short ones creep (semismooth
     Newton; the watchdog of Chamberlain et al., 1982). The whole step from ``which`` is the trial state already.
+    rise : how far uphill, N mm.
     """
     state, counter, keep = problem.state, problem.scratch.counter, problem.scratch.keep
     for j in range(k):
         for a in range(3):
             keep[j, a] = state.u[which, j, a]
     at, goal = which, energy - SUFFICIENT * decrement
-    limit = energy + RISE * scale_of(problem, which, k)
     for _ in range(VENTURES):
         trial = energy_of(state.parts[1 - at])
-        if not (trial <= limit and admissible(problem, at, k)):
+        if not (trial <= energy + rise and admissible(problem, at, k)):
             break
         at = 1 - at
         if trial <= goal:
@@ -83,7 +88,7 @@ def venture(
 
 
 @once
-def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: Any) -> float:
+def leave_saddle(problem: Problem, which: int, k: int, energy: float, noise: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
     gain = problem.scratch.gain
@@ -92,7 +97,7 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, report: An
             gain[j, a, b] = 0.0
     for i in range(j + 1, k):
         gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
-    size, least, noise = 0.3, 0.1 * abs(report[5]), noise_of(problem, which, k)
+    size, least = 0.3, 0.1 * abs(report[5])
     # joints further on may answer with a thousand times as much: nothing but rounding ends the search
     while least * size * size > noise:
         for side in (1.0, -1.0):
@@ -152,12 +157,12 @@ def polish(
 
 
 @once
-def ease(problem: Problem, which: int, k: int, energy: float, report: Any) -> tuple[int, float]:
+def ease(problem: Problem, which: int, k: int, energy: float, noise: float, report: Any) -> tuple[int, float]:
     """Take the damped step where the energy is flat to its last place, if that lowers the moments that are left."""
     costate(problem, which, k, report)
     moment = report[1]
     trial = step(problem, which, 0 * k, k, 1.0)
-    if trial <= energy + noise_of(problem, which, k) and admissible(problem, which, k):
+    if trial <= energy + noise and admissible(problem, which, k):
         costate(problem, 1 - which, k, report)
         if report[1] < moment:
             return 1 - which, trial
