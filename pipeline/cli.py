@@ -156,7 +156,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = _parser()
     args = parser.parse_args(argv)
     if args.version:
-        from pipeline.provenance import package_version
+        from pipeline.run.provenance import package_version
 
         print(f"wireval {package_version()}")
         return OK

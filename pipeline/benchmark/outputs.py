@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.benchmark.claim import Claim
-from pipeline.provenance import collect
+from pipeline.run.provenance import collect
 from reports.bench import BENCH_COLUMNS, CLAIM_COLUMNS, ORDER_COLUMNS, recommended, render_bench
 
 SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"

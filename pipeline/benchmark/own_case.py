@@ -6,12 +6,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline.benchmark.scenes import BenchScene
-from pipeline.cache import Store, default_root
-from pipeline.case import CaseRun, run_stages
 from pipeline.config import Config
-from pipeline.manifest import Case, read_manifest
-from pipeline.progress import CaseProgress
-from pipeline.simulate import rolls
+from pipeline.run.cache import Store, default_root
+from pipeline.run.progress import CaseProgress
+from pipeline.run.stages import CaseRun, run_stages
+from pipeline.simulate.replay import rolls
+from pipeline.study.manifest import Case, read_manifest
 
 
 class NoScene(ValueError):

@@ -17,7 +17,7 @@ from pipeline.benchmark.study import SEGMENTS_MM, settings, study
 from pipeline.commands.common import complain, say
 from pipeline.config import Config
 from pipeline.load import LoadError
-from pipeline.manifest import ManifestError
+from pipeline.study.manifest import ManifestError
 
 QUICK_SEGMENTS_MM = (5.0, 2.0, 1.0, 0.5)
 QUICK_SCENES = 200

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from pipeline.cache import Store, default_root
 from pipeline.commands.common import say
+from pipeline.run.cache import Store, default_root
 
 
 def main(args: Namespace) -> int:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from pipeline.check import check
 from pipeline.commands.common import complain, resolved_settings, say
-from pipeline.manifest import ManifestError, read_manifest
-from pipeline.settings import SettingsError
+from pipeline.study.check import check
+from pipeline.study.manifest import ManifestError, read_manifest
+from pipeline.study.settings import SettingsError
 
 
 def main(args: Namespace) -> int:

@@ -6,7 +6,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Sequence
 
-from pipeline.settings import Resolved, Setting, parse_assignment, read_settings, resolve
+from pipeline.study.settings import Resolved, Setting, parse_assignment, read_settings, resolve
 
 
 def settings_of(args: Namespace) -> list[Setting]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from pipeline.aggregate import aggregate, found_results
 from pipeline.commands.common import complain, say
 from pipeline.commands.run import last_line
+from pipeline.run.aggregate import aggregate, found_results
 from reports.html import render_case, render_index
 
 

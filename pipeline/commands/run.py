@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from pipeline import sweep
-from pipeline.aggregate import Totals, aggregate, found_results
-from pipeline.batch import run_jobs, shard_of
-from pipeline.cache import default_root, file_hash
-from pipeline.case import STAGES
-from pipeline.check import check
 from pipeline.commands.common import complain, resolved_settings, say, settings_of
-from pipeline.infer import infer_manifest
-from pipeline.junit import write_junit
 from pipeline.load import LoadError
-from pipeline.manifest import Case, Manifest, ManifestError, read_manifest
-from pipeline.provenance import collect
-from pipeline.run_case import Job, finished, job_key
-from pipeline.settings import Resolved, SettingsError, to_toml
-from pipeline.suggest import did_you_mean
+from pipeline.run import sweep
+from pipeline.run.aggregate import Totals, aggregate, found_results
+from pipeline.run.batch import run_jobs, shard_of
+from pipeline.run.cache import default_root, file_hash
+from pipeline.run.case import Job, finished, job_key
+from pipeline.run.junit import write_junit
+from pipeline.run.provenance import collect
+from pipeline.run.stages import STAGES
+from pipeline.study.check import check
+from pipeline.study.infer import infer_manifest
+from pipeline.study.manifest import Case, Manifest, ManifestError, read_manifest
+from pipeline.study.settings import Resolved, SettingsError, to_toml
+from pipeline.study.suggest import did_you_mean
 from reports.atomic import write_text
 from reports.html import render_index
 

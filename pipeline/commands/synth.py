@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from pipeline.commands.common import complain, say
-from pipeline.suggest import did_you_mean
+from pipeline.study.suggest import did_you_mean
 
 
 def _progress(done: int, total: int) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline._kernels.jets import jets_at, values_at
-from pipeline.memory_order import in_memory_order
+from pipeline.arrays.axis_order import in_memory_order
+from pipeline.arrays.jets import jets_at, values_at
 from pipeline.model import Array, Volume
 from pipeline.register.motion import Motion
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipeline.arrays.axis_order import in_memory_order, reorder
 from pipeline.config import SegmentConfig
-from pipeline.memory_order import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
 from pipeline.segment.connect import connect, connect_relative, neighbours

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.connect import FULL
-from pipeline._kernels.tiles import LEVELS
+from pipeline.arrays.tiles import LEVELS
+from pipeline.segment._kernels.connect import FULL
 
 HALF_HEIGHT_SPREAD = 0.42
 """sigma of the object feature over the contrast: the feature is 0.5 half way down to the background."""

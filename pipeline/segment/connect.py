@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.connect import FULL, flood, strengths
-from pipeline._kernels.tiles import CELLS, SIDE
+from pipeline.arrays.tiles import CELLS, SIDE
+from pipeline.segment._kernels.connect import FULL, flood, strengths
 from pipeline.segment.affinity import Affinity
 from solver.grid import Grid
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.contact import along_cores, meetings, nearest_core, runs_on, thickness
-from pipeline.sparse import sparse_zeros
+from pipeline.arrays.sparse import sparse_zeros
+from pipeline.segment._kernels.contact import along_cores, meetings, nearest_core, runs_on, thickness
 from solver.grid import Array, Grid
 
 CORE = 0.7

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.wall import (
+from pipeline.arrays.sparse import sparse_zeros
+from pipeline.segment._kernels.wall import (
     PAD,
     dilate,
     distances,
@@ -23,7 +24,6 @@ from pipeline._kernels.wall import (
 )
 from pipeline.segment.affinity import Levels
 from pipeline.segment.blur import blur_of_wall, half_level_offset
-from pipeline.sparse import sparse_zeros
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Array, Grid
 

@@ -16,15 +16,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pipeline._kernels.contact import along_cores
-from pipeline._kernels.ridges import smooth_voxels
-from pipeline._kernels.solids import cones
-from pipeline._kernels.thin import crests
-from pipeline._kernels.wall import PAD, dilate, into_box
+from pipeline.arrays.sparse import sparse_zeros
+from pipeline.segment._kernels.contact import along_cores
+from pipeline.segment._kernels.solids import cones
+from pipeline.segment._kernels.thin import crests
+from pipeline.segment._kernels.wall import PAD, dilate, into_box
 from pipeline.segment.affinity import Affinity, Levels, noise_after
 from pipeline.segment.connect import connect, neighbours
 from pipeline.segment.surface import Box, box_of
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.ridges import smooth_voxels
 from solver.grid import Array, Grid
 
 FAINTEST = 0.09

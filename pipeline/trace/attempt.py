@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline._kernels.jets import values_at
-from pipeline._kernels.tube import active_voxels
+from pipeline.arrays.jets import values_at
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, Curve, arc_length
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Crests, Tracklet, find_crests
 from pipeline.trace.link import Path, link, with_doubles
 from pipeline.trace.scene import Scene

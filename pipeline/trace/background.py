@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline._kernels.background import denoised, model, residual
-from pipeline.memory_order import contiguous, integer_offset, reorder
+from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Lumen, Volume
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.background import denoised, model, residual
 from pipeline.trace.region import HALO_VOXELS, MAD, Region, sampled
 from solver.grid import Grid
 

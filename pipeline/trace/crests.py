@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.ridges import above, smooth_voxels, tracklets
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.ridges import above, smooth_voxels, tracklets
 from pipeline.trace.region import MAD
 from pipeline.trace.scene import Scene
 

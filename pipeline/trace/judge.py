@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.jets import values_at
+from pipeline.arrays.jets import values_at
 from pipeline.model import Array
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt

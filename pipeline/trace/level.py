@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import ndtr
 
-from pipeline._kernels.tube import active_voxels
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.region import HALO_VOXELS, MAD
 from pipeline.trace.scene import Scene
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline._kernels.ridges import runs_below
-from pipeline.memory_order import contiguous, integer_offset, reorder
+from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
 from pipeline.model import Lumen
+from pipeline.trace._kernels.ridges import runs_below
 from solver.grid import Grid
 
 HALO_VOXELS = 4.0

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.ridges import subtract
-from pipeline.memory_order import in_memory_order
+from pipeline.arrays.axis_order import in_memory_order
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Lumen, Volume
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.ridges import subtract
 from pipeline.trace.background import modelled, smoothed
 from pipeline.trace.region import MAD, Region, region_of
 from solver.grid import Array

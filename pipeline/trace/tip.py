@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtr
 
-from pipeline._kernels.jets import values_at
+from pipeline.arrays.jets import values_at
 from pipeline.model import Array, arc_length
 from pipeline.trace.scene import Scene
 

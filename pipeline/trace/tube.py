@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline._kernels.skyline import factorise, inverse, substitute
-from pipeline._kernels.tube import active_voxels, normal_equations, render
+from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.sparse import sparse_zeros
+from pipeline.trace._kernels.skyline import factorise, inverse, substitute
+from pipeline.trace._kernels.tube import active_voxels, normal_equations, render
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""

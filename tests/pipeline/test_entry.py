@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.entry import measured_entry
 from pipeline.model import Curve
+from pipeline.simulate.clamp import measured_entry
 
 
 def arc_wire(length: float, noise: float, seed: int, curvature: float = 0.03) -> Curve:

@@ -7,10 +7,10 @@ import pytest
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline._kernels.jets import jet
-from pipeline._kernels.spline import hessian, value_gradient
-from pipeline._kernels.tube import active_voxels, normal_equations
+from pipeline.arrays.jets import jet
+from pipeline.arrays.spline import hessian, value_gradient
 from pipeline.segment.blur import blur_of_wall, half_level_offset
+from pipeline.trace._kernels.tube import active_voxels, normal_equations
 from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampling, tint_nodes
 from pipeline.trace.tube import evaluate as spline_points
 

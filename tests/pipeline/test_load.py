@@ -13,7 +13,7 @@ import SimpleITK as sitk
 from pipeline.config import LoadConfig
 from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
 from pipeline.load.raw import read_mha_box
-from pipeline.scans import _expanded, load_counters
+from pipeline.load.scans import _expanded, load_counters
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.manifest import ManifestError, natural_key, read_manifest
+from pipeline.study.manifest import ManifestError, natural_key, read_manifest
 
 GOOD = """
 schema = 1

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline import nulls
-from pipeline.compare import point_to_curve, rms
+from pipeline.compare import nulls, point_to_curve, rms
 from pipeline.model import Curve, Lumen, arc_length
 from solver.grid import Grid
 

@@ -11,8 +11,8 @@ import SimpleITK as sitk
 from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
-from pipeline.lumen_input import read_lumen
-from pipeline.trace_input import read_curve
+from pipeline.load.traces import read_curve
+from pipeline.segment.given import read_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
 
 RADIUS, LENGTH = 1.5, 12.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from pipeline.progress import CaseProgress
+from pipeline.run.progress import CaseProgress
 
 
 class Terminal(io.StringIO):

@@ -11,12 +11,12 @@ from data_synthetic import catalogue
 from data_synthetic.scene import Study
 from data_synthetic.study import psf_scanner
 from pipeline.config import LoadConfig, TraceConfig
-from pipeline.frame import Frame
-from pipeline.in_place import place_of, record, said
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
+from pipeline.register.frames import place_of, record, said
 from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion
+from pipeline.run.frame import Frame
 from pipeline.segment import segment
 
 VOXEL = 0.5

@@ -244,11 +244,11 @@ def test_an_unexpected_error_costs_one_case(
         if job.case.id == "second":  # type: ignore[attr-defined]
             msg = "burst pipe"
             raise RuntimeError(msg)
-        from pipeline.run_case import run_case
+        from pipeline.run.case import run_case
 
         return run_case(job)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("pipeline.batch.run_case", burst)
+    monkeypatch.setattr("pipeline.run.batch.run_case", burst)
     assert run(both, tmp_path / "out") == 1
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]

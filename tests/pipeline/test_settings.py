@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.cache import Store, file_hash, key_of
 from pipeline.commands.common import complain
 from pipeline.config import Config, SegmentConfig
 from pipeline.model import Curve, Lumen
-from pipeline.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
+from pipeline.run.cache import Store, file_hash, key_of
+from pipeline.run.stored import pack_curve, pack_lumen, unpack_curve, unpack_lumen
 from pipeline.status import FrameStatus
-from pipeline.stored import pack_curve, pack_lumen, unpack_curve, unpack_lumen
+from pipeline.study.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
 from solver.grid import Grid
 
 

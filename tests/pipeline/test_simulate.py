@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipeline.config import SimulateConfig, SolverConfig
-from pipeline.entry import Entry
-from pipeline.manifest import Case, Wire, read_manifest
 from pipeline.model import Lumen, Simulated
-from pipeline.simulate import guide_wire, rolls, simulate
+from pipeline.simulate.clamp import Entry
+from pipeline.simulate.replay import guide_wire, rolls, simulate
+from pipeline.study.manifest import Case, Wire, read_manifest
 from solver.grid import Grid
 
 MANIFEST = """

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.compare import Comparison, rms
-from pipeline.frame import Frame
+from pipeline.compare.metrics import Comparison, rms
+from pipeline.compare.pooled import blocks, intervals, pooled, skill_of
+from pipeline.run.frame import Frame
 from pipeline.status import FrameStatus
-from pipeline.summary import blocks, intervals, pooled, skill_of
 
 
 def frame(index: int, errors: np.ndarray, null: float = 1.0, tip: float = 0.2) -> Frame:

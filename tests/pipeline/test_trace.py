@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from pipeline.compare import point_to_curve
+from pipeline.compare.metrics import point_to_curve
 from pipeline.config import TraceConfig
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.segment import segment

@@ -19,8 +19,8 @@ import pandas as pd
 from data_synthetic import catalogue
 from data_synthetic.scene import Scene
 from data_synthetic.write import write_study
-from pipeline.case import STAGES
 from pipeline.cli import main as wireval
+from pipeline.run.stages import STAGES
 from reports.case_files import GOOD
 from reports.schema import ERRORS_COLUMNS
 from reports.tables import read_errors, write_errors

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from pipeline.compare import point_to_curve
+from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Volume
 from tests.pipeline import phantoms
 

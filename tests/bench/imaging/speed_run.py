@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 import SimpleITK as sitk
 
-from pipeline import scans
 from pipeline.config import LoadConfig
-from pipeline.load import load, read_header
+from pipeline.load import load, read_header, scans
 from pipeline.segment import segment
 from pipeline.trace import trace
 

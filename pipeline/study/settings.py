@@ -1,0 +1,140 @@
+"""Where each setting comes from: command line > config file > default; unknown or ill-typed ones are all listed."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+
+from pipeline.config import Config
+from pipeline.study.suggest import did_you_mean
+
+
+class SettingsError(Exception):
+    """Settings that cannot be used; ``problems`` lists all of them."""
+
+    def __init__(self, problems: list[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """The settings in force and, by ``table.key``, where each one that is not the default came from."""
+
+    config: Config
+    origin: dict[str, str]
+
+    def as_dict(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """{table: {key: {"value", "source"}}}, as result.json holds it."""
+        return {
+            table.name: {
+                item.name: {
+                    "value": getattr(getattr(self.config, table.name), item.name),
+                    "source": self.origin.get(f"{table.name}.{item.name}", "default"),
+                }
+                for item in fields(getattr(self.config, table.name))
+            }
+            for table in fields(self.config)
+        }
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One ``table.key = value`` and who said it."""
+
+    name: str
+    value: Any
+    source: str
+
+
+def parse_assignment(text: str, source: str = "command line") -> Setting:
+    """``table.key=value`` as typed after --set; the value is TOML, a bare word is a string."""
+    name, equals, raw = text.partition("=")
+    if not equals or "." not in name:
+        raise SettingsError(
+            [f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"]
+        )
+    try:
+        value = tomllib.loads(f"value = {raw.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = raw.strip()
+    return Setting(name.strip(), value, source)
+
+
+def read_settings(path: Path) -> list[Setting]:
+    """All settings of a TOML file of tables."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise SettingsError([f"{path}: cannot be read as TOML: {error}"]) from None
+    found: list[Setting] = []
+    for table, values in data.items():
+        if not isinstance(values, dict):
+            raise SettingsError(
+                [f"{path}: {table!r} stands outside a table; write [solver] and the like above it"]
+            )
+        found += [Setting(f"{table}.{key}", value, path.name) for key, value in values.items()]
+    return found
+
+
+def resolve(settings: Sequence[Setting]) -> Resolved:
+    """Apply settings in order (later ones win); raises SettingsError listing every problem."""
+    config, origin, problems = Config(), {}, []
+    for setting in settings:
+        try:
+            config = _applied(config, setting)
+            origin[setting.name] = setting.source
+        except SettingsError as error:
+            problems += error.problems
+    if problems:
+        raise SettingsError(problems)
+    return Resolved(config, origin)
+
+
+def _applied(config: Config, setting: Setting) -> Config:
+    table, _, key = setting.name.partition(".")
+    tables = {item.name for item in fields(config)}
+    if table not in tables:
+        raise SettingsError([f"{setting.source}: no table {table!r}; {did_you_mean(table, tables)}"])
+    current = getattr(config, table)
+    kinds = get_type_hints(type(current))
+    if key not in kinds:
+        raise SettingsError([f"{setting.source}: no setting {setting.name!r}; {did_you_mean(key, kinds)}"])
+    try:
+        value = TypeAdapter(kinds[key]).validate_python(setting.value)
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise SettingsError([f"{setting.source}: {setting.name} = {setting.value!r}: {reason}"]) from None
+    return replace(config, **{table: replace(current, **{key: value})})
+
+
+def to_toml(resolved: Resolved) -> str:
+    """config.resolved.toml: every setting with a comment saying where it came from; reads back through -c."""
+    lines: list[str] = []
+    for table, items in resolved.as_dict().items():
+        lines.append(f"[{table}]")
+        lines += [_line(key, item) for key, item in items.items()]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _line(key: str, item: dict[str, Any]) -> str:
+    """One setting; TOML has no null, so one that is left to the data is a comment."""
+    if item["value"] is None:
+        return f"# {key}: estimated from the data"
+    return f"{key} = {_literal(item['value'])}  # {item['source']}"
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_literal(v) for v in value) + "]"
+    return repr(value)
