@@ -17,6 +17,9 @@ from solver.grid import Grid, read_only
 
 Array = NDArray[np.float64]
 Counters = Mapping[str, float]
+"""What was counted, by name; over frames such numbers add up."""
+Levels = Mapping[str, float]
+"""What was measured (a noise, a blur, a share), by name; over frames such numbers have a median."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,7 @@ class Lumen:
     wall_level: float = float("nan")
     warnings: tuple[str, ...] = ()
     counters: Counters = field(default_factory=dict)
+    levels: Levels = field(default_factory=dict)
 
 
 def arc_length(points_mm: NDArray[Any]) -> Array:
@@ -67,6 +71,7 @@ class Curve:
     note: str = ""
     counters: Counters = field(default_factory=dict)
     in_plane: NDArray[np.bool_] | None = None
+    levels: Levels = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -109,3 +114,4 @@ class Simulated:
     max_penetration_mm: float
     seconds: float = float("nan")
     work: Counters = field(default_factory=dict)
+    levels: Levels = field(default_factory=dict)

@@ -6,11 +6,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline.benchmark.scenes import BenchScene
-from pipeline.config import Config
 from pipeline.run.cache import Store, default_root
 from pipeline.run.progress import CaseProgress
 from pipeline.run.stages import CaseRun, run_stages
 from pipeline.simulate.replay import rolls
+from pipeline.study.config import Config
 from pipeline.study.manifest import Case, read_manifest
 
 

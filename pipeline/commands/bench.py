@@ -15,8 +15,8 @@ from pipeline.benchmark.scenes import BenchScene
 from pipeline.benchmark.stress.scene_run import Outcome
 from pipeline.benchmark.study import SEGMENTS_MM, settings, study
 from pipeline.commands.common import complain, say
-from pipeline.config import Config
 from pipeline.load import LoadError
+from pipeline.study.config import Config
 from pipeline.study.manifest import ManifestError
 
 QUICK_SEGMENTS_MM = (5.0, 2.0, 1.0, 0.5)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent
-from pipeline.config import CompareConfig
+from pipeline.compare.config import CompareConfig
 from pipeline.model import Array, Curve, Lumen, Simulated, arc_length
 
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB

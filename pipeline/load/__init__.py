@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.config import LoadConfig
+from pipeline.load.config import LoadConfig
 from pipeline.load.dicom import read_dicom, read_dicom_header
 from pipeline.load.files import read_file, read_file_header
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any, Literal
 
-from pipeline.config import Config
 from pipeline.load import scans
 from pipeline.model import Lumen
 from pipeline.run.cache import Store
 from pipeline.run.frame import Frame
 from pipeline.simulate.clamp import Entry
 from pipeline.status import StageError
+from pipeline.study.config import Config
 from pipeline.study.manifest import Case
 
 Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]

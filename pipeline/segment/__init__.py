@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
-from pipeline.config import SegmentConfig
 from pipeline.model import Lumen, Volume
 from pipeline.segment.affinity import Affinity, Levels, estimate_affinity
+from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, neighbours
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.levels import deepest, levels_at, scanner_blur

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
-from pipeline.config import SegmentConfig
 from pipeline.load import LoadError, load, read_header
 from pipeline.load.curves import RAS_TO_LPS, Branches, read_markups_branches, read_swc
 from pipeline.load.surfaces import Shapes, read_stl, read_vtp
@@ -17,6 +16,7 @@ from pipeline.model import Lumen
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
 from pipeline.segment._kernels.wall import distances, propagate
 from pipeline.segment.affinity import Levels
+from pipeline.segment.config import SegmentConfig
 from pipeline.segment.surface import prepare, signed_distance
 from solver.grid import Grid
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.config import SimulateConfig, SolverConfig
 from pipeline.model import Lumen, Simulated
 from pipeline.simulate.clamp import Entry
+from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, Wire
 from pipeline.study.schema import Profile
 from solver import GuideWire, Insertion, VesselWall

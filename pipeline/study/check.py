@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.config import Config
 from pipeline.load import LoadError
 from pipeline.load.scans import Scans, read_headers
 from pipeline.load.truth import read_truth
 from pipeline.run.case import inputs_of
+from pipeline.study.config import Config
 from pipeline.study.manifest import Case, Manifest
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from pipeline.config import LoadConfig
 from pipeline.load import LoadError, load, read_header
+from pipeline.load.config import LoadConfig
 from pipeline.model import Array, Volume
 from pipeline.study.manifest import natural_key
 

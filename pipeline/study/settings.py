@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.config import Config
+from pipeline.study.config import Config
 from pipeline.study.suggest import did_you_mean
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipeline.config import TraceConfig
 from pipeline.model import Array, Curve, Lumen, Volume, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace._kernels.ridges import smooth_voxels
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, Entry, again, cold, dense, misfit, warm
 from pipeline.trace.background import wall_blur
+from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
 from pipeline.trace.in_plane import near_rotation_plane
 from pipeline.trace.judge import LEAST_SEEN, SURE_CNR, Verdict, depth_at, judge

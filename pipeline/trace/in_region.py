@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.config import TraceConfig
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.trace.config import TraceConfig
 from pipeline.trace.follow import trace
 from solver.grid import Grid
 

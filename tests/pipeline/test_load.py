@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from pipeline.config import LoadConfig
 from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
+from pipeline.load.config import LoadConfig
 from pipeline.load.raw import read_mha_box
 from pipeline.load.scans import _expanded, load_counters
 

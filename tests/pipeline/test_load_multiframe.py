@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.config import LoadConfig
 from pipeline.load import LoadError, load, read_header
+from pipeline.load.config import LoadConfig
 from tests.pipeline.enhanced_dicom import enhanced
 from tests.pipeline.test_load import ORIGIN, SPACING, numbered, straight_stack
 

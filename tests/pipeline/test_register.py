@@ -10,7 +10,7 @@ import pytest
 from data_synthetic import catalogue
 from data_synthetic.scene import Study
 from data_synthetic.study import psf_scanner
-from pipeline.config import LoadConfig, TraceConfig
+from pipeline.load.config import LoadConfig
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import place_of, record, said
@@ -18,6 +18,7 @@ from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion
 from pipeline.run.frame import Frame
 from pipeline.segment import segment
+from pipeline.trace.config import TraceConfig
 
 VOXEL = 0.5
 SKIP = 0.1

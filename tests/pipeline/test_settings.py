@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pipeline.commands.common import complain
-from pipeline.config import Config, SegmentConfig
 from pipeline.model import Curve, Lumen
 from pipeline.run.cache import Store, file_hash, key_of
 from pipeline.run.stored import pack_curve, pack_lumen, unpack_curve, unpack_lumen
+from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
+from pipeline.study.config import Config
 from pipeline.study.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
 from solver.grid import Grid
 

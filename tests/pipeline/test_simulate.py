@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.config import SimulateConfig, SolverConfig
 from pipeline.model import Lumen, Simulated
 from pipeline.simulate.clamp import Entry
+from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.simulate.replay import guide_wire, rolls, simulate
 from pipeline.study.manifest import Case, Wire, read_manifest
 from solver.grid import Grid

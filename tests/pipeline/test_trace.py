@@ -10,12 +10,12 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.compare.metrics import point_to_curve
-from pipeline.config import TraceConfig
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import trace, trace_region
 from pipeline.trace.background import wall_blur
+from pipeline.trace.config import TraceConfig
 from pipeline.trace.in_plane import near_rotation_plane
 from pipeline.trace.level import levelled
 from pipeline.trace.scene import build_scene

@@ -9,8 +9,8 @@ import numpy as np
 import SimpleITK as sitk
 from skimage.segmentation import flood as skimage_flood
 
-from pipeline.config import SegmentConfig
 from pipeline.segment.affinity import Levels, estimate_affinity
+from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, neighbours, strength_list
 from solver.grid import Grid
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 import SimpleITK as sitk
 
-from pipeline.config import LoadConfig
 from pipeline.load import load, read_header, scans
+from pipeline.load.config import LoadConfig
 from pipeline.segment import segment
 from pipeline.trace import trace
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.config import SegmentConfig
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.segment.config import SegmentConfig
 from solver import VesselWall
 from tests.pipeline import phantoms
 

@@ -1,0 +1,13 @@
+"""How scans are read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LoadConfig:
+    """How scans are read."""
+
+    resample: bool = False
+    """Resample a tilted or irregularly spaced series onto a regular grid instead of refusing it."""

@@ -1,0 +1,26 @@
+"""Settings of the wire's centreline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class TraceConfig:
+    """The wire's centreline."""
+
+    length_tolerance_mm: float = 2.0
+    """Largest accepted disagreement between the traced length and the manifest's insertion_mm."""
+    ridge_voxels: float = 0.7
+    """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
+    longest_gap_mm: float = 5.0
+    """Longest gap between two pieces of wire that is bridged."""
+    rotation_axis: tuple[float, ...] = ()
+    """Axis (LPS) about which the scanner turned; empty: the scan's third axis, as rotational scans are stored."""
+    in_plane_deg: float = 10.0
+    """Points whose tangent is nearer than this to the plane of rotation are flagged: the cone's half angle."""
+    register: Literal["auto", "off"] = "auto"
+    """auto (frames are registered to the reference scan where the phantom moved) or off."""
+    register_skip_voxels: float = 0.1
+    """A phantom that moved by less than this everywhere on the lumen's wall is taken not to have moved."""
