@@ -5,24 +5,36 @@ Coordinates are index * spacing (mm along the grid's axes); derivatives are per 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.arrays.compiled import door, kernel
+from pipeline.arrays.lattice import nodes_near
 
 REACH = 3.0
 """Half width of the Gaussian's window in sigmas."""
+WIDEST = 64
+"""Nodes along an axis that a window may have."""
 
 
-@njit(cache=True)
+class Blurred(NamedTuple):
+    """A lattice (values, voxel size (3,) in mm) that is looked at through a Gaussian of ``sigma`` mm."""
+
+    grey: NDArray[Any]
+    spacing: NDArray[Any]
+    sigma: float
+
+
+@kernel
 def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
     """Rows of ``w``: Gaussian, its first and its second derivative at the nodes within reach of x; and their range."""
     s = max(sigma, 0.6 * h)
-    first = max(0, int(np.ceil((x - REACH * s) / h)))
-    last = min(n - 1, int(np.floor((x + REACH * s) / h)), first + w.shape[1] - 1)
+    first, stop = nodes_near(x, x, REACH * s, h, n)
+    stop = min(stop, first + w.shape[1])
     total = 0.0
-    for i in range(first, last + 1):
+    for i in range(first, stop):
         d = (i * h - x) / s
         g = np.exp(-0.5 * d * d)
         total += g
@@ -31,27 +43,21 @@ def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple
         w[2, i - first] = g * (d * d - 1.0) / (s * s)
     if total > 0.0:
         for m in range(3):
-            for i in range(last - first + 1):
+            for i in range(stop - first):
                 w[m, i] /= total
-    return first, last + 1
+    return first, stop
 
 
-@njit(cache=True)
-def jet(
-    grey: NDArray[Any],
-    spacing: NDArray[Any],
-    sigma: float,
-    p: NDArray[Any],
-    w: NDArray[Any],
-    out: NDArray[Any],
-) -> None:
+@kernel
+def jet(field: Blurred, p: NDArray[Any], w: NDArray[Any], out: NDArray[Any]) -> None:
     """Value, gradient (3), and second derivatives xx yy zz xy xz yz of the blurred lattice at ``p``, into out (10).
 
-    ``w`` is scratch (3, 3, m) with m at least the window's width.
+    ``w`` is scratch (3, 3, WIDEST).
     """
-    i0, i1 = _weights(p[0], spacing[0], sigma, grey.shape[0], w[0])
-    j0, j1 = _weights(p[1], spacing[1], sigma, grey.shape[1], w[1])
-    k0, k1 = _weights(p[2], spacing[2], sigma, grey.shape[2], w[2])
+    grey = field.grey
+    i0, i1 = _weights(p[0], field.spacing[0], field.sigma, grey.shape[0], w[0])
+    j0, j1 = _weights(p[1], field.spacing[1], field.sigma, grey.shape[1], w[1])
+    k0, k1 = _weights(p[2], field.spacing[2], field.sigma, grey.shape[2], w[2])
     for m in range(10):
         out[m] = 0.0
     for i in range(i0, i1):
@@ -82,96 +88,17 @@ def jet(
         out[9] += a * fyz
 
 
-@njit(cache=True)
-def values_at(grey: NDArray[Any], spacing: NDArray[Any], sigma: float, points: NDArray[Any]) -> NDArray[Any]:
-    """The blurred lattice at points (n, 3)."""
-    w = np.empty((3, 3, 64))
-    out = np.empty(10)
-    result = np.empty(points.shape[0])
-    for n in range(points.shape[0]):
-        jet(grey, spacing, sigma, points[n], w, out)
-        result[n] = out[0]
-    return result
-
-
-@njit(cache=True)
-def jets_at(grey: NDArray[Any], spacing: NDArray[Any], sigma: float, points: NDArray[Any]) -> NDArray[Any]:
+@door
+def jets_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     """Value and gradient (n, 4) of the blurred lattice at points (n, 3)."""
-    w = np.empty((3, 3, 64))
-    out = np.empty(10)
+    w, out = np.empty((3, 3, WIDEST)), np.empty(10)
     result = np.empty((points.shape[0], 4))
     for n in range(points.shape[0]):
-        jet(grey, spacing, sigma, points[n], w, out)
-        for m in range(4):
-            result[n, m] = out[m]
+        jet(field, points[n], w, out)
+        result[n] = out[:4]
     return result
 
 
-@njit(cache=True)
-def ridge_frame(out: NDArray[Any], t: NDArray[Any]) -> tuple[float, float]:
-    """Tangent (into ``t``, sign kept towards its old value) of a bright ridge from a jet, and the two curvatures
-    across it, ascending: eigenvalues of the Hessian, the tangent belonging to the largest.
-    """
-    xx, yy, zz, xy, xz, yz = out[4], out[5], out[6], out[7], out[8], out[9]
-    q = (xx + yy + zz) / 3.0
-    p2 = (xx - q) ** 2 + (yy - q) ** 2 + (zz - q) ** 2 + 2.0 * (xy * xy + xz * xz + yz * yz)
-    p = np.sqrt(p2 / 6.0) + 1e-300
-    a, b, c = (xx - q) / p, (yy - q) / p, (zz - q) / p
-    d, e, f = xy / p, xz / p, yz / p
-    det = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)
-    angle = np.arccos(min(1.0, max(-1.0, 0.5 * det))) / 3.0
-    high = q + 2.0 * p * np.cos(angle)
-    low = q + 2.0 * p * np.cos(angle + 2.0 * np.pi / 3.0)
-    middle = 3.0 * q - high - low
-    best = 0.0
-    bx = by = bz = 0.0
-    ax, ay, az = xx - high, yy - high, zz - high
-    for m in range(3):
-        if m == 0:
-            cx, cy, cz = xy * yz - xz * ay, xz * xy - ax * yz, ax * ay - xy * xy
-        elif m == 1:
-            cx, cy, cz = xy * az - xz * yz, xz * xz - ax * az, ax * yz - xy * xz
-        else:
-            cx, cy, cz = ay * az - yz * yz, yz * xz - xy * az, xy * yz - ay * xz
-        size = cx * cx + cy * cy + cz * cz
-        if size > best:
-            best, bx, by, bz = size, cx, cy, cz
-    if best > 0.0:
-        scale = 1.0 / np.sqrt(best)
-        if bx * t[0] + by * t[1] + bz * t[2] < 0.0:
-            scale = -scale
-        t[0], t[1], t[2] = bx * scale, by * scale, bz * scale
-    return low, middle
-
-
-@njit(cache=True)
-def ridge_step(out: NDArray[Any], t: NDArray[Any], limit: float, step: NDArray[Any]) -> None:
-    """Newton step (3,) across the tangent to the ridge's crest, at most ``limit`` mm long."""
-    ux, uy, uz = 0.0, 0.0, 0.0
-    if abs(t[0]) < 0.7:
-        ux = 1.0
-    else:
-        uy = 1.0
-    dot = ux * t[0] + uy * t[1] + uz * t[2]
-    ux, uy, uz = ux - dot * t[0], uy - dot * t[1], uz - dot * t[2]
-    size = np.sqrt(ux * ux + uy * uy + uz * uz)
-    ux, uy, uz = ux / size, uy / size, uz / size
-    vx, vy, vz = t[1] * uz - t[2] * uy, t[2] * ux - t[0] * uz, t[0] * uy - t[1] * ux
-    xx, yy, zz, xy, xz, yz = out[4], out[5], out[6], out[7], out[8], out[9]
-    hux, huy, huz = xx * ux + xy * uy + xz * uz, xy * ux + yy * uy + yz * uz, xz * ux + yz * uy + zz * uz
-    hvx, hvy, hvz = xx * vx + xy * vy + xz * vz, xy * vx + yy * vy + yz * vz, xz * vx + yz * vy + zz * vz
-    a = ux * hux + uy * huy + uz * huz
-    b = vx * hux + vy * huy + vz * huz
-    c = vx * hvx + vy * hvy + vz * hvz
-    g = out[1] * ux + out[2] * uy + out[3] * uz
-    h = out[1] * vx + out[2] * vy + out[3] * vz
-    det = a * c - b * b
-    if det <= 0.0 or a + c >= 0.0:
-        size = np.sqrt(g * g + h * h) + 1e-30
-        s, r = limit * g / size, limit * h / size
-    else:
-        s, r = -(c * g - b * h) / det, -(a * h - b * g) / det
-    size = np.sqrt(s * s + r * r)
-    if size > limit:
-        s, r = s * limit / size, r * limit / size
-    step[0], step[1], step[2] = s * ux + r * vx, s * uy + r * vy, s * uz + r * vz
+def values_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
+    """The blurred lattice (n,) at points (n, 3)."""
+    return jets_at(field, np.ascontiguousarray(points))[:, 0].copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 from typing import Any
 
@@ -19,4 +20,7 @@ def sparse_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     size = int(np.prod(shape))
     if size * kind.itemsize < mmap.PAGESIZE:
         return np.zeros(shape, kind)
-    return np.frombuffer(mmap.mmap(-1, size * kind.itemsize), kind, size).reshape(shape)
+    pages = mmap.mmap(-1, size * kind.itemsize, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    with contextlib.suppress(OSError):  # a system without pages of 2 MiB knows no such advice
+        pages.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(pages, kind, size).reshape(shape)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.motion import Motion
 from pipeline.load import Box, Header, Source, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.model import Lumen, Volume
-from pipeline.register.motion import Motion
 from pipeline.study.manifest import Case
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.arrays.resample import sampled
 from pipeline.load import Box, Header, scans
 from pipeline.load.config import LoadConfig
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.run.frame import Frame
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.region import sampled
 
 
 @dataclass(frozen=True, eq=False)

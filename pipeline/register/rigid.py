@@ -9,8 +9,9 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipeline.arrays.motion import Motion
+from pipeline.arrays.robust import spread
 from pipeline.model import Array, Volume
-from pipeline.register.motion import Motion
 
 EDGE_MEDIANS = 3.5
 """Steepness, in medians of it, from which a voxel belongs to a static structure: 5.4 sd of what noise makes."""
@@ -55,8 +56,7 @@ def metal_mask(frame: Volume, reference: Volume) -> NDArray[np.bool_]:
     size = 2 * REACH_VOXELS + 1
     ceiling = ndimage.maximum_filter(reference.values, size)
     difference = np.asarray(frame.values, np.float32) - reference.values
-    noise = 1.4826 * float(np.median(np.abs(difference - np.median(difference))))
-    metal = np.asarray(frame.values, np.float32) > ceiling + METAL_NOISES * noise
+    metal = np.asarray(frame.values, np.float32) > ceiling + METAL_NOISES * spread(difference)
     return np.asarray(ndimage.binary_dilation(metal, iterations=HALO_VOXELS) if metal.any() else metal)
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.axis_order import in_memory_order
-from pipeline.arrays.jets import jets_at, values_at
+from pipeline.arrays.jets import Blurred, jets_at, values_at
+from pipeline.arrays.motion import Motion
+from pipeline.arrays.robust import MAD
 from pipeline.model import Array, Volume
-from pipeline.register.motion import Motion
 
 BLUR_VOXELS = 1.0
 """Gaussian in which grey is read: wide enough to see a wall 2 voxels away, and it takes noise to 0.15."""
@@ -96,7 +97,8 @@ def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
     points = np.ascontiguousarray(points_mm[inside(reference, points_mm)])
     grid, _ = in_memory_order(reference)
     voxel = float(np.min(grid.spacing_mm))
-    jets = jets_at(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel, grid.to_index(points) * grid.spacing_mm)
+    field = Blurred(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel)
+    jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
     return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel)
 
 
@@ -120,7 +122,7 @@ def _reweighted(design: Array, grey: Array, used: NDArray[np.bool_]) -> tuple[Ar
         weighted = design * weights[:, None]
         solution = _seen(weighted.T @ design, weighted.T @ grey, scale)
         residual = grey - design @ solution
-        scale = 1.4826 * float(np.median(np.abs(residual[used]))) + 1e-9
+        scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     return solution, scale, residual
 
@@ -165,8 +167,8 @@ def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, roun
         at = motion.moved(s.points_mm)
         if np.mean(inside(frame, at)) < MOST_SEEN:
             return Fit(motion, float("inf"))
-        index = np.ascontiguousarray(grid.to_index(at))
-        grey = values_at(grid.values, grid.spacing_mm, s.blur_mm, index * grid.spacing_mm)
+        field = Blurred(grid.values, grid.spacing_mm, s.blur_mm)
+        grey = values_at(field, grid.to_index(at) * grid.spacing_mm)
         step, misfit = _step(s, at, grey, motion)
         motion = motion.then(Motion.about(motion.moved(s.centre_mm), step[3:], step[:3]))
         if np.linalg.norm(step[:3]) + np.linalg.norm(step[3:]) * s.radius_mm < STILL_VOXELS * s.voxel_mm:

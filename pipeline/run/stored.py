@@ -22,7 +22,12 @@ def pack_lumen(lumen: Lumen) -> tuple[Arrays, dict[str, Any]]:
         "origin": grid.origin_mm,
         "direction": grid.direction,
     }
-    meta = {"wall_level": lumen.wall_level, "warnings": lumen.warnings, "counters": dict(lumen.counters)}
+    meta = {
+        "wall_level": lumen.wall_level,
+        "warnings": lumen.warnings,
+        "counters": dict(lumen.counters),
+        "levels": dict(lumen.levels),
+    }
     return arrays, meta
 
 
@@ -31,7 +36,12 @@ def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
     distance = Grid(arrays["distance"], arrays["spacing"], arrays["origin"], arrays["direction"])
     mask = np.unpackbits(arrays["mask"], count=distance.values.size).reshape(distance.shape)
     return Lumen(
-        distance, distance.with_values(mask), meta["wall_level"], tuple(meta["warnings"]), meta["counters"]
+        distance,
+        distance.with_values(mask),
+        meta["wall_level"],
+        tuple(meta["warnings"]),
+        meta["counters"],
+        meta["levels"],
     )
 
 
@@ -49,6 +59,7 @@ def pack_curve(curve: Curve) -> tuple[Arrays, dict[str, Any]]:
         "status": curve.status.name,
         "note": curve.note,
         "counters": dict(curve.counters),
+        "levels": dict(curve.levels),
     }
     return arrays, meta
 
@@ -64,4 +75,5 @@ def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
         meta["note"],
         meta["counters"],
         arrays["in_plane"],
+        meta["levels"],
     )

@@ -18,7 +18,7 @@ def segment_vessel(run: CaseRun) -> None:
         from pipeline.segment.given import read_lumen
 
         with run.timed("segment"):
-            run.lumen = read_lumen(run.case.lumen.path, run.case, run.config)
+            run.lumen = read_lumen(run.case.lumen.path, run.config.segment)
         return
     assert run.headers is not None
     header = run.headers.first

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.tiles import LEVELS
-from pipeline.segment._kernels.connect import FULL
+from pipeline.segment._kernels.connect import FULL, Affinity
+from pipeline.segment._kernels.tiles import GREY_STEPS
+from pipeline.segment.levels import GreyLevels
 
 HALF_HEIGHT_SPREAD = 0.42
 """sigma of the object feature over the contrast: the feature is 0.5 half way down to the background."""
@@ -17,40 +17,6 @@ HOMOGENEITY_SPREAD = 0.17
 """sigma of the homogeneity over the contrast; a wall blurred by 0.8 voxel falls by 0.45 contrasts per voxel."""
 NOISE_SPREAD = 3.0
 """Least sigma of the homogeneity in standard deviations of the smoothed noise: noise alone must not cut a vessel."""
-
-
-@dataclass(frozen=True)
-class Levels:
-    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing."""
-
-    inside: float
-    outside: float
-    noise: float
-
-    @property
-    def contrast(self) -> float:
-        """Inside minus outside."""
-        return self.inside - self.outside
-
-    @property
-    def half(self) -> float:
-        """The level of the wall."""
-        return 0.5 * (self.inside + self.outside)
-
-
-@dataclass(frozen=True, eq=False)
-class Affinity:
-    """Tables of the pairwise affinity sqrt(H O), 0..255, over quantised grey: level = (grey - low) * scale.
-
-    H = exp(-(f - g)^2 / 2 s_H^2) and O = exp(-(m - (f + g)/2)^2 / 2 s_O^2), 1 above the object's mean m.
-    The geometric mean lets each feature veto: a weighted sum keeps a floor in any even background, and leaks.
-    """
-
-    homogeneity: NDArray[np.float32]
-    feature: NDArray[np.float32]
-    low: float
-    scale: float
-    taps: NDArray[np.float32]
 
 
 def binomial_taps(scale: int) -> NDArray[np.float32]:
@@ -61,32 +27,29 @@ def binomial_taps(scale: int) -> NDArray[np.float32]:
     return np.asarray(taps, np.float32)
 
 
-def smoothing_taps(levels: Levels) -> NDArray[np.float32]:
-    """A binomial kernel: sigma 0.7 voxel where contrast is above 5 noises, 1.0 below."""
-    return binomial_taps(1 if levels.noise / levels.contrast < 0.2 else 2)
-
-
 def noise_after(taps: NDArray[Any]) -> float:
     """Standard deviation of unit white noise after the separable kernel in three dimensions."""
     return float(np.sqrt(np.sum(np.asarray(taps, float) ** 2)) ** 3)
 
 
 def estimate_affinity(
-    levels: Levels,
+    levels: GreyLevels,
     homogeneity_sigma: float | None = None,
     feature_sigma: float | None = None,
     scale: int | None = None,
 ) -> Affinity:
     """The tables for an object with these levels; a sigma that is given (grey values) replaces the estimate."""
-    taps = smoothing_taps(levels) if scale is None else binomial_taps(scale)
+    if scale is None:  # a kernel of sigma 0.7 voxel where contrast is above 5 noises, 1.0 below
+        scale = 1 if levels.noise / levels.contrast < 0.2 else 2
+    taps = binomial_taps(scale)
     spread = NOISE_SPREAD * levels.noise * noise_after(taps)
     s_h = homogeneity_sigma or max(HOMOGENEITY_SPREAD * levels.contrast, spread)
     s_o = feature_sigma or HALF_HEIGHT_SPREAD * levels.contrast
     low = levels.outside - levels.contrast
     high = levels.inside + 2.0 * levels.contrast
-    step = (high - low) / (LEVELS - 1)
-    difference = step * np.arange(LEVELS)
-    mean = low + 0.5 * step * np.arange(2 * LEVELS - 1)
+    step = (high - low) / (GREY_STEPS - 1)
+    difference = step * np.arange(GREY_STEPS)
+    mean = low + 0.5 * step * np.arange(2 * GREY_STEPS - 1)
     below = np.maximum(levels.inside - mean, 0.0)
     h = np.exp(-0.25 * (difference / s_h) ** 2)
     o = np.exp(-0.25 * (below / s_o) ** 2)

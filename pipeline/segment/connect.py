@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.tiles import CELLS, SIDE
-from pipeline.segment._kernels.connect import FULL, flood, strengths
-from pipeline.segment.affinity import Affinity
+from pipeline.arrays.sparse import sparse_zeros
+from pipeline.segment._kernels.connect import FULL, READ, Affinity, Search, flood, strengths
+from pipeline.segment._kernels.tiles import CELLS, SIDE
 from solver.grid import Grid
 
 Index = NDArray[np.int64]
@@ -28,43 +28,32 @@ def cut_level(threshold: float) -> int:
     return min(FULL, max(1, round(threshold * FULL)))
 
 
-def _table(grid: Grid) -> NDArray[np.int32]:
-    """One entry a tile of the grid, 0: not read yet."""
-    return np.zeros([-(-n // SIDE) for n in grid.shape], np.int32)
+def _search(grid: Grid, affinity: Affinity, offsets: Index) -> Search:
+    tiles = np.zeros([-(-n // SIDE) + 2 for n in grid.shape], np.uint8)
+    cells = sparse_zeros((tiles.size * CELLS,), np.uint16)
+    return Search(grid.values, affinity, cells, tiles, np.ascontiguousarray(offsets))
+
+
+def _read(search: Search) -> float:
+    """Number of voxels read."""
+    return float(np.count_nonzero(search.tiles == READ) * CELLS)
 
 
 def connect(
     grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
 ) -> tuple[Index, float]:
     """Flat indices of the voxels connected to the seeds at ``threshold``, and the number of voxels read."""
-    a = affinity
-    order, tiles = flood(
-        grid.values, _table(grid), seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
-        cut_level(threshold),
-    )  # fmt: skip
-    return order, float(tiles * CELLS)
+    search = _search(grid, affinity, offsets)
+    return flood(search, seeds, cut_level(threshold)), _read(search)
 
 
 def strength_list(
     grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
 ) -> tuple[Index, NDArray[np.uint8], float]:
     """Flat indices of the voxels connected at ``threshold``, how strongly (0..255), and the number of voxels read."""
-    a = affinity
-    order, strength, tiles = strengths(
-        grid.values, _table(grid), seeds, offsets, a.taps, a.low, a.scale, a.homogeneity, a.feature,
-        cut_level(threshold),
-    )  # fmt: skip
-    return order, strength, float(tiles * CELLS)
-
-
-def strength_map(
-    grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
-) -> tuple[NDArray[np.uint8], Index]:
-    """Strength of connectedness 0..255 (0 below ``threshold``) and the flat indices of the voxels that have one."""
-    order, strength, _ = strength_list(grid, seeds, affinity, threshold, offsets)
-    out = np.zeros(grid.shape, np.uint8)
-    out.reshape(-1)[order] = strength
-    return out, order
+    search = _search(grid, affinity, offsets)
+    room = sparse_zeros(search.cells.shape, np.uint8)
+    return *strengths(search, seeds, cut_level(threshold), room), _read(search)
 
 
 def connect_relative(

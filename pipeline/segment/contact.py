@@ -11,9 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.segment._kernels.contact import along_cores, meetings, nearest_core, runs_on, thickness
+from pipeline.segment.region import Index
 from solver.grid import Array, Grid
 
 CORE = 0.7
@@ -58,18 +62,18 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
     )
 
 
-def _groups(places: NDArray[np.float64], apart: float) -> list[NDArray[np.int64]]:
-    """Indices of places (n, 3) that hang together by gaps of at most ``apart``."""
-    left, out = np.arange(len(places)), []
-    while len(left):
-        group, left = left[:1], left[1:]
-        fresh = group
-        while len(fresh) and len(left):
-            gaps = np.linalg.norm(places[left][:, None] - places[fresh][None], axis=2).min(axis=1)
-            fresh, left = left[gaps <= apart], left[gaps > apart]
-            group = np.concatenate([group, fresh])
-        out.append(group)
-    return out
+def parts(points: Array, apart: float) -> Index:
+    """The part (n,) that each point (n, 3) belongs to: points at most ``apart`` from one another hang together."""
+    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1], np.int64)
+
+
+def numbered(shape: tuple[int, ...], inner: Index) -> NDArray[np.int32]:
+    """A box that holds the position + 1 of each of the voxels ``inner`` (flat), 0 elsewhere."""
+    ids = sparse_zeros(shape, np.int32)
+    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
+    return ids
 
 
 def _vessels_only(
@@ -89,12 +93,13 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     distance : signed distance, mm, negative inside; C-contiguous.
     """
     values, spacing = distance.values, np.asarray(distance.spacing_mm)
-    inner = np.flatnonzero(values < 0)
+    # kernels step to neighbours without looking for the box's border: it is kept free
+    inside = np.pad(values < 0, 1)
+    inner = np.flatnonzero(inside)
     if len(inner) == 0:
         return ()
-    ids = sparse_zeros(values.shape, np.int32)
-    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
-    depth = -values.reshape(-1)[inner].astype(np.float64)
+    ids = numbered(inside.shape, inner)
+    depth = -values[values < 0].astype(np.float64)
     thick = thickness(ids, inner, depth, spacing)
     core = depth >= CORE * thick
     part, steps = along_cores(ids, inner, core)
@@ -108,9 +113,13 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
         radius = thick[core_voxel] / voxel
         window, least = int(np.ceil(WINDOW * radius)), int(np.ceil(ONWARD * radius))
         passes[core_voxel] = runs_on(ids, inner, part, steps, int(core_voxel), window, least)
-    kept = np.array([passes[p] and passes[q] for _, p, q in found], bool)
-    index = np.stack(np.unravel_index(inner[found[kept, 0]], values.shape), axis=1)
-    apart = 2.0 * float(np.median(thick[found[kept, 1]])) / voxel if kept.any() else 0.0
+    found = found[[passes[p] and passes[q] for _, p, q in found]]
+    if len(found) == 0:
+        return ()
+    places = np.stack(np.unravel_index(inner[found[:, 0]], ids.shape), axis=1) - 1
+    group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
     face = float(np.prod(spacing) ** (2 / 3))
-    groups = [g for g in _groups(index.astype(float), apart) if len(g) >= LEAST_FACES]
-    return tuple(Contact(distance.to_mm(index[g].mean(axis=0)), len(g) * face) for g in groups)
+    groups = [places[group == n] for n in range(group.max() + 1)]
+    return tuple(
+        Contact(distance.to_mm(g.mean(axis=0)), len(g) * face) for g in groups if len(g) >= LEAST_FACES
+    )

@@ -13,11 +13,11 @@ from pipeline.load import LoadError, load, read_header
 from pipeline.load.curves import RAS_TO_LPS, Branches, read_markups_branches, read_swc
 from pipeline.load.surfaces import Shapes, read_stl, read_vtp
 from pipeline.model import Lumen
+from pipeline.segment._kernels.distance import propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
-from pipeline.segment._kernels.wall import distances, propagate
-from pipeline.segment.affinity import Levels
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.surface import prepare, signed_distance
+from pipeline.segment.levels import GreyLevels
+from pipeline.segment.surface import prepare, signed, signed_distance
 from solver.grid import Grid
 
 VOXEL_MM = 0.3
@@ -67,21 +67,18 @@ def lumen_from_surface(shapes: Shapes, path: Path, config: SegmentConfig) -> Lum
     corners = np.ascontiguousarray((points - grid.origin_mm)[shapes.triangles])
     spacing = np.asarray(grid.spacing_mm)
     voxel = float(spacing[0])
-    inside = np.zeros(grid.shape, np.uint8)
+    inside, owner = np.zeros(grid.shape, np.uint8), np.zeros(grid.shape, np.int32)
     enclosed(corners, spacing, inside)
     area = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     corners = np.ascontiguousarray(corners[area > 1e-9 * voxel**2])
-    room = int(8 * area.sum() / voxel**2) + 8 * len(corners) + 1000
-    owner = np.zeros(grid.shape, np.int32)
-    foot = np.zeros((room, 3))
-    found = splat_triangles(corners, spacing, 1.5 * voxel, owner, foot)
-    voxels = found[:, 0]
-    feet, normal, flat = foot[: len(voxels)], np.zeros((len(voxels), 3)), np.zeros(len(voxels))
-    propagate(owner, inside, spacing, voxels, feet, config.outer_mm)
-    distance = owner.view(np.float32)
-    distances(owner, inside, spacing, feet, normal, flat, config.outer_mm, 0, distance)
+    foot = np.zeros((int(8 * area.sum() / voxel**2) + 8 * len(corners) + 1000, 3))
+    voxels = splat_triangles(corners, spacing, 1.5 * voxel, owner, foot)[:, 0]
+    foot = foot[: len(voxels)]
+    propagate(owner, inside, spacing, voxels, foot, config.outer_mm)
+    flat = (foot, np.zeros_like(foot), np.zeros(len(foot)))
+    distance = signed(owner, inside, spacing, flat, config.outer_mm, 0)
     return _lumen(
         grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)"
     )
@@ -98,27 +95,26 @@ def lumen_from_labels(path: Path, config: SegmentConfig) -> Lumen:
         raise LoadError(msg)
     binary = grid.with_values((grid.values != 0).astype(np.uint8))
     site = prepare(binary, order, LABEL_TAPS, config.margin_mm)
-    values, _ = signed_distance(site, Levels(1.0, 0.0, 0.0), config.outer_mm)
+    values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0), config.outer_mm).values
     distance = reorder(site.grid.with_values(values), axes)
     return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 
 
-def read_lumen(path: Path, case: Any = None, config: Any = None) -> Lumen:
+def read_lumen(path: Path, config: SegmentConfig) -> Lumen:
     """The lumen in a file: .swc or .mrk.json (centreline with radius), .stl or .vtp (closed surface), else label map.
 
-    ``config`` : SegmentConfig, or a Config that holds one. Raises LoadError when the file does not hold a lumen.
+    Raises LoadError when the file does not hold a lumen.
     """
-    own = getattr(config, "segment", config) or SegmentConfig()
     name = path.name.lower()
     if not path.exists():
         msg = f"{path}: no such file; check lumen in the manifest (relative to the manifest itself)"
         raise LoadError(msg)
     if name.endswith(".swc"):
-        return lumen_from_branches(read_swc(path), own)
+        return lumen_from_branches(read_swc(path), config)
     if name.endswith(".mrk.json"):
-        return lumen_from_branches(read_markups_branches(path), own)
+        return lumen_from_branches(read_markups_branches(path), config)
     if name.endswith(".stl"):
-        return lumen_from_surface(read_stl(path), path, own)
+        return lumen_from_surface(read_stl(path), path, config)
     if name.endswith(".vtp"):
-        return lumen_from_surface(read_vtp(path), path, own)
-    return lumen_from_labels(path, own)
+        return lumen_from_surface(read_vtp(path), path, config)
+    return lumen_from_labels(path, config)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,16 +10,34 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.segment.affinity import Levels
+from pipeline.arrays.robust import spread
 from solver.grid import Grid
 
 BOX_MM = 6.0
 """Half width of the box around a seed in which the levels are estimated: a carotid artery and what is around it."""
 LEAST_BOX = 8
 """Its least half width in voxels."""
-MAD = 1.4826
 THICK = 5.0
 """Depth over blur from which grey in the middle is the plateau."""
+
+
+@dataclass(frozen=True)
+class GreyLevels:
+    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing."""
+
+    inside: float
+    outside: float
+    noise: float
+
+    @property
+    def contrast(self) -> float:
+        """Inside minus outside."""
+        return self.inside - self.outside
+
+    @property
+    def half(self) -> float:
+        """The level of the wall."""
+        return 0.5 * (self.inside + self.outside)
 
 
 def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
@@ -64,11 +83,11 @@ def _noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
     if core.sum() < 100:
         core = ~ndimage.binary_dilation(region, iterations=4)
     values = rough[core] if core.any() else rough.ravel()
-    return MAD * float(np.median(np.abs(values - np.median(values)))) / 0.935
+    return spread(values) / 0.935
 
 
-def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[Levels, NDArray[np.int64]]:
-    """Levels around one seed voxel, and the brightest smoothed voxel beside it, where to start.
+def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
+    """GreyLevels around one seed voxel, and the brightest smoothed voxel beside it, where to start.
 
     Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
     """
@@ -87,25 +106,7 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[Levels, NDArray[np.int64
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
     inside, outside, region = _two_levels(grey, seed, at)
     noise = _noise(raw - grey, region)
-    return Levels(inside, outside, noise), start + np.array(at)
-
-
-def plateau(distance_mm: NDArray[Any], grey: NDArray[Any], levels: Levels, blur_mm: float) -> Levels:
-    """The levels again, from the deepest part of the whole vessel.
-
-    distance_mm, grey : (n,) of the voxels inside.  blur_mm : the scanner's.  A tube no thicker than its blur never
-    reaches its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2).
-    """
-    depth = float(np.percentile(-distance_mm, 99))
-    core = np.flatnonzero(-distance_mm > 0.7 * depth)
-    if depth > THICK * blur_mm:
-        return Levels(_median(grey[core], levels.inside), levels.outside, levels.noise)
-    core = core[:: max(1, len(core) // 500)]
-    radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
-    off_axis = np.maximum(radius + distance_mm[core], 0.0)
-    share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
-    peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
-    return Levels(levels.outside + peak, levels.outside, levels.noise)
+    return GreyLevels(inside, outside, noise), start + np.array(at)
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
@@ -115,12 +116,25 @@ def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
     return float(np.sqrt(max(blur_mm**2 - smoothing * voxel**2, (0.3 * voxel) ** 2)))
 
 
-def deepest(grid: Grid, distance: Grid, levels: Levels, taps: NDArray[Any], blur_mm: float) -> Levels:
-    """:func:`plateau` of a segmented vessel; ``blur_mm`` is the whole blur, of which smoothing is taken off."""
-    own = scanner_blur(blur_mm, taps, float(np.min(grid.spacing_mm)))
-    corner = np.rint(grid.to_index(distance.origin_mm)).astype(int)
-    window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> GreyLevels:
+    """The levels again, from the deepest part of the whole segmented vessel.
+
+    distance : signed, on a box of the scan.  blur_mm : the scanner's.  A tube no thicker than its blur never reaches
+    its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2).
+    """
     inside = distance.values < 0
-    if not np.isfinite(own) or not inside.any():
+    if not np.isfinite(blur_mm) or not inside.any():
         return levels
-    return plateau(distance.values[inside], grid.values[window][inside], levels, float(own))
+    corner = np.rint(scan.to_index(distance.origin_mm)).astype(int)
+    window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    off_wall, grey = -distance.values[inside], scan.values[window][inside]
+    depth = float(np.percentile(off_wall, 99))
+    core = np.flatnonzero(off_wall > 0.7 * depth)
+    if depth > THICK * blur_mm:
+        return GreyLevels(_median(grey[core], levels.inside), levels.outside, levels.noise)
+    core = core[:: max(1, len(core) // 500)]
+    radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
+    off_axis = np.maximum(radius - off_wall[core], 0.0)
+    share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
+    peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
+    return GreyLevels(levels.outside + peak, levels.outside, levels.noise)

@@ -3,166 +3,179 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.sparse import sparse_zeros
+from pipeline.model import Counters
+from pipeline.segment._kernels.distance import distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import (
     PAD,
+    Wall,
     dilate,
-    distances,
-    ends,
     feet,
-    into_box,
-    lost_feet,
     mean_around,
-    propagate,
     smooth_lattice,
     surface_voxels,
 )
-from pipeline.segment.affinity import Levels
 from pipeline.segment.blur import blur_of_wall, half_level_offset
-from pipeline.status import FrameStatus, StageError
+from pipeline.segment.levels import GreyLevels, plateau, scanner_blur
+from pipeline.segment.region import Index, failed
 from solver.grid import Array, Grid
 
 LAYERS = 4
 """Layers around the mask in which grey is smoothed: two may still be inside, two more feed the spline."""
 DEEP = 3
 """Mark of the last layer (mask = 1) that may be inside: connectedness is off by up to half a voxel, noise by one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Box:
-    """The vessel's padded box in the volume: the volume voxel of its voxel (PAD, PAD, PAD), and its arrays."""
-
-    corner: NDArray[np.int64]
-    shape: tuple[int, int, int]
-
-
-def box_of(order: NDArray[np.int64], grid: Grid, margin_mm: float) -> Box:
-    """The box that holds the voxels (flat indices) and ``margin_mm`` around them, clipped to the grid, then padded."""
-    margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
-    first, last = ends(order, grid.shape)
-    low = np.maximum(first - margin, 0)
-    high = np.minimum(last + margin + 1, grid.shape)
-    a, b, c = (int(n) + 2 * PAD for n in high - low)
-    return Box(low, (a, b, c))
-
-
-@dataclass(frozen=True, eq=False)
-class Wall:
-    """The surface's closest points and what they tell: foot, normal, curvature (1/mm), steepness (grey per mm)."""
-
-    voxels: NDArray[np.int64]
-    distance: Array
-    foot: Array
-    normal: Array
-    curvature: Array
-    steepness: Array
-
-
-def find_wall(
-    lattice: NDArray[Any], level: float, spacing: Array, voxels: NDArray[Any], inside: NDArray[Any]
-) -> Wall:
-    """Closest points of the voxels next to the half-level surface."""
-    n = len(voxels)
-    foot, normal = np.zeros((n, 3)), np.zeros((n, 3))
-    curvature, steepness = np.zeros(n), np.zeros(n)
-    distance = feet(lattice, level, spacing, voxels, inside, foot, normal, curvature, steepness)
-    return Wall(voxels, distance, foot, normal, curvature, steepness)
-
-
-def corrected(wall: Wall, owner: NDArray[np.int32], sigma_mm: float, spacing: Array) -> tuple[Wall, Array]:
-    """The wall moved out by the blur's offset, and the curvature averaged over the neighbourhood, 1/mm.
-
-    Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
-    """
-    good = np.isfinite(wall.distance)
-    limit = 1.0 / float(spacing.min())
-    bend = mean_around(owner, wall.voxels, np.clip(wall.curvature, -limit, limit), good, 2)
-    offset = half_level_offset(bend, sigma_mm)
-    moved = wall.foot + offset[:, None] * wall.normal
-    return Wall(wall.voxels, wall.distance - offset, moved, wall.normal, bend, wall.steepness), bend
+LEVEL_TOLERANCE = 0.03
+"""Change of the wall's level, in contrasts, that is worth a second surface; a smaller one just shifts the wall."""
+THIN_TOLERANCE = 0.004
+"""The same where no vessel is thick: there level, curvature and blur hang together."""
+SURFACE_ROUNDS = 3
+"""Surfaces at most beyond the first: only a vessel as thin as its blur, whose plateau is not seen, needs them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Site:
-    """A connected region about to get a surface: its padded box, and its mask with layers around it.
+    """A region about to get a surface: its padded box, and its mask with layers around it.
 
-    volume : C-contiguous grey.  near : flat indices in the box where ``state`` (mask 1, layers 2, 3, ...) is set.
+    volume : C-contiguous grey.  corner : the volume's voxel that is (PAD, PAD, PAD) of the box.  state : uint8 box,
+    mask 1, layers 2, 3, ...  near : flat indices where it is set.
     """
 
     volume: Grid
     taps: NDArray[np.float32]
-    box: Box
+    corner: Index
     state: NDArray[np.uint8]
-    near: NDArray[np.int64]
+    near: Index
 
     @property
     def grid(self) -> Grid:
         """The box without its padding, holding nothing yet."""
-        a, b, c = (n - 2 * PAD for n in self.box.shape)
-        empty = np.broadcast_to(np.float32(0), (a, b, c))
-        return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.box.corner), self.volume.direction)
+        empty = np.broadcast_to(np.float32(0), [n - 2 * PAD for n in self.state.shape])
+        return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
+
+
+def box_around(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, tuple[int, ...]]:
+    """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded."""
+    margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
+    index = np.unravel_index(voxels, grid.shape)
+    low = np.maximum(np.array([i.min() for i in index]) - margin, 0)
+    high = np.minimum(np.array([i.max() for i in index]) + margin + 1, grid.shape)
+    return low, tuple(int(n) + 2 * PAD for n in high - low)
+
+
+def into_box(voxels: Index, grid: Grid, corner: Index, shape: tuple[int, ...]) -> Index:
+    """Flat indices in a padded box of flat indices in the grid."""
+    index = np.unravel_index(voxels, grid.shape)
+    return np.asarray(
+        np.ravel_multi_index(tuple(i - c + PAD for i, c in zip(index, corner, strict=True)), shape)
+    )
 
 
 def prepare(
-    volume: Grid,
-    order: NDArray[np.int64],
-    taps: NDArray[np.float32],
-    margin_mm: float,
-    more: NDArray[np.int64] | None = None,
+    volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index | None = None
 ) -> Site:
     """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them.
 
     more : further voxels that the box must hold.
     """
-    box = box_of(order if more is None else np.concatenate([order, more]), volume, margin_mm)
-    state = sparse_zeros(box.shape, np.uint8)
-    flat = into_box(order, volume.shape, box.corner, box.shape)
+    corner, shape = box_around(order if more is None else np.concatenate([order, more]), volume, margin_mm)
+    state = sparse_zeros(shape, np.uint8)
+    flat = into_box(order, volume, corner, shape)
     state.reshape(-1)[flat] = 1
     dilate(state, flat, LAYERS, 2)
-    return Site(volume, taps, box, state, np.flatnonzero(state))
+    return Site(volume, taps, corner, state, np.flatnonzero(state))
 
 
-def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> Wall:
-    """Closest points on the surface where smoothed grey is ``level``; marks ``inside``."""
-    lattice = sparse_zeros(site.box.shape, np.float32)
-    smooth_lattice(site.volume.values, site.box.corner, site.taps, site.state, site.near, lattice)
+def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tuple[Index, Wall]:
+    """The voxels (flat) next to the surface where smoothed grey is ``level``, and the wall there; marks ``inside``."""
+    lattice = sparse_zeros(site.state.shape, np.float32)
+    smooth_lattice(site.volume.values, site.corner, site.taps, site.state, site.near, lattice)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    return find_wall(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
+    return voxels, feet(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
 
 
-def signed_distance(
-    site: Site, levels: Levels, outer_mm: float
-) -> tuple[NDArray[np.float32], dict[str, float]]:
-    """Signed distance (float32, mm, negative inside) on ``site.grid``.
+def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, voxel: float) -> Wall:
+    """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood.
 
-    Outside, beyond ``outer_mm``, the distance stays at ``outer_mm``. Returns also counters: visits, surface voxels,
-    blur_mm.
+    Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
     """
-    shape, spacing = site.box.shape, np.asarray(site.volume.spacing_mm)
-    inside = sparse_zeros(shape, np.uint8)
-    wall = _half_level_wall(site, levels.half, inside)
-    voxels, good = wall.voxels, np.isfinite(wall.distance)
+    bend = np.clip(wall.curvature, -1.0 / voxel, 1.0 / voxel)
+    bend = mean_around(owner, voxels, bend, np.isfinite(wall.distance), 2)
+    offset = half_level_offset(bend, blur_mm)
+    foot = wall.foot + offset[:, None] * wall.normal
+    return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)
+
+
+def signed(
+    owner: NDArray[np.int32], inside: NDArray[np.uint8], spacing: Array, wall: tuple[Array, Array, Array],
+    outer_mm: float, pad: int,
+) -> NDArray[np.float32]:  # fmt: skip
+    """Signed distances on a box less its padding, from every voxel's foot, the normal and the curvature there.
+
+    They overwrite the feet's numbers (``owner``) that they are read from: one box is held instead of two.
+    """
+    shape = tuple(n - 2 * pad for n in owner.shape)
+    values = owner.reshape(-1).view(np.float32)[: int(np.prod(shape))].reshape(shape)
+    distances(owner, inside, spacing, wall, outer_mm, values)
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class SignedDistance:
+    """values : float32, mm, negative inside, on the site's grid; beyond ``outer_mm`` outside they stay there.
+
+    level : the grey taken as the wall.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
+    """
+
+    values: NDArray[np.float32]
+    level: float
+    blur_mm: float
+    counters: Counters
+
+
+def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
+    """The distance from the surface at the half level."""
+    spacing: Array = np.asarray(site.volume.spacing_mm)
+    inside, owner = sparse_zeros(site.state.shape, np.uint8), np.zeros(site.state.shape, np.int32)
+    voxels, wall = _half_level_wall(site, levels.half, inside)
+    good = np.isfinite(wall.distance)
     if not good.any():
-        got = f"no place where smoothed grey is {levels.half:.0f}, half way between the vessel and its surroundings"
+        got = f"got no place where smoothed grey is {levels.half:.0f}, half way between the vessel and its surroundings"
         do = "the vessel is thinner than its blur: scan with smaller voxels, or set segment.scale = 0"
-        msg = f"segment: got {got}; expected a surface; {do}"
-        raise StageError(FrameStatus.SEGMENT_FAILED, msg)
-    owner = np.zeros(shape, np.int32)
-    owner.reshape(-1)[voxels[good]] = np.flatnonzero(good) + 1
+        raise failed(got, "a surface", do)
+    seen = voxels[good]
+    owner.reshape(-1)[seen] = np.flatnonzero(good) + 1
     blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
-    wall, bend = corrected(wall, owner, blur, spacing)
-    inside.reshape(-1)[voxels[good]] = wall.distance[good] < 0
-    visits = propagate(owner, inside, spacing, voxels, wall.foot, outer_mm)
+    wall = _corrected(wall, voxels, owner, blur, float(spacing.min()))
+    inside.reshape(-1)[seen] = wall.distance[good] < 0
+    visits = propagate(owner, inside, spacing, seen, wall.foot, outer_mm)
     stray = lost_feet(owner, spacing, voxels, wall.foot, good)
     if len(stray):
-        bend[stray] = 0.0
+        wall.curvature[stray] = 0.0
         visits += propagate(owner, inside, spacing, voxels[stray], wall.foot, outer_mm)
-    # the distances overwrite the feet's numbers they are read from: one box is held instead of two
-    values = owner.reshape(-1).view(np.float32)[: site.grid.values.size].reshape(site.grid.shape)
-    distances(owner, inside, spacing, wall.foot, wall.normal, bend, outer_mm, PAD, values)
-    return values, {"surface_voxels": float(len(voxels)), "distance_visits": float(visits), "blur_mm": blur}
+    values = signed(owner, inside, spacing, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
+    counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits)}
+    return SignedDistance(values, levels.half, blur, counters)
+
+
+def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
+    """The distance from the wall, whose level is taken again from the surface that it leads to."""
+    voxel = float(np.min(site.volume.spacing_mm))
+    found = signed_distance(site, levels, outer_mm)
+    for _ in range(SURFACE_ROUNDS):
+        own = scanner_blur(found.blur_mm, site.taps, voxel)
+        again = plateau(site.volume, site.grid.with_values(found.values), levels, own)
+        thin = -float(found.values.min()) < 4 * found.blur_mm
+        if abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast:
+            break
+        levels = again
+        del found  # before the next takes its place in memory
+        found = signed_distance(site, levels, outer_mm)
+    # what is left of the change moves the wall by change over steepness
+    steepness = levels.contrast / (np.sqrt(2 * np.pi) * found.blur_mm)
+    values = found.values
+    values += np.float32((again.half - levels.half) / steepness)
+    return SignedDistance(values, again.half, found.blur_mm, found.counters)

@@ -8,23 +8,26 @@ skirt of the vessel, what hangs together at a lower grey, is long, thin and nowh
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.jets import Blurred
+from pipeline.arrays.smooth import smooth_voxels
 from pipeline.arrays.sparse import sparse_zeros
+from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
+from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.contact import along_cores
+from pipeline.segment._kernels.crests import crests
 from pipeline.segment._kernels.solids import cones
-from pipeline.segment._kernels.thin import crests
-from pipeline.segment._kernels.wall import PAD, dilate, into_box
-from pipeline.segment.affinity import Affinity, Levels, noise_after
+from pipeline.segment._kernels.wall import PAD, dilate
+from pipeline.segment.affinity import noise_after
 from pipeline.segment.connect import connect, neighbours
-from pipeline.segment.surface import Box, box_of
-from pipeline.trace._kernels.ridges import smooth_voxels
+from pipeline.segment.contact import numbered, parts
+from pipeline.segment.levels import GreyLevels
+from pipeline.segment.region import Index
+from pipeline.segment.surface import box_around, into_box
 from solver.grid import Array, Grid
 
 FAINTEST = 0.09
@@ -53,7 +56,6 @@ HIGHEST = 0.85
 """Share of the brightest crest point within three voxels that another must have: half a blur off it is 0.88."""
 SHARP = 0.4
 """Curvature of a crest over that of a Gaussian line of its height: half a blur off its middle it is down to 0.7."""
-Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,35 +66,35 @@ class Balls:
     radius: Array
 
 
-def _low_affinity(levels: Levels, affinity: Affinity) -> Affinity | None:
+def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
     """Tables that link any two voxels whose mean is above the faintest grey; None where noise leaves no room."""
     least = max(FAINTEST, SIGMAS * levels.noise * noise_after(affinity.taps) / levels.contrast)
     if least > 0.4:
         return None
     mean = affinity.low + 0.5 / affinity.scale * np.arange(len(affinity.feature))
     feature = (mean >= levels.outside + least * levels.contrast).astype(np.float32)
-    return Affinity(
-        np.full_like(affinity.homogeneity, 255.0), feature, affinity.low, affinity.scale, affinity.taps
-    )
+    alike = np.full_like(affinity.homogeneity, FULL_STRENGTH)
+    return affinity._replace(homogeneity=alike, feature=feature)
 
 
-def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Any]:
-    """Voxels of ``low`` (flat, ascending) that the blur of ``thick`` does not reach, and their box of positions + 1."""
-    box: Box = box_of(low, volume, 0.0)
-    state = sparse_zeros(box.shape, np.uint8)
-    main, wide = (into_box(o, volume.shape, box.corner, box.shape) for o in (thick, low))
+def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, NDArray[np.int32], Index]:
+    """Voxels of ``low`` that the blur of ``thick`` does not reach, a box of their positions + 1, and where it has them.
+
+    All voxels are flat indices; those returned ascend.
+    """
+    corner, shape = box_around(low, volume, 0.0)
+    state = sparse_zeros(shape, np.uint8)
+    main, wide = (into_box(o, volume, corner, shape) for o in (thick, low))
     state.reshape(-1)[main] = 1
     dilate(state, main, SKIRT, 2)
-    rest = np.flatnonzero(state.reshape(-1)[wide] == 0)
-    inner = np.sort(wide[rest])
-    ids = sparse_zeros(box.shape, np.int32)
-    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
-    index = np.stack(np.unravel_index(inner, box.shape), axis=1) - PAD + box.corner
-    return np.ravel_multi_index(tuple(index.T), volume.shape), (ids, inner)
+    inner = np.sort(wide[state.reshape(-1)[wide] == 0])
+    index = np.unravel_index(inner, shape)
+    found = np.ravel_multi_index(tuple(i - PAD + c for i, c in zip(index, corner, strict=True)), volume.shape)
+    return found, numbered(shape, inner), inner
 
 
 def thin_branches(
-    volume: Grid, seeds: Index, order: Index, levels: Levels, affinity: Affinity
+    volume: Grid, seeds: Index, order: Index, levels: GreyLevels, affinity: Affinity
 ) -> tuple[Index, float]:
     """Flat indices of the voxels of thin branches beyond the vessel ``order``, and the number of voxels read."""
     tables = _low_affinity(levels, affinity)
@@ -104,7 +106,7 @@ def thin_branches(
     thick = order[bright >= levels.outside + FULL * levels.contrast]
     if len(low) <= len(order) or len(thick) == 0:
         return nothing, read
-    found, (ids, inner) = _beyond_skirt(volume, thick, low)
+    found, ids, inner = _beyond_skirt(volume, thick, low)
     if len(found) < SHORTEST:
         return nothing, read
     part, steps = along_cores(ids, inner, np.ones(len(inner), bool))
@@ -123,12 +125,12 @@ def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
     return np.array([s >= HIGHEST * share[n].max() for s, n in zip(share, near, strict=True)], bool)
 
 
-def balls(volume: Grid, thin: Index, corner: Index, levels: Levels, blur_mm: float) -> Balls:
+def balls(volume: Grid, thin: Index, corner: Index, levels: GreyLevels, blur_mm: float) -> Balls:
     """Crest points of thin branches and the radii that their peaks tell. blur_mm : the scanner's."""
     spacing = np.asarray(volume.spacing_mm)
     sigma = CREST_VOXELS * float(spacing.min())
     whole = float(np.hypot(blur_mm, sigma))
-    at, peak = crests(volume.values, spacing, sigma, thin, levels.outside, SHARP / whole**2)
+    at, peak = crests(Blurred(volume.values, spacing, sigma), thin, levels.outside, SHARP / whole**2)
     share = np.clip((peak - levels.outside) / levels.contrast, 0.0, 0.95)
     radius = whole * np.sqrt(-2.0 * np.log1p(-share))
     good = np.flatnonzero(share > 0)
@@ -137,13 +139,6 @@ def balls(volume: Grid, thin: Index, corner: Index, levels: Levels, blur_mm: flo
     _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
     thickest = np.maximum(radius[good][first], LEAST_RADIUS * float(spacing.min()))
     return Balls(at[good][first] - corner * spacing, thickest)
-
-
-def _pieces(points: Array, apart: float) -> NDArray[np.int64]:
-    """The piece (n,) that each point belongs to: points at most ``apart`` from one another hang together."""
-    pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
-    return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
 def _nearest(places: Array, points: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -158,7 +153,7 @@ def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_
     Returns also (b, 2): from a point to the place it hangs on, (b, 2, 3). Pieces are joined nearest first, as in
     Prim's minimum spanning tree: the gaps are the skirts that were cut out of one connected region.
     """
-    piece = _pieces(points, 2.0)
+    piece = parts(points, 2.0)
     gap, at = _nearest(vessel, points)
     foot = vessel[at]
     free, bridges = np.ones(len(points), bool), []

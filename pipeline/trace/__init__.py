@@ -2,7 +2,56 @@
 
 from __future__ import annotations
 
-from pipeline.trace.follow import trace
-from pipeline.trace.in_region import trace_region
+from dataclasses import replace
 
-__all__ = ["trace", "trace_region"]
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pipeline.model import Curve, Lumen, Volume
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import EntryPose
+from pipeline.trace.config import TraceConfig
+from pipeline.trace.explain import explained, missed_mm
+from pipeline.trace.in_plane import near_rotation_plane
+from pipeline.trace.subtraction import subtracted
+
+__all__ = ["trace"]
+
+BACK_END = explained
+"""How the curve is found: (subtraction, entry, previous, config) -> Curve."""
+
+
+def trace(
+    frame: Volume,
+    lumen: Lumen,
+    entry_mm: ArrayLike,
+    entry_direction: ArrayLike,
+    *,
+    reference: Volume | None = None,
+    previous: Curve | None = None,
+    expected_mm: float | None = None,
+    config: TraceConfig | None = None,
+) -> Curve:
+    """The wire of one frame from the plane of entry to the tip.
+
+    frame, reference : scans of one geometry, with and without wire (without: the background is modelled from the
+    lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve of the frame before, if any; it is
+    consulted only where the frame alone leaves doubts.  expected_mm : insertion depth, which helps to decide.
+    Returns a Curve; what went wrong is its status and note.
+    """
+    config = config or TraceConfig()
+    image = subtracted(frame, lumen, reference)
+    heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
+    entry = EntryPose(image.local(np.asarray(entry_mm, float)[None])[0], image.turned(heading), expected_mm)
+    curve = BACK_END(image, entry, previous, config)
+    if len(curve.points_mm) == 0:
+        return curve
+    axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
+    in_plane = near_rotation_plane(curve.points_mm, axis, config.in_plane_deg)
+    in_plane_mm = float(in_plane.mean()) * curve.length_mm
+    curve = replace(curve, in_plane=in_plane, counters={**curve.counters, "in_plane_mm": in_plane_mm})
+    if curve.status is FrameStatus.OK and missed_mm(curve.length_mm, entry, config) > 0:
+        note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
+        note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest"
+        return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)
+    return curve

@@ -10,50 +10,46 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
+from pipeline.arrays.resample import sampled
+from pipeline.arrays.robust import spread
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Lumen, Volume
-from pipeline.trace._kernels.background import denoised, model, residual
-from pipeline.trace.region import HALO_VOXELS, MAD, Region, sampled
+from pipeline.trace._kernels.runs import WallModel, denoised, modelled, residual
+from pipeline.trace.region import HALO_VOXELS, Region, voxels_of
 from solver.grid import Grid
 
 TABLE_HALF = 160
-"""Entries of the wall's profile on either side, a twentieth of a voxel apart."""
+"""Entries of the wall's profile on either side."""
+TABLE_STEP = 0.05
+"""Voxels from one to the next."""
 SMOOTH_VOXELS = 1.0
 """Gaussian with which the reference's departure from the model is smoothed: its noise falls to 0.15."""
-_backgrounds: weakref.WeakKeyDictionary[Grid, tuple[Any, NDArray[Any]]] = weakref.WeakKeyDictionary()
 
 
 def wall_blur(lumen: Lumen, voxel: float) -> float:
-    """The scanner's blur as segment found it, else 0.9 voxel."""
-    found = float(lumen.counters.get("scanner_blur_mm", float("nan")))
+    """The scanner's blur (mm) as segment found it, else 0.9 voxel."""
+    found = float(lumen.levels.get("scanner_blur_mm", float("nan")))
     return found if np.isfinite(found) and found > 0.3 * voxel else 0.9 * voxel
 
 
-def _profile(grey: NDArray[Any], distance: NDArray[Any], voxel: float, blur: float) -> NDArray[np.float64]:
+def _wall_model(scan: Grid, corner: NDArray[np.int64], region: Region, lumen: Lumen) -> WallModel:
     """Grey over signed distance: the medians well inside and 2 to 4 voxels outside, joined by a blurred step."""
+    voxel = float(np.min(scan.spacing_mm))
+    # every hundredth run or so is enough for two medians
+    at = voxels_of(region.runs[:: max(1, len(region.runs) // 2000)])
+    grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
     deep, out = distance < -voxel, (distance > 2 * voxel) & (distance < HALO_VOXELS * voxel)
     inside = float(np.median(grey[deep if deep.any() else distance < 0]))
     outside = float(np.median(grey[out])) if out.any() else inside
-    at = np.arange(-TABLE_HALF, TABLE_HALF + 1) * 0.05 * voxel
-    return np.asarray(outside + (inside - outside) * ndtr(-at / blur))
+    steps = np.arange(-TABLE_HALF, TABLE_HALF + 1) * TABLE_STEP * voxel
+    table = outside + (inside - outside) * ndtr(-steps / wall_blur(lumen, voxel))
+    return WallModel(region.box.values, region.runs, table, TABLE_STEP * voxel)
 
 
-def _sample(scan: Grid, corner: NDArray[np.int64], region: Region) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Grey and distance at every hundredth run or so, enough for two medians."""
-    runs = region.runs[:: max(1, len(region.runs) // 2000)]
-    length = runs[:, 3] - runs[:, 2]
-    row = np.repeat(runs[:, :3], length, axis=0)
-    row[:, 2] += np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
-    at = row + corner
-    return scan.values[tuple(at.T)], region.box.values[tuple(row.T)]
-
-
-def modelled(frame: Grid, region: Region, lumen: Lumen) -> NDArray[np.float32]:
+def from_wall(frame: Grid, region: Region, lumen: Lumen) -> NDArray[np.float32]:
     """A background without a reference: two grey levels of the frame itself, joined by the blurred wall."""
-    voxel = float(np.min(frame.spacing_mm))
-    table = _profile(*_sample(frame, region.corner, region), voxel, wall_blur(lumen, voxel))
     out = sparse_zeros(region.box.shape, np.float32)
-    model(region.box.values, region.runs, table, 0.05 * voxel, out)
+    modelled(_wall_model(frame, region.corner, region, lumen), out)
     return out
 
 
@@ -68,24 +64,28 @@ def _on_box(reference: Volume, region: Region, axes: tuple[int, int, int]) -> tu
     return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
 
 
-def smoothed(reference: Volume, region: Region, lumen: Lumen, axes: tuple[int, int, int]) -> NDArray[Any]:
-    """The reference near the lumen, its noise smoothed away; worked out once, since frames share it."""
-    known = _backgrounds.get(reference)
-    if known is not None and known[0] is region:
-        return known[1]
+def _smoothed(reference: Volume, region: Region, lumen: Lumen, axes: tuple[int, int, int]) -> NDArray[Any]:
     scan, corner = _on_box(reference, region, axes)
-    voxel = float(np.min(scan.spacing_mm))
-    table = _profile(*_sample(scan, corner, region), voxel, wall_blur(lumen, voxel))
+    wall = _wall_model(scan, corner, region, lumen)
     kind = np.int16 if scan.values.dtype.kind in "iu" and scan.values.dtype.itemsize <= 2 else np.float32
-    rough = sparse_zeros(region.box.shape, kind)
-    distance = region.box.values
-    residual(scan.values, corner, distance, region.runs, table, 0.05 * voxel, rough)
-    values = rough.reshape(-1)[region.within].astype(float)
-    variance = (MAD * float(np.median(np.abs(values - np.median(values))))) ** 2
-    x = np.arange(-2, 3)
-    taps = np.exp(-0.5 * (x / SMOOTH_VOXELS) ** 2)
-    out = sparse_zeros(region.box.shape, kind)
-    limit = HALO_VOXELS * voxel
-    denoised(rough, distance, region.runs, table, 0.05 * voxel, taps, limit, variance, out)
-    _backgrounds[reference] = (region, out)
+    rough, out = sparse_zeros(region.box.shape, kind), sparse_zeros(region.box.shape, kind)
+    residual(scan.values, corner, wall, rough)
+    variance = spread(rough.reshape(-1)[region.within].astype(float)) ** 2
+    taps = np.exp(-0.5 * (np.arange(-2, 3) / SMOOTH_VOXELS) ** 2)
+    denoised(rough, wall, taps, HALO_VOXELS * float(np.min(scan.spacing_mm)), variance, out)
     return out
+
+
+_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[Region, NDArray[Any]]] = weakref.WeakKeyDictionary()
+"""The last background of each reference, which frames share; it hangs on the reference and the lumen's region alone."""
+
+
+def from_reference(
+    reference: Volume, region: Region, lumen: Lumen, axes: tuple[int, int, int]
+) -> NDArray[Any]:
+    """The reference near the lumen, its noise smoothed away."""
+    known = _smoothed_of.get(reference)
+    if known is None or known[0] is not region:
+        known = region, _smoothed(reference, region, lumen, axes)
+        _smoothed_of[reference] = known
+    return known[1]

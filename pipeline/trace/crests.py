@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.jets import Blurred
+from pipeline.arrays.robust import spread
+from pipeline.arrays.smooth import smooth_voxels
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.trace._kernels.ridges import above, smooth_voxels, tracklets
-from pipeline.trace.region import MAD
-from pipeline.trace.scene import Scene
+from pipeline.trace._kernels.runs import above
+from pipeline.trace._kernels.tracklets import Rules, tracklets
+from pipeline.trace.subtraction import Subtraction
 
 SEED_SIGMAS = 5.5
 """A tracklet starts at smoothed grey this many standard deviations up: noise gives none in 150 000 voxels."""
@@ -38,10 +42,15 @@ class Tracklet:
     tangents: Array
     values: Array
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Arc length, mm."""
         return float(arc_length(self.points)[-1])
+
+    @property
+    def grey(self) -> float:
+        """Median crest grey."""
+        return float(np.median(self.values))
 
     def reversed(self) -> Tracklet:
         """The other way round."""
@@ -56,37 +65,20 @@ def gaussian_taps(sigma_voxel: float) -> NDArray[np.float32]:
     return np.asarray(g / g.sum(), np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class Crests:
-    """Tracklets, strongest first, with the noise of the smoothed grey they were found in."""
-
-    pieces: list[Tracklet]
-    noise: float
-    sigma_mm: float
-    strong: NDArray[np.int64]
-
-
 def find_crests(
-    scene: Scene, sigma_voxel: float, seed_sigmas: float = SEED_SIGMAS, bend: float = BEND
-) -> Crests:
-    """All tracklets in the region; ``sigma_voxel`` is the blur in which crests are looked for."""
-    h = float(scene.spacing.min())
-    taps = gaussian_taps(sigma_voxel)
-    sample = smooth_voxels(scene.grey, taps, scene.region.within[::4])
-    noise = MAD * float(np.median(np.abs(sample - np.median(sample))))
-    bright = above(scene.grey, scene.region.allowed, scene.region.runs, PREFILTER * scene.noise)
-    scene.counters["voxels_visited"] = scene.counters.get("voxels_visited", 0.0) + bright.size
-    smooth = smooth_voxels(scene.grey, taps, bright)
+    image: Subtraction, sigma_voxel: float, seed_sigmas: float = SEED_SIGMAS, bend: float = BEND
+) -> list[Tracklet]:
+    """All tracklets in the region, strongest first; ``sigma_voxel`` is the blur in which crests are looked for."""
+    taps, sigma = gaussian_taps(sigma_voxel), sigma_voxel * image.voxel
+    noise = spread(smooth_voxels(image.grey, taps, image.region.within[::4]))
+    bright = above(image.grey, image.region.allowed, image.region.runs, PREFILTER * image.noise)
+    image.counters["voxels_visited"] = image.counters.get("voxels_visited", 0.0) + bright.size
+    smooth = smooth_voxels(image.grey, taps, bright)
     strong = np.flatnonzero(smooth > seed_sigmas * noise)
-    strong = strong[np.argsort(-smooth[strong], kind="stable")]
-    seeds = bright[strong]
-    high, low = seed_sigmas * noise, KEEP_SIGMAS * noise
-    # a crest of height low in a blur of sigma_voxel bends by about low / sigma^2
-    sharp = 0.15 * low / (sigma_voxel * h) ** 2
-    stamp = sparse_zeros(scene.grey.shape, np.int32)
-    points, tangents, values, first = tracklets(
-        scene.grey, scene.region.allowed, stamp, scene.spacing, sigma_voxel * h, seeds,
-        high, low, sharp, TURN, bend, 0.7 * h, LONGEST,
-    )  # fmt: skip
-    pieces = [Tracklet(points[a:b], tangents[a:b], values[a:b]) for a, b in pairwise(first)]
-    return Crests(pieces, noise, sigma_voxel * h, seeds)
+    seeds = bright[strong[np.argsort(-smooth[strong], kind="stable")]]
+    low = KEEP_SIGMAS * noise
+    # a crest of height low in a blur of sigma bends by about low / sigma^2
+    rules = Rules(seed_sigmas * noise, low, 0.15 * low / sigma**2, TURN, bend, 0.7 * image.voxel)
+    field, stamp = Blurred(image.grey, image.spacing, sigma), sparse_zeros(image.grey.shape, np.int32)
+    points, tangents, values, first = tracklets(field, image.region.allowed, stamp, seeds, rules, LONGEST)
+    return [Tracklet(points[a:b], tangents[a:b], values[a:b]) for a, b in pairwise(first)]

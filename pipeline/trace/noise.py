@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
 from pipeline.model import Array
-from pipeline.trace.scene import Scene
+from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 
 CLEAR_VOXELS = 3.5
@@ -84,52 +84,47 @@ def _spread(square: Array) -> float:
     return float(np.sqrt(np.mean(np.minimum(square, 9 * np.median(square) / 0.4549))))
 
 
-def _places(scene: Scene, curve: Array) -> NDArray[np.int64]:
+def _places(image: Subtraction, curve: Array) -> NDArray[np.int64]:
     """Voxels of the lumen (n, 3) away from the curve, with room for a template around them."""
-    box = scene.region.box
-    index = np.stack(np.unravel_index(scene.region.within[::7], box.shape), axis=1)
+    box = image.region.box
+    index = np.stack(np.unravel_index(image.region.within[::7], box.shape), axis=1)
     inner = np.all((index >= HALF) & (index < np.array(box.shape) - HALF), axis=1)
     index = index[inner]
     if len(index) and len(curve):
-        h = float(scene.spacing.min())
-        far = cKDTree(curve).query(index * scene.spacing, distance_upper_bound=BESIDE_VOXELS * h)[0]
-        index = index[(far > CLEAR_VOXELS * h) & np.isfinite(far)]
+        most = BESIDE_VOXELS * image.voxel
+        far = cKDTree(curve).query(index * image.spacing, distance_upper_bound=most)[0]
+        index = index[(far > CLEAR_VOXELS * image.voxel) & np.isfinite(far)]
     index = index[box.values[tuple(index.T)] < 0]
     return np.asarray(index[:: max(1, len(index) // PLACES)])
 
 
-def _patches(scene: Scene, tube: Tube, index: NDArray[np.int64]) -> tuple[NDArray[np.float32], Array]:
+def _patches(image: Subtraction, tube: Tube, index: NDArray[np.int64]) -> tuple[NDArray[np.float32], Array]:
     """Grey less the tube's around places (n, 3), and the share of it (n,) that was read: the rest is 0."""
     offset = np.arange(-HALF, HALF + 1)
     i, j, k = (index[:, axis, None] + offset for axis in range(3))
     at = (i[:, :, None, None], j[:, None, :, None], k[:, None, None, :])
-    none = np.zeros(0, np.int64)
-    voxels, rest = (none if tube.voxels is None else tube.voxels), (none if tube.rest is None else tube.rest)
-    flat = scene.grey.reshape(-1)
-    kept = flat[voxels]
-    flat[voxels] = rest
-    patches = scene.grey[at]
-    flat[voxels] = kept  # put back: a copy of the box would cost more than the fit
+    with image.showing(tube.voxels, tube.rest):
+        patches = image.grey[at]
     return patches, np.asarray(np.mean(patches != 0, axis=(1, 2, 3)))
 
 
-def inflation(scene: Scene, curve: Array, tube: Tube) -> Inflation:
+def inflation(image: Subtraction, curve: Array, tube: Tube) -> Inflation:
     """Measured at places of the lumen beside the wire; 1 where there is no room to measure.
 
     curve : (n, 3) kernel coordinates of the ``tube`` that was fitted. White noise gives 1 by construction.
     """
-    h = float(scene.spacing.min())
-    index = _places(scene, curve)
-    if scene.spacing.max() > 1.5 * h or len(index) < LEAST:
+    h = image.voxel
+    index = _places(image, curve)
+    if image.spacing.max() > 1.5 * h or len(index) < LEAST:
         return NO_INFLATION
-    patches, read = _patches(scene, tube, index)
+    patches, read = _patches(image, tube, index)
     known = read > 0.8
     if known.sum() < LEAST:
         return NO_INFLATION
     # voxels outside the halo were not read and are 0: the response is put on the scale of those that were
-    scale = scene.noise**2 * read[known, None]
+    scale = image.noise**2 * read[known, None]
     across, along = (_responses(patches[known], t) / scale for t in _templates(tube.sigma / h))
-    depth = scene.region.box.values[tuple(index[known].T)]
+    depth = image.region.box.values[tuple(index[known].T)]
     groups = np.array_split(np.argsort(depth), max(1, min(DEPTHS, len(depth) // LEAST)))
     return Inflation(
         np.array([np.mean(depth[g]) for g in groups]),

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
+from pipeline.arrays.resample import sampled
 from pipeline.model import Lumen
-from pipeline.trace._kernels.ridges import runs_below
 from solver.grid import Grid
 
 HALO_VOXELS = 4.0
@@ -21,7 +19,6 @@ INSIDE_MM = 0.3
 """How far outside the wall the wire's axis may seem to lie: one voxel of segmentation and registration error."""
 SAMPLE = 20000
 """Voxels of the lumen from which noise is estimated (to half a per cent)."""
-MAD = 1.4826
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +26,8 @@ class Region:
     """The part of the frames' lattice that is looked at: the lumen's box and its voxels, in memory order.
 
     box : float32 signed distance on the frames' lattice.  corner : index in the frame of its voxel (0, 0, 0).
-    runs : (n, 4) rows of voxels near the lumen.  within : flat indices of a sample of those in it.
-    allowed : uint8 box, 1 where the wire's axis may lie.
+    runs : (n, 4) rows of voxels near the lumen: i, j, first k, stop k.  allowed : uint8 box, 1 where the wire's axis
+    may lie.  within : flat indices of a sample of those.
     """
 
     box: Grid
@@ -38,6 +35,14 @@ class Region:
     runs: NDArray[np.int64]
     within: NDArray[np.int64]
     allowed: NDArray[np.uint8]
+
+
+def voxels_of(runs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The voxels (n, 3) of runs."""
+    length = runs[:, 3] - runs[:, 2]
+    row = np.repeat(runs[:, :3], length, axis=0)
+    row[:, 2] += np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
+    return row
 
 
 def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
@@ -55,48 +60,34 @@ def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
     index = frame.to_index(distance.to_mm(ends))
     low = np.clip(np.floor(index.min(0)), 0, np.array(frame.shape) - 1).astype(np.int64)
     high = np.clip(np.ceil(index.max(0)), low + 1, np.array(frame.shape)).astype(np.int64)
-    empty = Grid(
-        np.broadcast_to(np.float32(0), tuple(high - low)), frame.spacing_mm, frame.to_mm(low), frame.direction
-    )
-    return sampled(distance, empty, float(np.max(distance.values))), low
+    empty = np.broadcast_to(np.float32(0), tuple(high - low))
+    box = Grid(empty, frame.spacing_mm, frame.to_mm(low), frame.direction)
+    return sampled(distance, box, float(np.max(distance.values))), low
 
 
-def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
-    """``grid`` interpolated (trilinear) at the voxels of ``like``, float32; ``outside`` beyond it."""
-    matrix = (grid.direction.T @ like.direction) * like.spacing_mm / grid.spacing_mm[:, None]
-    shift = grid.to_index(like.origin_mm)
-    values = np.empty(like.shape, np.float32)
-    ndimage.affine_transform(
-        grid.values.astype(np.float32),
-        matrix,
-        shift,
-        like.shape,
-        output=values,
-        order=1,
-        mode="constant",
-        cval=outside,
-    )
-    return like.with_values(values)
+def _region(frame: Grid, distance: Grid) -> Region:
+    box, corner = _onto(frame, distance)
+    box = contiguous(box)
+    # float64: rounded to float32 the limit may take in the distances that were cut off there
+    near = box.values < HALO_VOXELS * np.float64(box.spacing_mm.min())
+    near = np.pad(near, ((0, 0), (0, 0), (1, 1)))
+    edges = np.argwhere(near[..., 1:] != near[..., :-1])
+    allowed = (box.values < INSIDE_MM).view(np.uint8)
+    within = np.flatnonzero(allowed)
+    within = within[:: max(1, len(within) // SAMPLE)]
+    return Region(box, corner, np.column_stack([edges[::2], edges[1::2, 2]]), within, allowed)
 
 
-_regions: weakref.WeakKeyDictionary[Lumen, dict[Any, Region]] = weakref.WeakKeyDictionary()
-
-
-def _key(grid: Grid) -> tuple[Any, ...]:
-    return (grid.shape, *(tuple(np.ravel(a)) for a in (grid.spacing_mm, grid.origin_mm, grid.direction)))
+_regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, Region]] = weakref.WeakKeyDictionary()
+"""The last region of each lumen: frames share it, and it hangs on nothing but the lumen and the frames' lattice."""
 
 
 def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> Region:
-    """The region for frames of this lattice; worked out once per lumen, since frames share it."""
-    known = _regions.setdefault(lumen, {})
-    key = (axes, *_key(frame))
-    if key not in known:
-        box, corner = _onto(frame, reorder(lumen.distance, axes))
-        box = contiguous(box)
-        runs = runs_below(box.values, HALO_VOXELS * float(np.min(box.spacing_mm)))
-        allowed = (box.values < INSIDE_MM).view(np.uint8)
-        within = np.flatnonzero(allowed)
-        within = within[:: max(1, len(within) // SAMPLE)]
-        known.clear()
-        known[key] = Region(box, corner, runs, within, allowed)
-    return known[key]
+    """The region for frames of this lattice (their axes reordered by ``axes``)."""
+    lattice = (frame.shape, axes, frame.spacing_mm, frame.origin_mm, frame.direction)
+    key = np.concatenate([np.ravel(part) for part in lattice]).tobytes()
+    known = _regions.get(lumen)
+    if known is None or known[0] != key:
+        known = key, _region(frame, reorder(lumen.distance, axes))
+        _regions[lumen] = known
+    return known[1]

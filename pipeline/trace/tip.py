@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtr
 
-from pipeline.arrays.jets import values_at
 from pipeline.model import Array, arc_length
-from pipeline.trace.scene import Scene
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 BACK_VOXELS = 14.0
 """How much of the wire before its apparent end enters the step fit."""
@@ -16,11 +15,10 @@ AHEAD_VOXELS = 8.0
 
 
 def extended(points: Array, ahead: float, step: float) -> Array:
-    """The path (n, 3), continued straight by ``ahead`` mm from its last 4 mm-or-fewer of direction."""
+    """The path (n, 3), continued straight by ``ahead`` mm in the direction of its last 1.5 mm (or half)."""
     arc = arc_length(points)
     back = int(np.searchsorted(arc, arc[-1] - min(1.5, 0.5 * arc[-1])))
-    back = min(back, len(points) - 2)
-    t = points[-1] - points[back]
+    t = points[-1] - points[min(back, len(points) - 2)]
     t /= np.linalg.norm(t)
     more = np.arange(step, ahead + step, step)[:, None] * t
     return np.concatenate([points, points[-1] + more])
@@ -37,7 +35,7 @@ def resampled(points: Array, step: float) -> Array:
 def step_position(profile: Array, arc: Array, sigma: float) -> float:
     """Arc length at which a blurred step (height free, foot at 0) fits the profile best, least squares.
 
-    The step may lie beyond neither end of ``arc``; tried every 0.03 of a blur and a parabola put through the best.
+    The step may lie beyond neither end of ``arc``; tried every tenth of a blur.
     """
     tries = np.arange(arc[0], arc[-1], 0.1 * sigma)
     shape = ndtr((tries[:, None] - arc[None]) / sigma)
@@ -47,14 +45,13 @@ def step_position(profile: Array, arc: Array, sigma: float) -> float:
     return float(tries[int(np.argmin(cost))])
 
 
-def cut_at_tip(scene: Scene, points: Array, sigma_mm: float, profile_mm: float) -> Array:
-    """The path ended (or continued) at the step of its crest profile. points : (n, 3), evenly spaced."""
-    h = float(scene.spacing.min())
+def cut_at_tip(image: Subtraction, points: Array, blur_mm: float) -> Array:
+    """The path ended (or continued) at the step of its crest profile. points : (n, 3).  blur_mm : of the wire."""
+    h = image.voxel
     step = 0.25 * h
     line = resampled(extended(points, AHEAD_VOXELS * h, step), step)
     arc = arc_length(line)
-    low = arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
-    tail = arc >= low
-    profile = values_at(scene.grey, scene.spacing, sigma_mm, np.ascontiguousarray(line[tail]))
-    end = step_position(profile, arc[tail], float(np.hypot(sigma_mm, profile_mm)))
+    tail = arc >= arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
+    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
+    end = step_position(image.along(line[tail]), arc[tail], blur)
     return np.asarray(line[arc <= max(end, arc[0] + 2 * h)])

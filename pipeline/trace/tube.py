@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.skyline import factorise, inverse, substitute
-from pipeline.trace._kernels.tube import active_voxels, normal_equations, render
+from pipeline.trace._kernels.tube import (
+    Blob,
+    Claim,
+    Equations,
+    Line,
+    Samples,
+    active_voxels,
+    normal_equations,
+    render,
+)
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
@@ -26,18 +35,10 @@ TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
 """End weights of the fourth-order Gregory rule: the tip's position hangs on the quadrature of the last samples."""
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Fixed sampling of a uniform cubic B-spline: per sample four weights, their slopes, and its quadrature weight."""
-
-    first: NDArray[np.int64]
-    value: Array
-    slope: Array
-    measure: Array
-    tint_first: NDArray[np.int64]
-    tint_share: Array
+BLUR_HELD = 2
+"""First iterations in which the blur is held: before the curve lies on the wire it would grow."""
+SLIDING, POLISHED = 3e-2, 1e-6
+"""Damping of control points along the wire, while they are fitted and for the covariance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,90 +55,26 @@ class Tube:
     covariance: Array | None = None
     residual_rms: float = float("nan")
     iterations: int = 0
-    voxels: NDArray[np.int64] | None = None
-    rest: Array | None = None
+    voxels: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    rest: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def intervals(self) -> int:
         """Number of spline pieces."""
         return len(self.controls) - 3
 
+    @property
+    def knot_mm(self) -> float:
+        """Mean distance of neighbouring control points."""
+        return float(np.mean(np.linalg.norm(np.diff(self.controls, axis=0), axis=1)))
 
-def weights_at(u: Array, intervals: int) -> tuple[NDArray[np.int64], Array, Array]:
-    """First control, values (n, 4) and slopes (n, 4) of the uniform cubic B-spline at u in [0, intervals]."""
-    i = np.clip(np.floor(u).astype(np.int64), 0, intervals - 1)
-    t = u - i
-    v = 1 - t
-    value = np.stack([v**3, 4 - 6 * t**2 + 3 * t**3, 4 - 6 * v**2 + 3 * v**3, t**3], axis=1) / 6
-    slope = np.stack([-(v**2), 3 * t**2 - 4 * t, 4 * v - 3 * v**2, t**2], axis=1) / 2
-    return i, value, slope
+    def at(self, u: Array) -> Array:
+        """Points (n, 3) of the curve at parameters from 0 to ``intervals``."""
+        return evaluate(self.controls, u)[0]
 
-
-def evaluate(controls: Array, u: Array) -> tuple[Array, Array]:
-    """Points (n, 3) and derivatives (n, 3) of the spline at parameters u."""
-    i, value, slope = weights_at(u, len(controls) - 3)
-    window = controls[i[:, None] + np.arange(4)]
-    return np.einsum("nk,nkd->nd", value, window), np.einsum("nk,nkd->nd", slope, window)
-
-
-def sampling(intervals: int, per: int) -> Samples:
-    """``per`` samples in every interval, both ends included, with Gregory's end weights."""
-    n = intervals * per
-    u = np.linspace(0, intervals, n + 1)
-    measure = np.full(n + 1, 1.0 / per)
-    m = min(3, (n + 1) // 2)
-    measure[:m] *= GREGORY[:m]
-    measure[-m:] *= GREGORY[:m][::-1]
-    first, value, slope = weights_at(u, intervals)
-    tints = tint_nodes(intervals)
-    at = u / intervals * (tints - 1)
-    t_first = np.clip(np.floor(at).astype(np.int64), 0, tints - 2)
-    return Samples(first, value, slope, measure, t_first, at - t_first)
-
-
-def tint_nodes(intervals: int) -> int:
-    """How many amplitude nodes: one every TINT_KNOTS intervals, two at least."""
-    return max(2, round(intervals / TINT_KNOTS) + 1)
-
-
-def spline_through(points: Array, knot: float) -> Array:
-    """Control points (k, 3) of the least-squares uniform spline along a path (n, 3), knots about ``knot`` mm apart."""
-    arc = arc_length(points)
-    intervals = max(2, round(arc[-1] / knot))
-    u = arc / arc[-1] * intervals
-    i, value, _ = weights_at(u, intervals)
-    k = intervals + 3
-    basis = np.zeros((len(u), k))
-    np.put_along_axis(basis, i[:, None] + np.arange(4), value, axis=1)
-    third = np.diff(np.eye(k), n=3, axis=0)
-    density = len(u) / k
-    normal = basis.T @ basis + 1e-3 * density * third.T @ third
-    lower, first = _factors(normal)
-    right = basis.T @ points
-    return np.stack([substitute(lower, first, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
-
-
-def _prior(controls: int, columns: int, noise: float, voxel: float, knot: float) -> Array:
-    """Normal matrix of the smoothness prior on the control points, ``knot`` mm apart."""
-    third = np.diff(np.eye(controls), n=3, axis=0)
-    loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3
-    block = third.T @ third * (noise / (loose * voxel)) ** 2
-    if knot < FULL_KNOT * voxel:
-        second = np.diff(np.eye(controls), n=2, axis=0)
-        block += second.T @ second * (noise * TIGHTEST * voxel / knot**2) ** 2
-    out = np.zeros((columns, columns))
-    for axis in range(3):
-        out[axis : 3 * controls : 3, axis : 3 * controls : 3] = block
-    return out
-
-
-def _frozen(normal: Array, held: list[int]) -> Array:
-    """Columns that are not fitted: a one on the diagonal and nothing else."""
-    for c in held:
-        normal[c, :] = 0.0
-        normal[:, c] = 0.0
-        normal[c, c] = 1.0
-    return normal
+    def blob(self, voxel: float) -> Blob:
+        """What one of its points looks like."""
+        return Blob(self.sigma, WINDOW * max(self.sigma, 0.5 * voxel), self.offset)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,42 +89,109 @@ class TubeData:
     noise: float
     start_plane: tuple[Array, Array] | None = None
 
+    @property
+    def voxel(self) -> float:
+        """Smallest edge of a voxel, mm."""
+        return float(self.spacing.min())
 
-def _weights(data: TubeData, voxels: NDArray[np.int64]) -> Array:
-    """1 for voxels that count, 0 before the start plane."""
+
+def weights_at(u: Array, intervals: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """First control, values (n, 4) and slopes (n, 4) of the uniform cubic B-spline at u in [0, intervals]."""
+    i = np.clip(np.floor(u).astype(np.int64), 0, intervals - 1)
+    t = u - i
+    v = 1 - t
+    value = np.stack([v**3, 4 - 6 * t**2 + 3 * t**3, 4 - 6 * v**2 + 3 * v**3, t**3], axis=1) / 6
+    slope = np.stack([-(v**2), 3 * t**2 - 4 * t, 4 * v - 3 * v**2, t**2], axis=1) / 2
+    return i, value, slope
+
+
+def _combined(controls: Array, first: NDArray[np.int64], weights: Array) -> Array:
+    """Sums (n, 3) of four control points each."""
+    return np.asarray(np.einsum("nk,nkd->nd", weights, controls[first[:, None] + np.arange(4)]))
+
+
+def evaluate(controls: Array, u: Array) -> tuple[Array, Array]:
+    """Points (n, 3) and derivatives (n, 3) of the spline at parameters u."""
+    first, value, slope = weights_at(u, len(controls) - 3)
+    return _combined(controls, first, value), _combined(controls, first, slope)
+
+
+def tint_nodes(intervals: int) -> int:
+    """How many amplitude nodes: one every TINT_KNOTS intervals, two at least."""
+    return max(2, round(intervals / TINT_KNOTS) + 1)
+
+
+def sampling(tube: Tube, voxel: float) -> Samples:
+    """Samples a voxel or 0.8 blur apart, three in every interval at least, with Gregory's end weights."""
+    per = max(3, int(np.ceil(tube.knot_mm / max(voxel, 0.8 * tube.sigma))))
+    n = tube.intervals * per
+    u = np.linspace(0, tube.intervals, n + 1)
+    measure = np.full(n + 1, 1.0 / per)
+    m = min(3, (n + 1) // 2)
+    measure[:m] *= GREGORY[:m]
+    measure[-m:] *= GREGORY[:m][::-1]
+    last = len(tube.tint) - 1
+    at = u / tube.intervals * last
+    node = np.clip(np.floor(at).astype(np.int64), 0, last - 1)
+    return Samples(measure, *weights_at(u, tube.intervals), node, at - node)
+
+
+def sampled(tube: Tube, s: Samples) -> Line:
+    """The tube at its samples."""
+    curve, velocity = (_combined(tube.controls, s.first, w) for w in (s.value, s.slope))
+    speed = np.linalg.norm(velocity, axis=1) + 1e-30
+    amplitude = tube.tint[s.tint_first] * (1.0 - s.tint_share) + tube.tint[s.tint_first + 1] * s.tint_share
+    return Line(curve, velocity, speed, amplitude, s)
+
+
+def spline_through(points: Array, knot: float) -> Array:
+    """Control points (k, 3) of the least-squares uniform spline along a path (n, 3), knots about ``knot`` mm apart."""
+    arc = arc_length(points)
+    intervals = max(2, round(arc[-1] / knot))
+    u = arc / arc[-1] * intervals
+    i, value, _ = weights_at(u, intervals)
+    k = intervals + 3
+    basis = np.zeros((len(u), k))
+    np.put_along_axis(basis, i[:, None] + np.arange(4), value, axis=1)
+    third = np.diff(np.eye(k), n=3, axis=0)
+    factors = _factors(basis.T @ basis + 1e-3 * (len(u) / k) * third.T @ third)
+    right = basis.T @ points
+    return np.stack([substitute(*factors, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
+
+
+def _prior(tube: Tube, data: TubeData) -> Array:
+    """Normal matrix of the smoothness prior on the control points."""
+    count, knot, voxel = len(tube.controls), tube.knot_mm, data.voxel
+    third = np.diff(np.eye(count), n=3, axis=0)
+    loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3
+    block = third.T @ third * (data.noise / (loose * voxel)) ** 2
+    if knot < FULL_KNOT * voxel:
+        second = np.diff(np.eye(count), n=2, axis=0)
+        block += second.T @ second * (data.noise * TIGHTEST * voxel / knot**2) ** 2
+    return np.asarray(np.kron(block, np.eye(3)))
+
+
+def _claim(data: TubeData, curve: Array, radius: float, slot: NDArray[np.int32]) -> Claim:
+    """The voxels near the curve; those before the start plane have no weight."""
+    voxels = active_voxels(slot, data.spacing, curve, radius)
     if data.start_plane is None:
-        return np.ones(len(voxels))
+        return Claim(voxels, slot, np.ones(len(voxels)))
     point, direction = data.start_plane
     index = np.stack(np.unravel_index(voxels, data.grey.shape), axis=1) * data.spacing
-    return np.where((index - point) @ direction > 0, 1.0, 0.0)
+    return Claim(voxels, slot, np.where((index - point) @ direction > 0, 1.0, 0.0))
 
 
-def _step(
+def _equations(
     data: TubeData, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
-) -> tuple[Array, Array, float, tuple[NDArray[np.int64], Array]]:
-    """One set of normal equations: matrix with prior, right-hand side, residual rms, and voxels with residuals."""
-    curve, velocity = _sampled(tube.controls, samples)
-    radius = WINDOW * max(tube.sigma, 0.5 * float(data.spacing.min()))
-    voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
-    weight = _weights(data, voxels)
-    columns = prior.shape[0]
-    normal, right = np.zeros((columns, columns)), np.zeros(columns)
-    residual = np.zeros(len(voxels))
-    k = len(tube.controls)
-    square = normal_equations(
-        data.grey, data.spacing, slot, weight, voxels, curve, velocity, samples.first, samples.value, samples.slope,
-        samples.measure, samples.tint_first, samples.tint_share, tube.tint, tube.sigma, tube.offset, radius, k,
-        normal, right, residual,
-    )  # fmt: skip
-    slot.reshape(-1)[voxels] = 0
-    right[: 3 * k] -= prior[: 3 * k, : 3 * k] @ tube.controls.ravel()
-    return normal + prior, right, float(np.sqrt(square / max(1.0, weight.sum()))), (voxels, residual)
-
-
-def _sampled(controls: Array, s: Samples) -> tuple[Array, Array]:
-    window = controls[s.first[:, None] + np.arange(4)]
-    curve = np.einsum("nk,nkd->nd", s.value, window)
-    return np.ascontiguousarray(curve), np.ascontiguousarray(np.einsum("nk,nkd->nd", s.slope, window))
+) -> tuple[Equations, Claim, Line]:
+    """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
+    line, blob, k = sampled(tube, samples), tube.blob(data.voxel), len(tube.controls)
+    claim = _claim(data, line.curve, blob.radius, slot)
+    e = normal_equations(data.grey, data.spacing, claim, line, blob, k, len(tube.tint))
+    slot.reshape(-1)[claim.voxels] = 0
+    e.right[: 3 * k] -= prior @ tube.controls.ravel()
+    e.normal[: 3 * k, : 3 * k] += prior
+    return e, claim, line
 
 
 def _damped(normal: Array, tube: Tube, amount: float) -> Array:
@@ -213,11 +217,7 @@ def _factors(normal: Array) -> tuple[Array, NDArray[np.int64]]:
     return lower, first
 
 
-def _solved(normal: Array, right: Array) -> Array:
-    return np.asarray(substitute(*_factors(normal), right))
-
-
-def _moved(tube: Tube, step: Array, voxel: float, samples: Samples) -> tuple[Tube, float]:
+def _moved(tube: Tube, step: Array, voxel: float, line: Line) -> tuple[Tube, float]:
     """The tube after a step that moves its curve by at most a voxel; and the largest move that counts.
 
     The first and the last control point hang beyond the curve, and sliding along the wire changes nothing: what
@@ -225,10 +225,9 @@ def _moved(tube: Tube, step: Array, voxel: float, samples: Samples) -> tuple[Tub
     """
     k, a = len(tube.controls), len(tube.tint)
     shift = step[: 3 * k].reshape(k, 3)
-    drift = _sampled(shift, samples)[0]
+    drift = _combined(shift, line.samples.first, line.samples.value)
     size = float(np.max(np.linalg.norm(drift, axis=1)))
-    velocity = _sampled(tube.controls, samples)[1]
-    t = velocity / np.linalg.norm(velocity, axis=1)[:, None]
+    t = line.velocity / line.speed[:, None]
     drift[:-1] -= np.sum(drift * t, axis=1)[:-1, None] * t[:-1]
     moved_by = float(np.max(np.linalg.norm(drift, axis=1)))
     scale = min(1.0, voxel / max(size, 1e-12))
@@ -243,39 +242,35 @@ def _moved(tube: Tube, step: Array, voxel: float, samples: Samples) -> tuple[Tub
     return moved, scale * moved_by
 
 
-def fit_tube(
-    data: TubeData, tube: Tube, iterations: int = 12, tolerance: float = 0.02, fit_sigma: bool = True
-) -> Tube:
+def fit_tube(data: TubeData, tube: Tube, iterations: int = 12, tolerance: float = 0.02) -> Tube:
     """Gauss-Newton on the voxels within WINDOW blurs of the curve.
 
     Stops when no point of the curve moves by more than ``tolerance`` voxel. The result carries the covariance of its
     columns (controls, amplitudes, blur, offset), for the noise of ``data``.
     """
-    voxel = float(data.spacing.min())
-    step_mm = max(voxel, 0.8 * tube.sigma)
-    per = max(3, int(np.ceil(_mean_speed(tube.controls) / step_mm)))
-    samples = sampling(tube.intervals, per)
-    columns = 3 * len(tube.controls) + len(tube.tint) + 2
-    prior = _prior(len(tube.controls), columns, data.noise, voxel, _mean_speed(tube.controls))
-    held = [columns - 2] if not fit_sigma else []
+    samples, prior = sampling(tube, data.voxel), _prior(tube, data)
     slot = sparse_zeros(data.grey.shape, np.int32)
     done = 0
     for done in range(1, iterations + 1):
-        normal, right, _, _ = _step(data, tube, samples, prior, slot)
-        held_now = held if done > 2 else [columns - 2]
-        normal = _frozen(_damped(normal, tube, 3e-2), held_now)
-        right[held_now] = 0.0
-        tube, size = _moved(tube, _solved(normal, right), voxel, samples)
-        if size < tolerance * voxel and done > 2:
+        found, _, line = _equations(data, tube, samples, prior, slot)
+        normal, right = _damped(found.normal, tube, SLIDING), found.right
+        if done <= BLUR_HELD:
+            normal[-2], normal[:, -2], right[-2] = 0.0, 0.0, 0.0
+            normal[-2, -2] = 1.0
+        tube, size = _moved(tube, substitute(*_factors(normal), right), data.voxel, line)
+        if size < tolerance * data.voxel and done > BLUR_HELD:
             break
-    normal, _, rms, (voxels, rest) = _step(data, tube, samples, prior, slot)
-    normal = _frozen(_damped(normal, tube, 1e-6), held)
-    covariance = inverse(*_factors(normal)) * data.noise**2
-    return replace(tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=voxels, rest=rest)
-
-
-def _mean_speed(controls: Array) -> float:
-    return float(np.mean(np.linalg.norm(np.diff(controls, axis=0), axis=1)))
+    found, claim, _ = _equations(data, tube, samples, prior, slot)
+    rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
+    covariance = inverse(*_factors(_damped(found.normal, tube, POLISHED))) * data.noise**2
+    return replace(
+        tube,
+        covariance=covariance,
+        residual_rms=rms,
+        iterations=done,
+        voxels=claim.voxels,
+        rest=found.residual,
+    )
 
 
 def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
@@ -295,14 +290,8 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
 
 def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     """Voxels (flat) that the tube lights up and the grey it gives them."""
-    voxel = float(data.spacing.min())
-    per = max(3, int(np.ceil(_mean_speed(tube.controls) / max(voxel, 0.8 * tube.sigma))))
-    samples = sampling(tube.intervals, per)
-    curve, velocity = _sampled(tube.controls, samples)
-    radius = WINDOW * max(tube.sigma, 0.5 * voxel)
+    line, blob = sampled(tube, sampling(tube, data.voxel)), tube.blob(data.voxel)
     slot = sparse_zeros(data.grey.shape, np.int32)
-    voxels = active_voxels(data.grey.shape, data.spacing, curve, radius, slot)
-    amplitude = tube.tint[samples.tint_first] * (1 - samples.tint_share)
-    amplitude = amplitude + tube.tint[samples.tint_first + 1] * samples.tint_share
-    weight = amplitude * samples.measure * np.linalg.norm(velocity, axis=1)
-    return voxels, render(data.grey.shape, data.spacing, slot, len(voxels), curve, weight, tube.sigma, radius)
+    voxels = active_voxels(slot, data.spacing, line.curve, blob.radius)
+    weight = line.amplitude * line.samples.measure * line.speed
+    return voxels, render(slot, data.spacing, len(voxels), line.curve, weight, blob)

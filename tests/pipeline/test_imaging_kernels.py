@@ -7,11 +7,11 @@ import pytest
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.jets import jet
-from pipeline.arrays.spline import hessian, value_gradient
+from pipeline.arrays.jets import Blurred, jet
+from pipeline.segment._kernels.spline import hessian, value_gradient
 from pipeline.segment.blur import blur_of_wall, half_level_offset
-from pipeline.trace._kernels.tube import active_voxels, normal_equations
-from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampling, tint_nodes
+from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
+from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampled, sampling, tint_nodes
 from pipeline.trace.tube import evaluate as spline_points
 
 
@@ -32,28 +32,21 @@ def test_spline_derivatives_are_those_of_its_value():
 def test_jets_at_nodes_are_gaussian_derivatives():
     grey = np.random.default_rng(1).normal(size=(15, 16, 17)).astype(np.float32)
     spacing, out, w = np.array([0.5, 0.5, 0.5]), np.empty(10), np.empty((3, 3, 64))
-    jet(grey, spacing, 0.6, np.array([7, 8, 8]) * 0.5, w, out)
+    jet(Blurred(grey, spacing, 0.6), np.array([7, 8, 8]) * 0.5, w, out)
     orders = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
     for n, order in enumerate(orders):
         expected = ndimage.gaussian_filter(grey.astype(float), 1.2, order=order, truncate=2.9)[7, 8, 8]
         assert out[n] == pytest.approx(expected / 0.5 ** sum(order), rel=0.02, abs=5e-3)
 
 
-def _equations(grey, spacing, controls, tint, sigma, per=6):
-    s = sampling(len(controls) - 3, per)
-    window = controls[s.first[:, None] + np.arange(4)]
-    curve = np.ascontiguousarray(np.einsum("nk,nkd->nd", s.value, window))
-    velocity = np.ascontiguousarray(np.einsum("nk,nkd->nd", s.slope, window))
+def _equations(grey, spacing, samples, controls, tint, sigma):
+    line = sampled(Tube(controls, tint, sigma, 3.0), samples)
     slot = np.zeros(grey.shape, np.int32)
     radius = 6 * sigma
-    voxels = active_voxels(grey.shape, spacing, curve, radius, slot)
-    columns = 3 * len(controls) + len(tint) + 2
-    normal, right, residual = np.zeros((columns, columns)), np.zeros(columns), np.zeros(len(voxels))
-    cost = normal_equations(
-        grey, spacing, slot, np.ones(len(voxels)), voxels, curve, velocity, s.first, s.value, s.slope, s.measure,
-        s.tint_first, s.tint_share, tint, sigma, 3.0, radius, len(controls), normal, right, residual,
-    )  # fmt: skip
-    return cost, right, normal
+    voxels = active_voxels(slot, spacing, line.curve, radius)
+    claim = Claim(voxels, slot, np.ones(len(voxels)))
+    e = normal_equations(grey, spacing, claim, line, Blob(sigma, radius, 3.0), len(controls), len(tint))
+    return e.square, e.right, e.normal
 
 
 def test_tube_gradient_is_that_of_its_cost():
@@ -63,7 +56,8 @@ def test_tube_gradient_is_that_of_its_cost():
     spacing = np.full(3, 0.3)
     controls = np.stack([np.full(7, 3.5), 3.6 + 0.3 * np.sin(np.arange(7)), 0.5 + 1.2 * np.arange(7)], axis=1)
     tint = np.array([50.0, 60.0])
-    _, right, normal = _equations(grey, spacing, controls, tint, 0.3)
+    samples = sampling(Tube(controls, tint, 0.3, 3.0), 0.24)  # six an interval
+    _, right, normal = _equations(grey, spacing, samples, controls, tint, 0.3)
     np.testing.assert_allclose(normal, normal.T, atol=1e-6 * np.abs(normal).max())
     h = 1e-5
     for k, axis in ((0, 0), (3, 1), (5, 2), (6, 2)):
@@ -71,9 +65,11 @@ def test_tube_gradient_is_that_of_its_cost():
         for sign in (1, -1):
             moved = controls.copy()
             moved[k, axis] += sign * h
-            ends.append(_equations(grey, spacing, moved, tint, 0.3)[0])
+            ends.append(_equations(grey, spacing, samples, moved, tint, 0.3)[0])
         assert right[3 * k + axis] == pytest.approx(-0.5 * (ends[0] - ends[1]) / (2 * h), rel=2e-3, abs=1.0)
-    ends = [_equations(grey, spacing, controls, tint + np.array([d, 0]), 0.3)[0] for d in (1e-3, -1e-3)]
+    ends = [
+        _equations(grey, spacing, samples, controls, tint + np.array([d, 0]), 0.3)[0] for d in (1e-3, -1e-3)
+    ]
     assert right[21] == pytest.approx(-0.5 * (ends[0] - ends[1]) / 2e-3, rel=1e-3, abs=1e-2)
 
 

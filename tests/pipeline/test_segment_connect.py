@@ -11,12 +11,21 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.morphology import reconstruction
 
-from pipeline.segment.affinity import Affinity, Levels, binomial_taps, estimate_affinity
-from pipeline.segment.connect import connect, connect_relative, cut_level, neighbours, strength_map
+from pipeline.segment.affinity import Affinity, binomial_taps, estimate_affinity
+from pipeline.segment.connect import connect, connect_relative, cut_level, neighbours, strength_list
+from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 from tests.naive import connectedness as naive
 
-LEVELS = Levels(inside=800.0, outside=100.0, noise=60.0)
+LEVELS = GreyLevels(inside=800.0, outside=100.0, noise=60.0)
+
+
+def strength_map(grid, seeds, affinity, threshold, offsets):
+    """Strength of connectedness 0..255 (0 below ``threshold``) and the flat indices of the voxels that have one."""
+    order, strength, _ = strength_list(grid, seeds, affinity, threshold, offsets)
+    out = np.zeros(grid.shape, np.uint8)
+    out.reshape(-1)[order] = strength
+    return out, order
 
 
 def noisy(seed, shape=(9, 10, 11)):

@@ -13,15 +13,15 @@ from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import trace, trace_region
-from pipeline.trace.background import wall_blur
+from pipeline.trace import trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.in_plane import near_rotation_plane
 from pipeline.trace.level import levelled
-from pipeline.trace.scene import build_scene
+from pipeline.trace.subtraction import subtracted
 from solver.grid import Grid
 from tests.bench.imaging.topology import earlier, plain
 from tests.pipeline import phantoms, tangles
+from tests.pipeline.in_region import trace_region
 
 VOXEL = 0.3
 PEAK = phantoms.wire_peak(0.2 / VOXEL, 0.8)
@@ -135,10 +135,10 @@ def test_the_lumens_level_is_found_under_the_wire_and_leaves_an_even_lumen_alone
     left = []
     for clean in (empty, faded):
         frame = Volume(ndimage.gaussian_filter(clean.astype(np.float32), 0.8), [VOXEL] * 3, origin)
-        scene = build_scene(frame, lumen, None)
-        even = levelled(scene, scene.local(wire[::50]), 0.27, wall_blur(lumen, VOXEL))
-        deep = (scene.region.box.values < -0.6) & (scene.region.box.values > -1.5)
-        left.append([float(np.sqrt(np.mean(s.grey[deep] ** 2))) for s in (scene, even)])
+        image = subtracted(frame, lumen, None)
+        even = levelled(image, image.local(wire[::50]), 0.27)
+        deep = (image.region.box.values < -0.6) & (image.region.box.values > -1.5)
+        left.append([float(np.sqrt(np.mean(s.grey[deep] ** 2))) for s in (image, even)])
     (_, untouched), (before, after) = left
     assert untouched < 6.0
     assert after < 25.0

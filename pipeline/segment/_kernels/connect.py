@@ -1,265 +1,228 @@
 """Fuzzy connectedness: strength of a voxel = the best path from a seed, a path being as strong as its weakest link.
 
 Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246. Grey values are smoothed and quantised in tiles of
-8^3 voxels as the search comes to them, and all state lives in those tiles: cost and memory follow the object, not the
-volume. A cell is a voxel's place in the pool of tiles: tile * CELLS + place within the tile.
+8^3 voxels as the search comes to them. A cell is a voxel's place in memory, tile after tile: tile * CELLS + place in
+the tile. There is a cell for every voxel, and a layer of tiles around the volume; but cells take memory only where
+they are written to (:mod:`pipeline.arrays.sparse`), so cost and memory follow the object, not the volume.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.arrays.tiles import CELLS, INNER, LEVELS, SEEN, SHIFT, SIDE, grown, open_tile, scratch
+from pipeline.arrays.compiled import door, kernel
+from pipeline.arrays.lattice import grown, unravelled
+from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, INNER, SHIFT, SIDE, scratch, smooth_tile
 
 FULL = 255
 """Quantised strength of a seed: strengths are 0 to 255."""
-OUTSIDE = ~INNER
-"""Bits that an index within a tile never has; one step out of it, either way, sets some."""
-GREY = LEVELS - 1
+SEEN = 1 << 15
+"""Mark of a cell that is reached, or lies outside the volume and never will be."""
+GREY = GREY_STEPS - 1
 """Bits of a cell that hold its grey level."""
+READ, BEYOND = 1, 2
+"""Marks of a tile that was read, and of one that lies outside the volume; 0: not asked for yet."""
 
 
-@njit(cache=True, inline="always")
-def _cell(slot: int, x: int, y: int, z: int) -> int:
-    """The cell in the tile at position ``slot`` - 1 of a voxel with these indices, of which the last bits count."""
-    return (slot - 1) * CELLS + (((x & INNER) << (2 * SHIFT)) | ((y & INNER) << SHIFT) | (z & INNER))
+class Affinity(NamedTuple):
+    """Tables of the pairwise affinity sqrt(H O), 0..255, over quantised grey: level = (grey - low) * scale.
+
+    H = exp(-(f - g)^2 / 2 s_H^2) and O = exp(-(m - (f + g)/2)^2 / 2 s_O^2), 1 above the object's mean m.
+    The geometric mean lets each feature veto: a weighted sum keeps a floor in any even background, and leaks.
+    homogeneity, feature : float32, over the difference and the sum of two levels.  taps : the smoothing beforehand.
+    """
+
+    homogeneity: NDArray[Any]
+    feature: NDArray[Any]
+    low: float
+    scale: float
+    taps: NDArray[Any]
 
 
-@njit(cache=True)
-def _steps(offsets: NDArray[Any]) -> NDArray[Any]:
-    """From a cell to its neighbours in the same tile."""
-    out = np.empty(offsets.shape[0], np.int64)
-    for m in range(offsets.shape[0]):
-        out[m] = (offsets[m, 0] * SIDE + offsets[m, 1]) * SIDE + offsets[m, 2]
-    return out
+class Search(NamedTuple):
+    """What a search goes over, and what it knows of it.
+
+    volume : C-contiguous grey.  cells : uint16, level and SEEN of a voxel, 0 at first.  tiles : uint8, READ or BEYOND,
+    0 at first; tile (1, 1, 1) holds voxel (0, 0, 0).  offsets : (n, 3) of a voxel's neighbours.
+    """
+
+    volume: NDArray[Any]
+    affinity: Affinity
+    cells: NDArray[Any]
+    tiles: NDArray[Any]
+    offsets: NDArray[Any]
 
 
-@njit(cache=True)
-def _append_tile(
-    volume: NDArray[Any],
-    taps: NDArray[Any],
-    low: float,
-    scale: float,
-    table: NDArray[Any],
-    at: tuple[int, int, int],
-    work: NDArray[Any],
-    pool: NDArray[Any],
-    tiles: NDArray[Any],
-    used: int,
-) -> int:
-    """Read the tile with these three indices into the pool; returns how many tiles there are now, which is its slot."""
-    tiles[used, 0], tiles[used, 1], tiles[used, 2] = at
-    open_tile(volume, taps, low, scale, tiles[used], work, pool[used * CELLS : (used + 1) * CELLS])
-    table[at] = used + 1
-    return used + 1
+@kernel
+def _read_tile(s: Search, tile: int, work: NDArray[Any]) -> None:
+    """Quantised smoothed grey 0..GREY_STEPS-1 of one tile into its cells; those outside the volume are marked SEEN."""
+    a, b, c = unravelled(tile, s.tiles.shape)
+    i0, j0, k0 = (a - 1) * SIDE, (b - 1) * SIDE, (c - 1) * SIDE
+    ni, nj, nk = s.volume.shape
+    cells = s.cells[tile * CELLS : (tile + 1) * CELLS]
+    if min(i0, j0, k0) < 0 or i0 >= ni or j0 >= nj or k0 >= nk:
+        s.tiles[a, b, c] = BEYOND
+        cells[:] = SEEN
+        return
+    s.tiles[a, b, c] = READ
+    smooth_tile(s.volume, s.affinity.taps, (i0, j0, k0), work[0], work[1])
+    low, scale, w = s.affinity.low, s.affinity.scale, SIDE + 2 * (s.affinity.taps.shape[0] // 2)
+    n = 0
+    for i in range(SIDE):
+        for j in range(SIDE):
+            row = work[1, (i * w + j) * w : (i * w + j) * w + SIDE]
+            to = cells[n : n + SIDE]
+            for k in range(SIDE):
+                to[k] = np.int32(min(max((row[k] - low) * scale + 0.5, 0.0), GREY_STEPS - 1.0))
+            if i0 + i >= ni or j0 + j >= nj:
+                to[:] = SEEN
+            elif k0 + SIDE > nk:
+                to[nk - k0 :] = SEEN
+            n += SIDE
 
 
-@njit(cache=True, inline="always")
-def _neighbour(tiles: NDArray[Any], tile: int, x: int, y: int, z: int) -> tuple[int, int, int]:
-    """Indices of the tile that holds a voxel with these indices, counted from the first voxel of ``tile``."""
-    return tiles[tile, 0] + (x >> SHIFT), tiles[tile, 1] + (y >> SHIFT), tiles[tile, 2] + (z >> SHIFT)
+@kernel
+def _away(cell: int, x: int, y: int, z: int, tiles: tuple[int, int, int]) -> tuple[int, int]:
+    """The cell that lies ``x, y, z`` voxels from another one, and its tile; ``tiles`` along each axis there are."""
+    x, y, z = x + ((cell >> (2 * SHIFT)) & INNER), y + ((cell >> SHIFT) & INNER), z + (cell & INNER)
+    tile = cell // CELLS + ((x >> SHIFT) * tiles[1] + (y >> SHIFT)) * tiles[2] + (z >> SHIFT)
+    return tile * CELLS + (((x & INNER) << (2 * SHIFT)) | ((y & INNER) << SHIFT) | (z & INNER)), tile
 
 
-@njit(cache=True, inline="always")
-def _beyond(at: tuple[int, int, int], shape: tuple[int, int, int]) -> bool:
-    """Whether a tile lies outside the table."""
-    return min(at) < 0 or at[0] >= shape[0] or at[1] >= shape[1] or at[2] >= shape[2]
-
-
-@njit(cache=True)
-def _with_room(
-    pool: NDArray[Any], tiles: NDArray[Any], used: int, more: int
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The pool and its tiles' indices, with room for some more tiles."""
-    while (used + more) * CELLS > pool.shape[0]:
-        pool = grown(pool)
-        larger = np.empty((2 * tiles.shape[0], 3), tiles.dtype)
-        larger[:used] = tiles[:used]
-        tiles = larger
-    return pool, tiles
-
-
-@njit(cache=True)
-def _as_long(array: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
-    """The array itself, or zeros as long as ``other`` that begin with it."""
-    if array.shape[0] == other.shape[0]:
-        return array
-    longer = np.zeros(other.shape[0], array.dtype)
-    longer[: array.shape[0]] = array
-    return longer
-
-
-@njit(cache=True)
-def _flat(cells: NDArray[Any], tiles: NDArray[Any], shape: tuple[int, int, int]) -> NDArray[Any]:
+@kernel
+def _flat(s: Search, cells: NDArray[Any]) -> NDArray[Any]:
     """Cells as flat indices of the volume."""
     out = np.empty(cells.shape[0], np.int64)
+    _, nj, nk = s.volume.shape
+    tile = a = b = c = 0
     for n in range(cells.shape[0]):
         cell = cells[n]
-        tile = cell // CELLS
-        i = tiles[tile, 0] * SIDE + ((cell >> (2 * SHIFT)) & INNER)
-        j = tiles[tile, 1] * SIDE + ((cell >> SHIFT) & INNER)
-        out[n] = (i * shape[1] + j) * shape[2] + tiles[tile, 2] * SIDE + (cell & INNER)
+        if cell // CELLS != tile:
+            tile = cell // CELLS
+            a, b, c = unravelled(tile, s.tiles.shape)
+        i = (a - 1) * SIDE + ((cell >> (2 * SHIFT)) & INNER)
+        j = (b - 1) * SIDE + ((cell >> SHIFT) & INNER)
+        out[n] = (i * nj + j) * nk + (c - 1) * SIDE + (cell & INNER)
     return out
 
 
-@njit(cache=True)
-def flood(
-    volume: NDArray[Any],
-    table: NDArray[Any],
-    seeds: NDArray[Any],
-    offsets: NDArray[Any],
-    taps: NDArray[Any],
-    low: float,
-    scale: float,
-    homogeneity: NDArray[Any],
-    feature: NDArray[Any],
-    threshold: int,
-) -> tuple[NDArray[Any], int]:
+@door
+def flood(s: Search, seeds: NDArray[Any], threshold: int) -> NDArray[Any]:
     """Voxels whose strength of connectedness is at least ``threshold``: an alpha cut needs no queue.
 
     Any order of visiting links of at least the threshold reaches exactly that set, so first come first served does,
-    which is several times faster than ordering by strength. ``table`` (int32 zeros, one per tile of the volume) gets
-    the tiles' slots. Returns flat indices in the order in which they were reached, and the number of tiles read.
+    which is several times faster than ordering by strength. Returns flat indices in the order they were reached in.
     """
-    work = scratch(taps)
-    pool, tiles, used = np.empty(64 * CELLS, np.uint16), np.empty((64, 3), np.int64), 0
-    cut = np.float32(threshold - 0.5)
-    links, step = offsets.shape[0], _steps(offsets)
-    order = np.empty(65536, np.int32)
-    count = 0
-    for s in range(seeds.shape[0]):
-        i, j, k = seeds[s, 0], seeds[s, 1], seeds[s, 2]
-        pool, tiles = _with_room(pool, tiles, used, 1)
-        slot = table[i >> SHIFT, j >> SHIFT, k >> SHIFT]
-        if slot == 0:
-            at = (i >> SHIFT, j >> SHIFT, k >> SHIFT)
-            slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
-        start = _cell(slot, i, j, k)
-        if pool[start] < SEEN:
-            pool[start] |= SEEN
+    work, cut = scratch(s.affinity.taps), np.float32(threshold - 0.5)
+    cells, tiles, homogeneity, feature, offsets = (
+        s.cells,
+        s.tiles.reshape(-1),
+        s.affinity.homogeneity,
+        s.affinity.feature,
+        s.offsets,
+    )
+    order = np.empty(65536, np.int64)
+    count = done = 0
+    for n in range(seeds.shape[0]):
+        start, tile = _away(0, seeds[n, 0] + SIDE, seeds[n, 1] + SIDE, seeds[n, 2] + SIDE, s.tiles.shape)
+        if tiles[tile] == 0:
+            _read_tile(s, tile, work)
+        if s.cells[start] < SEEN:
+            s.cells[start] |= SEEN
             order[count] = start
             count += 1
-    done = 0
     while done < count:
-        cell = np.int64(order[done])
+        cell = order[done]
         done += 1
-        if count + links > order.shape[0]:
+        if count + s.offsets.shape[0] > order.shape[0]:
             order = grown(order)
-        if (used + links) * CELLS > pool.shape[0]:
-            pool, tiles = _with_room(pool, tiles, used, links)
-        here = np.int64(pool[cell]) & GREY
-        x, y, z = (cell >> (2 * SHIFT)) & INNER, (cell >> SHIFT) & INNER, cell & INNER
-        for m in range(links):
-            a, b, c = x + offsets[m, 0], y + offsets[m, 1], z + offsets[m, 2]
-            to = cell + step[m]
-            if (a | b | c) & OUTSIDE:
-                at = _neighbour(tiles, int(cell) // CELLS, a, b, c)
-                if _beyond(at, table.shape):
-                    continue
-                slot = table[at]
-                if slot == 0:
-                    slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
-                to = _cell(slot, a, b, c)
-            there = np.int64(pool[to])
+        here = np.int64(cells[cell]) & GREY
+        for m in range(offsets.shape[0]):
+            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.tiles.shape)
+            if tiles[tile] == 0:
+                _read_tile(s, tile, work)
+            there = np.int64(cells[to])
             if there >= SEEN or homogeneity[abs(here - there)] * feature[here + there] < cut:
                 continue
-            pool[to] = there | SEEN
+            cells[to] = there | SEEN
             order[count] = to
             count += 1
-    return _flat(order[:count], tiles, volume.shape), used
+    return np.asarray(_flat(s, order[:count]))
 
 
-@njit(cache=True)
+class _Buckets(NamedTuple):
+    """Cells to go on from, by strength: the first entry of each bucket, and of an entry its cell and the next one."""
+
+    head: NDArray[Any]
+    cell: NDArray[Any]
+    after: NDArray[Any]
+
+
+@kernel
+def _push(b: _Buckets, strength: int, cell: int, entry: int) -> None:
+    b.cell[entry], b.after[entry], b.head[strength] = cell, b.head[strength], entry
+
+
+@door
 def strengths(
-    volume: NDArray[Any],
-    table: NDArray[Any],
-    seeds: NDArray[Any],
-    offsets: NDArray[Any],
-    taps: NDArray[Any],
-    low: float,
-    scale: float,
-    homogeneity: NDArray[Any],
-    feature: NDArray[Any],
-    threshold: int,
-) -> tuple[NDArray[Any], NDArray[Any], int]:
-    """Strength of connectedness 0..255 of every voxel that has at least ``threshold``.
+    s: Search, seeds: NDArray[Any], threshold: int, strength: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Strength of connectedness 0..255 of every voxel that has at least ``threshold``: flat indices, strengths (uint8).
 
-    Dijkstra's algorithm for max-min paths with one bucket per quantised strength (linked lists in two growing
-    arrays). A voxel is pushed only when its strength rises, so an entry is stale exactly when its bucket differs
-    from the voxel's strength. Returns flat indices, their strengths (uint8), and the number of tiles read.
+    Dijkstra's algorithm for max-min paths with one bucket per quantised strength. A voxel is pushed only when its
+    strength rises, so an entry is stale exactly when its bucket differs from the voxel's strength. ``strength``: uint8
+    zeros, one a cell, working memory.
     """
-    work = scratch(taps)
-    pool, tiles, used = np.empty(64 * CELLS, np.uint16), np.empty((64, 3), np.int64), 0
-    strength = np.zeros(pool.shape[0], np.uint8)
-    links, step = offsets.shape[0], _steps(offsets)
-    head = np.full(FULL + 1, -1, np.int32)
-    queue, after, order = np.empty(4096, np.int32), np.empty(4096, np.int32), np.empty(4096, np.int32)
-    count = pushed = 0
-    for s in range(seeds.shape[0]):
-        i, j, k = seeds[s, 0], seeds[s, 1], seeds[s, 2]
-        pool, tiles = _with_room(pool, tiles, used, 1)
-        strength = _as_long(strength, pool)
-        slot = table[i >> SHIFT, j >> SHIFT, k >> SHIFT]
-        if slot == 0:
-            at = (i >> SHIFT, j >> SHIFT, k >> SHIFT)
-            slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
-        start = _cell(slot, i, j, k)
+    work = scratch(s.affinity.taps)
+    cells, tiles, homogeneity, feature, offsets = (
+        s.cells,
+        s.tiles.reshape(-1),
+        s.affinity.homogeneity,
+        s.affinity.feature,
+        s.offsets,
+    )
+    b = _Buckets(np.full(FULL + 1, -1, np.int64), np.empty(4096, np.int64), np.empty(4096, np.int64))
+    pushed = 0
+    for n in range(seeds.shape[0]):
+        start, tile = _away(0, seeds[n, 0] + SIDE, seeds[n, 1] + SIDE, seeds[n, 2] + SIDE, s.tiles.shape)
+        if tiles[tile] == 0:
+            _read_tile(s, tile, work)
         if strength[start] < FULL:
             strength[start] = FULL
-            order[count] = queue[pushed] = start
-            after[pushed] = head[FULL]
-            head[FULL] = pushed
-            count += 1
+            _push(b, FULL, start, pushed)
             pushed += 1
     bucket = FULL
     while bucket >= threshold:
-        entry = head[bucket]
+        entry = b.head[bucket]
         if entry < 0:
             bucket -= 1
             continue
-        head[bucket] = after[entry]
-        cell = np.int64(queue[entry])
+        cell, b.head[bucket] = b.cell[entry], b.after[entry]
         if strength[cell] != bucket:
             continue
-        if count + links > order.shape[0]:
-            order = grown(order)
-        if pushed + links > queue.shape[0]:
-            queue, after = grown(queue), grown(after)
-        if (used + links) * CELLS > pool.shape[0]:
-            pool, tiles = _with_room(pool, tiles, used, links)
-            strength = _as_long(strength, pool)
-        here = np.int64(pool[cell])
-        x, y, z = (cell >> (2 * SHIFT)) & INNER, (cell >> SHIFT) & INNER, cell & INNER
-        for m in range(links):
-            a, b, c = x + offsets[m, 0], y + offsets[m, 1], z + offsets[m, 2]
-            to = cell + step[m]
-            if (a | b | c) & OUTSIDE:
-                at = _neighbour(tiles, int(cell) // CELLS, a, b, c)
-                if _beyond(at, table.shape):
-                    continue
-                slot = table[at]
-                if slot == 0:
-                    slot = used = _append_tile(volume, taps, low, scale, table, at, work, pool, tiles, used)
-                to = _cell(slot, a, b, c)
-            there = np.int64(pool[to])
+        if pushed + offsets.shape[0] > b.cell.shape[0]:
+            b = _Buckets(b.head, grown(b.cell), grown(b.after))
+        here = np.int64(cells[cell])
+        for m in range(offsets.shape[0]):
+            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.tiles.shape)
+            if tiles[tile] == 0:
+                _read_tile(s, tile, work)
+            there = np.int64(cells[to])
             if there >= SEEN or strength[to] >= bucket:
                 continue
             link = min(bucket, int(homogeneity[abs(here - there)] * feature[here + there] + 0.5))
-            if link < threshold or link <= strength[to]:
-                continue
-            if strength[to] == 0:
-                order[count] = to
-                count += 1
-            strength[to] = link
-            queue[pushed] = to
-            after[pushed] = head[link]
-            head[link] = pushed
-            pushed += 1
-    out = np.empty(count, np.uint8)
-    for n in range(count):
-        out[n] = strength[order[n]]
-    return _flat(order[:count], tiles, volume.shape), out, used
+            if link >= threshold and link > strength[to]:
+                strength[to] = link
+                _push(b, link, to, pushed)
+                pushed += 1
+    # an entry a rise: the first of a voxel stands for it
+    found, count = np.empty(pushed, np.uint8), 0
+    for entry in range(pushed):
+        cell = b.cell[entry]
+        if strength[cell] > 0:
+            b.cell[count], found[count], strength[cell] = cell, strength[cell], 0
+            count += 1
+    return _flat(s, b.cell[:count]), found[:count]

@@ -8,11 +8,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.arrays.compiled import door, kernel
+from pipeline.arrays.lattice import nodes_near
 
-@njit(cache=True)
+
+@door
 def cones(
     start: NDArray[Any], end: NDArray[Any], r0: NDArray[Any], r1: NDArray[Any], spacing: NDArray[Any], outer: float,
     distance: NDArray[Any],
@@ -28,15 +30,14 @@ def cones(
         length = np.sqrt(square)
         lean = min(0.95, max(-0.95, (r0[n] - r1[n]) / length))
         shift = lean / (np.sqrt(1.0 - lean * lean) * length)
-        for i in range(_low(ax, end[n, 0], reach, spacing[0]), _high(ax, end[n, 0], reach, spacing[0], ni)):
+        i0, i1 = nodes_near(min(ax, end[n, 0]), max(ax, end[n, 0]), reach, spacing[0], ni)
+        j0, j1 = nodes_near(min(ay, end[n, 1]), max(ay, end[n, 1]), reach, spacing[1], nj)
+        k0, k1 = nodes_near(min(az, end[n, 2]), max(az, end[n, 2]), reach, spacing[2], nk)
+        for i in range(i0, i1):
             x = i * spacing[0] - ax
-            for j in range(
-                _low(ay, end[n, 1], reach, spacing[1]), _high(ay, end[n, 1], reach, spacing[1], nj)
-            ):
+            for j in range(j0, j1):
                 y = j * spacing[1] - ay
-                for k in range(
-                    _low(az, end[n, 2], reach, spacing[2]), _high(az, end[n, 2], reach, spacing[2], nk)
-                ):
+                for k in range(k0, k1):
                     z = k * spacing[2] - az
                     t = (x * dx + y * dy + z * dz) / square
                     across = np.sqrt(max(0.0, x * x + y * y + z * z - t * t * square))
@@ -46,18 +47,8 @@ def cones(
                     distance[i, j, k] = min(distance[i, j, k], d)
 
 
-@njit(cache=True, inline="always")
-def _low(a: float, b: float, reach: float, h: float) -> int:
-    return max(0, int(np.ceil((min(a, b) - reach) / h)))
-
-
-@njit(cache=True, inline="always")
-def _high(a: float, b: float, reach: float, h: float, n: int) -> int:
-    return min(n, int(np.floor((max(a, b) + reach) / h)) + 1)
-
-
-@njit(cache=True)
-def closest_on_triangle(
+@kernel
+def _closest_on_triangle(
     p: NDArray[Any], a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], out: NDArray[Any]
 ) -> float:
     """Closest point of a triangle to p into ``out``; returns the squared distance (Ericson, Real-Time Collision
@@ -93,12 +84,12 @@ def closest_on_triangle(
     return square
 
 
-@njit(cache=True, inline="always")
+@kernel
 def _dot(a: NDArray[Any], b: NDArray[Any]) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(cache=True)
+@door
 def splat_triangles(
     corners: NDArray[Any], spacing: NDArray[Any], reach: float, owner: NDArray[Any], foot: NDArray[Any]
 ) -> NDArray[Any]:
@@ -115,14 +106,14 @@ def splat_triangles(
     q = np.empty(3)
     for n in range(corners.shape[0]):
         a, b, c = corners[n, 0], corners[n, 1], corners[n, 2]
-        i0 = _low(min(a[0], b[0]), c[0], reach, spacing[0])
-        j0 = _low(min(a[1], b[1]), c[1], reach, spacing[1])
-        k0 = _low(min(a[2], b[2]), c[2], reach, spacing[2])
-        for i in range(i0, _high(max(a[0], b[0]), c[0], reach, spacing[0], ni)):
-            for j in range(j0, _high(max(a[1], b[1]), c[1], reach, spacing[1], nj)):
-                for k in range(k0, _high(max(a[2], b[2]), c[2], reach, spacing[2], nk)):
+        i0, i1 = nodes_near(min(a[0], b[0], c[0]), max(a[0], b[0], c[0]), reach, spacing[0], ni)
+        j0, j1 = nodes_near(min(a[1], b[1], c[1]), max(a[1], b[1], c[1]), reach, spacing[1], nj)
+        k0, k1 = nodes_near(min(a[2], b[2], c[2]), max(a[2], b[2], c[2]), reach, spacing[2], nk)
+        for i in range(i0, i1):
+            for j in range(j0, j1):
+                for k in range(k0, k1):
                     p[0], p[1], p[2] = i * spacing[0], j * spacing[1], k * spacing[2]
-                    square = closest_on_triangle(p, a, b, c, q)
+                    square = _closest_on_triangle(p, a, b, c, q)
                     m = owner[i, j, k] - 1
                     if square > reach * reach or (m >= 0 and square >= best[m]):
                         continue
@@ -139,7 +130,7 @@ def splat_triangles(
     return found[:count]
 
 
-@njit(cache=True)
+@door
 def enclosed(corners: NDArray[Any], spacing: NDArray[Any], inside: NDArray[Any]) -> None:
     """Set ``inside`` (uint8 zeros) where a ray along the last axis has crossed the mesh an odd number of times.
 
@@ -152,10 +143,8 @@ def enclosed(corners: NDArray[Any], spacing: NDArray[Any], inside: NDArray[Any])
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         if area == 0.0:
             continue
-        i0 = _low(min(a[0], b[0]), c[0], spacing[0], spacing[0])
-        i1 = _high(max(a[0], b[0]), c[0], 0.0, spacing[0], ni)
-        j0 = _low(min(a[1], b[1]), c[1], spacing[1], spacing[1])
-        j1 = _high(max(a[1], b[1]), c[1], 0.0, spacing[1], nj)
+        i0, i1 = nodes_near(min(a[0], b[0], c[0]) - spacing[0], max(a[0], b[0], c[0]), 0.0, spacing[0], ni)
+        j0, j1 = nodes_near(min(a[1], b[1], c[1]) - spacing[1], max(a[1], b[1], c[1]), 0.0, spacing[1], nj)
         for i in range(i0, i1):
             x = (i + 1.618034e-6) * spacing[0]
             for j in range(j0, j1):

@@ -10,11 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.arrays.compiled import door
 
-@njit(cache=True)
+
+@door
 def factorise(matrix: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], bool]:
     """Lower factor L (n, n) with L L^T = matrix, the first column of every row, and whether it went well."""
     n = matrix.shape[0]
@@ -38,7 +39,7 @@ def factorise(matrix: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], bool]:
     return lower, first, True
 
 
-@njit(cache=True)
+@door
 def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """x with L L^T x = right (n,)."""
     n = right.shape[0]
@@ -55,7 +56,7 @@ def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) ->
     return x
 
 
-@njit(cache=True)
+@door
 def inverse(lower: NDArray[Any], first: NDArray[Any]) -> NDArray[Any]:
     """The inverse of L L^T, column by column."""
     n = lower.shape[0]

@@ -7,11 +7,13 @@ The arc weights depend on the control points too: that is what places the tip al
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pipeline.arrays.compiled import door, kernel
+from pipeline.arrays.lattice import grown, nodes_near, unravelled
 
 BLOCKS = 14
 """Control points that one voxel may see: 5 for one strand, 10 for two in contact, with room for a third."""
@@ -19,69 +21,115 @@ TINTS = 8
 """Amplitude nodes that one voxel may see."""
 
 
-@njit(cache=True)
-def _find(ids: NDArray[Any], count: int, wanted: int) -> int:
-    for m in range(count):
-        if ids[m] == wanted:
-            return m
-    return -1
+class Samples(NamedTuple):
+    """Fixed sampling of a uniform cubic B-spline, n samples.
+
+    measure : quadrature weight in u.  first : of the four control points; value, slope : (n, 4) their weights and d/du.
+    tint_first, tint_share : linear interpolation of the amplitude nodes.
+    """
+
+    measure: NDArray[Any]
+    first: NDArray[Any]
+    value: NDArray[Any]
+    slope: NDArray[Any]
+    tint_first: NDArray[Any]
+    tint_share: NDArray[Any]
 
 
-@njit(cache=True)
+class Line(NamedTuple):
+    """A wire at its samples: points and d/du (n, 3) in kernel coordinates, |d/du| and amplitude (n,)."""
+
+    curve: NDArray[Any]
+    velocity: NDArray[Any]
+    speed: NDArray[Any]
+    amplitude: NDArray[Any]
+    samples: Samples
+
+
+class Blob(NamedTuple):
+    """What a point of the wire looks like: its Gaussian's sigma, cut off at ``radius`` (mm), over ``offset``."""
+
+    sigma: float
+    radius: float
+    offset: float
+
+
+class Claim(NamedTuple):
+    """Voxels (flat) that a wire claims, their position + 1 on the box (``slot``), and their weights (n,) in the fit."""
+
+    voxels: NDArray[Any]
+    slot: NDArray[Any]
+    weight: NDArray[Any]
+
+
+class _Rows(NamedTuple):
+    """The model (n,) of n voxels and its derivatives: by sigma (n,), and by those controls and nodes (``ids``) that a
+    voxel sees, of which it has ``used`` so many.
+    """
+
+    model: NDArray[Any]
+    by_sigma: NDArray[Any]
+    ids: NDArray[Any]
+    used: NDArray[Any]
+    by_control: NDArray[Any]
+    tint_ids: NDArray[Any]
+    tint_used: NDArray[Any]
+    by_tint: NDArray[Any]
+
+
+class Equations(NamedTuple):
+    """J^T W J, J^T W r, the residuals r (n,) and their weighted sum of squares."""
+
+    normal: NDArray[Any]
+    right: NDArray[Any]
+    residual: NDArray[Any]
+    square: float
+
+
+@door
 def active_voxels(
-    shape: tuple[int, int, int], spacing: NDArray[Any], curve: NDArray[Any], radius: float, slot: NDArray[Any]
+    slot: NDArray[Any], spacing: NDArray[Any], curve: NDArray[Any], radius: float
 ) -> NDArray[Any]:
     """Flat indices of the voxels within ``radius`` mm of the samples (n, 3); ``slot`` gets their position + 1."""
-    ni, nj, nk = shape
+    ni, nj, nk = slot.shape
     found = np.empty(4096, np.int64)
     count = 0
-    for m in range(curve.shape[0]):
-        i0, i1 = _window(curve[m, 0], radius, spacing[0], ni)
-        j0, j1 = _window(curve[m, 1], radius, spacing[1], nj)
-        k0, k1 = _window(curve[m, 2], radius, spacing[2], nk)
+    for x, y, z in curve:
+        i0, i1 = nodes_near(x, x, radius, spacing[0], ni)
+        j0, j1 = nodes_near(y, y, radius, spacing[1], nj)
+        k0, k1 = nodes_near(z, z, radius, spacing[2], nk)
         for i in range(i0, i1):
-            dx = (i * spacing[0] - curve[m, 0]) ** 2
             for j in range(j0, j1):
-                dy = dx + (j * spacing[1] - curve[m, 1]) ** 2
-                if dy > radius * radius:
-                    continue
+                flat = (i * spacing[0] - x) ** 2 + (j * spacing[1] - y) ** 2
                 for k in range(k0, k1):
-                    if slot[i, j, k] or dy + (k * spacing[2] - curve[m, 2]) ** 2 > radius * radius:
+                    if slot[i, j, k] or flat + (k * spacing[2] - z) ** 2 > radius * radius:
                         continue
                     if count >= found.shape[0]:
-                        larger = np.empty(2 * count, np.int64)
-                        larger[:count] = found
-                        found = larger
+                        found = grown(found)
                     found[count] = (i * nj + j) * nk + k
                     count += 1
                     slot[i, j, k] = count
     return found[:count]
 
 
-@njit(cache=True, inline="always")
-def _window(x: float, radius: float, h: float, n: int) -> tuple[int, int]:
-    return max(0, int(np.ceil((x - radius) / h))), min(n, int(np.floor((x + radius) / h)) + 1)
-
-
-@njit(cache=True)
+@door
 def render(
-    shape: tuple[int, int, int],
-    spacing: NDArray[Any],
     slot: NDArray[Any],
+    spacing: NDArray[Any],
     count: int,
     curve: NDArray[Any],
     weight: NDArray[Any],
-    sigma: float,
-    radius: float,
+    blob: Blob,
 ) -> NDArray[Any]:
     """The model's grey (count,) at the voxels numbered in ``slot``; ``weight`` is amplitude times arc weight."""
     out = np.zeros(count)
+    sigma, radius, _ = blob
     norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
     for m in range(curve.shape[0]):
         x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
-        i0, i1 = _window(x, radius, spacing[0], shape[0])
-        j0, j1 = _window(y, radius, spacing[1], shape[1])
-        k0, k1 = _window(z, radius, spacing[2], shape[2])
+        i0, i1 = nodes_near(x, x, radius, spacing[0], slot.shape[0])
+        j0, j1 = nodes_near(y, y, radius, spacing[1], slot.shape[1])
+        k0, k1 = nodes_near(z, z, radius, spacing[2], slot.shape[2])
         for i in range(i0, i1):
             for j in range(j0, j1):
                 flat = (i * spacing[0] - x) ** 2 + (j * spacing[1] - y) ** 2
@@ -92,62 +140,40 @@ def render(
     return out
 
 
-@njit(cache=True)
-def normal_equations(
-    grey: NDArray[Any],
-    spacing: NDArray[Any],
-    slot: NDArray[Any],
-    weight: NDArray[Any],
-    voxels: NDArray[Any],
-    curve: NDArray[Any],
-    velocity: NDArray[Any],
-    first: NDArray[Any],
-    value: NDArray[Any],
-    slope: NDArray[Any],
-    measure: NDArray[Any],
-    tint_first: NDArray[Any],
-    tint_share: NDArray[Any],
-    tint: NDArray[Any],
-    sigma: float,
-    offset: float,
-    radius: float,
-    controls: int,
-    normal: NDArray[Any],
-    right: NDArray[Any],
-    residual: NDArray[Any],
-) -> float:
-    """J^T W J and J^T W r of the tube model over the active voxels; returns the weighted sum of squares of r.
+@kernel
+def _place(ids: NDArray[Any], used: NDArray[Any], s: int, wanted: int) -> int:
+    """Where a voxel's row keeps the column ``wanted``, which is taken up if it is new there; -1 if the row is full."""
+    for m in range(used[s]):
+        if ids[s, m] == wanted:
+            return m
+    if used[s] >= ids.shape[1]:
+        return -1
+    ids[s, used[s]] = wanted
+    used[s] += 1
+    return int(used[s] - 1)
 
-    curve, velocity : (n, 3) samples and d/du.  first : (n,) first of the four control points, value and slope (n, 4)
-    their weights and d/du.  measure : (n,) quadrature weight in u.  tint_first, tint_share : linear interpolation of
-    the amplitude nodes ``tint``.  weight, residual : (voxels,).  Columns: 3 controls, amplitude nodes, sigma, offset.
-    """
-    _, nj, nk = grey.shape
-    total = voxels.shape[0]
-    tints = tint.shape[0]
-    ids = np.empty((total, BLOCKS), np.int32)
-    used = np.zeros(total, np.int32)
-    jac = np.zeros((total, BLOCKS, 3))
-    tint_ids = np.empty((total, TINTS), np.int32)
-    tint_used = np.zeros(total, np.int32)
-    tint_jac = np.zeros((total, TINTS))
-    sigma_jac = np.zeros(total)
-    model = np.full(total, offset)
+
+@kernel
+def _rows(line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob, total: int) -> _Rows:
+    """The model and its derivatives at the ``total`` voxels numbered in ``slot``."""
+    rows = _Rows(
+        np.full(total, blob.offset), np.zeros(total), np.empty((total, BLOCKS), np.int32), np.zeros(total, np.int32),
+        np.zeros((total, BLOCKS, 3)), np.empty((total, TINTS), np.int32), np.zeros(total, np.int32),
+        np.zeros((total, TINTS)),
+    )  # fmt: skip
+    model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
+    curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share) = line
+    sigma, radius, _ = blob
     norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
     inverse = 1.0 / (sigma * sigma)
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
     gz = np.empty(256)
     for m in range(curve.shape[0]):
         x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
-        i0, i1 = _window(x, radius, hx, grey.shape[0])
-        j0, j1 = _window(y, radius, hy, nj)
-        k0, k1 = _window(z, radius, hz, nk)
+        i0, i1 = nodes_near(x, x, radius, hx, slot.shape[0])
+        j0, j1 = nodes_near(y, y, radius, hy, slot.shape[1])
+        k0, k1 = nodes_near(z, z, radius, hz, slot.shape[2])
         vx, vy, vz = velocity[m, 0], velocity[m, 1], velocity[m, 2]
-        speed = np.sqrt(vx * vx + vy * vy + vz * vz) + 1e-30
-        tf = tint_first[m]
-        share = tint_share[m]
-        amplitude = tint[tf] * (1.0 - share) + tint[tf + 1] * share
-        base = first[m]
         for k in range(k0, k1):
             gz[k - k0] = np.exp(-0.5 * inverse * (k * hz - z) ** 2)
         for i in range(i0, i1):
@@ -165,107 +191,68 @@ def normal_equations(
                     if s < 0 or square > radius * radius:
                         continue
                     g = gxy * gz[k - k0]
-                    shade = g * speed
-                    model[s] += amplitude * shade
-                    push = amplitude * shade * inverse
-                    pull = amplitude * g / speed
-                    at = _find(ids[s], used[s], base)
-                    if at < 0 or at + 3 >= used[s] or ids[s, at + 3] != base + 3:
-                        at = -1
+                    shade = g * speed[m]
+                    model[s] += amplitude[m] * shade
+                    push = amplitude[m] * shade * inverse
+                    pull = amplitude[m] * g / speed[m]
+                    at = -1
                     for q in range(4):
-                        place = at + q if at >= 0 else _find(ids[s], used[s], base + q)
-                        if place < 0:
-                            if used[s] >= BLOCKS:
-                                continue
-                            place = used[s]
-                            ids[s, place] = base + q
-                            used[s] += 1
-                        b = push * value[m, q]
-                        d = pull * slope[m, q]
-                        jac[s, place, 0] += b * dx + d * vx
-                        jac[s, place, 1] += b * dy + d * vy
-                        jac[s, place, 2] += b * dz + d * vz
+                        at += 1  # mostly the columns follow one another
+                        if at >= used[s] or ids[s, at] != first[m] + q:
+                            at = _place(ids, used, s, first[m] + q)
+                        if at >= 0:
+                            b, d = push * value[m, q], pull * slope[m, q]
+                            by_control[s, at, 0] += b * dx + d * vx
+                            by_control[s, at, 1] += b * dy + d * vy
+                            by_control[s, at, 2] += b * dz + d * vz
                     for q in range(2):
-                        place = _find(tint_ids[s], tint_used[s], tf + q)
-                        if place < 0:
-                            if tint_used[s] >= TINTS:
-                                continue
-                            place = tint_used[s]
-                            tint_ids[s, place] = tf + q
-                            tint_used[s] += 1
-                        tint_jac[s, place] += shade * (share if q else 1.0 - share)
-                    sigma_jac[s] += amplitude * shade * (square * inverse - 1.0) / sigma
-    return _accumulate(
-        grey,
-        weight,
-        voxels,
-        model,
-        ids,
-        used,
-        jac,
-        tint_ids,
-        tint_used,
-        tint_jac,
-        sigma_jac,
-        controls,
-        tints,
-        normal,
-        right,
-        residual,
-    )
+                        at = _place(tint_ids, tint_used, s, tint_first[m] + q)
+                        if at >= 0:
+                            by_tint[s, at] += shade * (tint_share[m] if q else 1.0 - tint_share[m])
+                    by_sigma[s] += amplitude[m] * shade * (square * inverse - 1.0) / sigma
+    return rows
 
 
-@njit(cache=True)
-def _accumulate(
-    grey: NDArray[Any],
-    weight: NDArray[Any],
-    voxels: NDArray[Any],
-    model: NDArray[Any],
-    ids: NDArray[Any],
-    used: NDArray[Any],
-    jac: NDArray[Any],
-    tint_ids: NDArray[Any],
-    tint_used: NDArray[Any],
-    tint_jac: NDArray[Any],
-    sigma_jac: NDArray[Any],
-    controls: int,
-    tints: int,
-    normal: NDArray[Any],
-    right: NDArray[Any],
-    residual: NDArray[Any],
-) -> float:
-    """Sum the rows of J into the (full, symmetric) normal matrix."""
-    _, nj, nk = grey.shape
-    column = np.empty(3 * BLOCKS + TINTS + 2, np.int64)
-    row = np.empty(3 * BLOCKS + TINTS + 2)
+@kernel
+def _row(rows: _Rows, s: int, controls: int, tints: int, column: NDArray[Any], row: NDArray[Any]) -> int:
+    """The derivatives of one voxel that are not 0, and their columns; returns how many there are."""
+    n = 0
+    for m in range(rows.used[s]):
+        for q in range(3):
+            column[n], row[n] = 3 * rows.ids[s, m] + q, rows.by_control[s, m, q]
+            n += 1
+    for m in range(rows.tint_used[s]):
+        column[n], row[n] = 3 * controls + rows.tint_ids[s, m], rows.by_tint[s, m]
+        n += 1
+    column[n], row[n] = 3 * controls + tints, rows.by_sigma[s]
+    column[n + 1], row[n + 1] = 3 * controls + tints + 1, 1.0
+    return n + 2
+
+
+@door
+def normal_equations(
+    grey: NDArray[Any], spacing: NDArray[Any], claim: Claim, line: Line, blob: Blob, controls: int, tints: int
+) -> Equations:
+    """The normal equations (full, symmetric) of the tube model over the claimed voxels.
+
+    Columns: 3 ``controls``, ``tints`` amplitude nodes, sigma, offset.
+    """
+    voxels, slot, weight = claim
+    rows = _rows(line, slot, spacing, blob, voxels.shape[0])
+    size = 3 * controls + tints + 2
+    normal, right, residual = np.zeros((size, size)), np.zeros(size), np.zeros(voxels.shape[0])
+    column, row = np.empty(3 * BLOCKS + TINTS + 2, np.int64), np.empty(3 * BLOCKS + TINTS + 2)
     total = 0.0
     for s in range(voxels.shape[0]):
-        flat = voxels[s]
-        rest = flat // nk
-        r = grey[rest // nj, rest % nj, flat % nk] - model[s]
-        residual[s] = r
-        w = weight[s]
-        if w == 0.0:
+        i, j, k = unravelled(voxels[s], grey.shape)
+        r = residual[s] = grey[i, j, k] - rows.model[s]
+        if weight[s] == 0.0:
             continue
-        n = 0
-        for m in range(used[s]):
-            for q in range(3):
-                column[n] = 3 * ids[s, m] + q
-                row[n] = jac[s, m, q]
-                n += 1
-        for m in range(tint_used[s]):
-            column[n] = 3 * controls + tint_ids[s, m]
-            row[n] = tint_jac[s, m]
-            n += 1
-        column[n] = 3 * controls + tints
-        row[n] = sigma_jac[s]
-        column[n + 1] = 3 * controls + tints + 1
-        row[n + 1] = 1.0
-        n += 2
-        total += w * r * r
+        n = _row(rows, s, controls, tints, column, row)
+        total += weight[s] * r * r
         for a in range(n):
-            ja = w * row[a]
+            ja = weight[s] * row[a]
             right[column[a]] += ja * r
             for b in range(n):
                 normal[column[a], column[b]] += ja * row[b]
-    return total
+    return Equations(normal, right, residual, total)

@@ -9,12 +9,13 @@ import numpy as np
 import SimpleITK as sitk
 from skimage.segmentation import flood as skimage_flood
 
-from pipeline.segment.affinity import Levels, estimate_affinity
+from pipeline.segment.affinity import estimate_affinity
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, neighbours, strength_list
+from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 
-LEVELS = Levels(1000.0, 100.0, 50.0)
+LEVELS = GreyLevels(1000.0, 100.0, 50.0)
 ROUNDS = 4
 """Rounds of all methods in turn, so that a busy machine hits each; the best of each counts."""
 

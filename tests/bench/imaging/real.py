@@ -15,7 +15,7 @@ from skimage.morphology import skeletonize
 from pipeline.load import load, read_header
 from pipeline.model import Volume
 from pipeline.segment import segment
-from pipeline.trace import trace_region
+from tests.pipeline.in_region import trace_region
 
 # corners (x, y) in pixels of four boxes, each around one ramp of the CTP404 module, slices 26 to 38
 BOXES = (
@@ -123,7 +123,7 @@ def report_aneurysm(data: Path, picture: Path | None):
     """Print the tree's branches and draw it."""
     volume, lumen = aneurysm(data)
     values = lumen.distance.values
-    found, blur = lumen.counters, lumen.counters["scanner_blur_mm"]
+    found, blur = lumen.counters, lumen.levels["scanner_blur_mm"]
     print(f"## Aneurysm scan (voxel taken as {VOXEL_MM} mm): {int((values < 0).sum())} voxels inside, deepest "
           f"{-float(values.min()):.2f} mm, level {lumen.wall_level:.0f}, blur {blur:.2f} mm, "
           f"{found['voxels_thin']:.0f} voxels looked at again for thin branches")  # fmt: skip

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.trace import trace
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.follow import trace
 from solver.grid import Grid
 
 

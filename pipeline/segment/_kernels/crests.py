@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.arrays.jets import ridge_step
-from pipeline.arrays.tiles import unravelled
-from pipeline.trace._kernels.ridges import to_ridge
+from pipeline.arrays.compiled import door
+from pipeline.arrays.jets import Blurred
+from pipeline.arrays.lattice import unravelled
+from pipeline.arrays.ridges import new_probe, ridge_step, to_ridge
 
 ROUNDS = 6
 STILL = 0.1
@@ -19,32 +19,27 @@ FURTHEST = 1.8
 """Voxels that a point may move to its crest: further off lies another one."""
 
 
-@njit(cache=True)
+@door
 def crests(
-    grey: NDArray[Any],
-    spacing: NDArray[Any],
-    sigma: float,
-    voxels: NDArray[Any],
-    outside: float,
-    sharp: float,
+    field: Blurred, voxels: NDArray[Any], outside: float, sharp: float
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Crest points (n, 3), index * spacing, and the grey blurred by ``sigma`` there, of flat voxels that have one.
+    """Crest points (n, 3), index * spacing, and the blurred grey there, of flat voxels that have one.
 
     On a crest the weaker curvature across is at least ``sharp`` (1/mm^2) of the height above ``outside``; a flank's is
     less, or of the other sign.
     """
-    w, out, step = np.empty((3, 3, 64)), np.empty(10), np.empty(3)
+    probe, spacing = new_probe(), field.spacing
+    p, out, step = probe.place, probe.jet, probe.step
     at, peak = np.empty((voxels.shape[0], 3)), np.empty(voxels.shape[0])
     size = min(spacing[0], spacing[1], spacing[2])
-    p, t = np.empty(3), np.empty(3)
     count = 0
-    for n in range(voxels.shape[0]):
-        i, j, k = unravelled(voxels[n], grey.shape)
+    for voxel in voxels:
+        i, j, k = unravelled(voxel, field.grey.shape)
         p[0], p[1], p[2] = i * spacing[0], j * spacing[1], k * spacing[2]
-        t[:] = 0.0
-        middle = to_ridge(grey, spacing, sigma, p, t, ROUNDS, w, out, step)
+        probe.tangent[:] = 0.0
+        middle = to_ridge(field, probe, ROUNDS)
         moved = (p[0] - i * spacing[0]) ** 2 + (p[1] - j * spacing[1]) ** 2 + (p[2] - k * spacing[2]) ** 2
-        ridge_step(out, t, size, step)
+        ridge_step(out, probe.tangent, size, step)
         left = step[0] ** 2 + step[1] ** 2 + step[2] ** 2
         crest = middle < -sharp * (out[0] - outside) and out[0] > outside
         if crest and moved < (FURTHEST * size) ** 2 and left < (STILL * size) ** 2:

@@ -1,15 +1,15 @@
-"""How the phantom lies in one scan: a rotation and a shift against the reference scan."""
+"""A rigid motion: how the phantom lies in one scan, as a rotation and a shift against the reference scan."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from pipeline.model import Array, Volume
-from solver.grid import Grid, read_only
+from solver.grid import read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +53,7 @@ class Motion:
         """Size of the rotation."""
         return float(np.degrees(Rotation.from_matrix(self.rotation).magnitude()))
 
-    def grid_undone(self, grid: Grid) -> Grid:
-        """The frame's voxels where they lie in the phantom as the reference shows it: a new geometry, same values."""
-        origin = self.rotation.T @ (grid.origin_mm - self.shift_mm)
-        return Grid(grid.values, grid.spacing_mm, origin, self.rotation.T @ grid.direction)
-
     def undone(self, frame: Volume) -> Volume:
-        """The same for a scan. Nothing is interpolated."""
-        grid = self.grid_undone(frame)
-        return Volume(grid.values, grid.spacing_mm, grid.origin_mm, grid.direction, frame.assumed)
+        """The frame's voxels where they lie in the phantom as the reference shows it: a new geometry, same values."""
+        origin = self.rotation.T @ (frame.origin_mm - self.shift_mm)
+        return replace(frame, origin_mm=origin, direction=self.rotation.T @ frame.direction)

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.arrays.compiled import kernel
 
-@njit(cache=True, inline="always")
-def basis(t: float) -> tuple[float, float, float, float]:
+Four = tuple[float, float, float, float]
+
+
+@kernel
+def basis(t: float) -> Four:
     """The four cubic B-spline weights at offset ``t`` in [0, 1) from the second node."""
     u = 1.0 - t
     return (
@@ -23,26 +26,26 @@ def basis(t: float) -> tuple[float, float, float, float]:
     )
 
 
-@njit(cache=True, inline="always")
-def slope(t: float) -> tuple[float, float, float, float]:
+@kernel
+def slope(t: float) -> Four:
     """First derivatives of :func:`basis`, per voxel."""
     u = 1.0 - t
     return -0.5 * u * u, 1.5 * t * t - 2.0 * t, 2.0 * u - 1.5 * u * u, 0.5 * t * t
 
 
-@njit(cache=True, inline="always")
-def bend(t: float) -> tuple[float, float, float, float]:
+@kernel
+def bend(t: float) -> Four:
     """Second derivatives of :func:`basis`, per voxel^2."""
     u = 1.0 - t
     return u, 3.0 * t - 2.0, 3.0 * u - 2.0, t
 
 
-@njit(cache=True, inline="always")
-def _row(c: NDArray[Any], i: int, j: int, k: int, w: tuple[float, float, float, float]) -> float:
+@kernel
+def _row(c: NDArray[Any], i: int, j: int, k: int, w: Four) -> float:
     return float(w[0] * c[i, j, k] + w[1] * c[i, j, k + 1] + w[2] * c[i, j, k + 2] + w[3] * c[i, j, k + 3])
 
 
-@njit(cache=True)
+@kernel
 def value_gradient(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Value and gradient (per voxel) at a point in index coordinates; the four nodes per axis must lie in ``c``."""
     i, j, k = int(x), int(y), int(z)
@@ -64,29 +67,26 @@ def value_gradient(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float
     return f, gx, gy, gz
 
 
-@njit(cache=True)
+@kernel
+def _contracted(c: NDArray[Any], at: tuple[int, int, int], wx: Four, wy: Four, wz: Four) -> float:
+    """The 4^3 nodes around ``at``, weighted along each axis and added up."""
+    i, j, k = at
+    total = 0.0
+    for a in range(4):
+        plane = 0.0
+        for b in range(4):
+            plane += wy[b] * _row(c, i + a - 1, j + b - 1, k - 1, wz)
+        total += wx[a] * plane
+    return total
+
+
+@kernel
 def hessian(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float, float, float, float, float, float]:
     """Second derivatives xx, yy, zz, xy, xz, yz (per voxel^2) at a point in index coordinates."""
-    i, j, k = int(x), int(y), int(z)
-    wx, dx, bx = basis(x - i), slope(x - i), bend(x - i)
-    wy, dy, by = basis(y - j), slope(y - j), bend(y - j)
-    wz, dz, bz = basis(z - k), slope(z - k), bend(z - k)
-    xx = yy = zz = xy = xz = yz = 0.0
-    for a in range(4):
-        f = fy = fz = fyy = fyz = fzz = 0.0
-        for b in range(4):
-            row = _row(c, i + a - 1, j + b - 1, k - 1, wz)
-            drow = _row(c, i + a - 1, j + b - 1, k - 1, dz)
-            f += wy[b] * row
-            fy += dy[b] * row
-            fyy += by[b] * row
-            fz += wy[b] * drow
-            fyz += dy[b] * drow
-            fzz += wy[b] * _row(c, i + a - 1, j + b - 1, k - 1, bz)
-        xx += bx[a] * f
-        yy += wx[a] * fyy
-        zz += wx[a] * fzz
-        xy += dx[a] * fy
-        xz += dx[a] * fz
-        yz += wx[a] * fyz
-    return xx, yy, zz, xy, xz, yz
+    at = int(x), int(y), int(z)
+    x, y, z = x - at[0], y - at[1], z - at[2]
+    wx, dx, wy, dy, wz, dz = basis(x), slope(x), basis(y), slope(y), basis(z), slope(z)
+    return (
+        _contracted(c, at, bend(x), wy, wz), _contracted(c, at, wx, bend(y), wz), _contracted(c, at, wx, wy, bend(z)),
+        _contracted(c, at, dx, dy, wz), _contracted(c, at, dx, wy, dz), _contracted(c, at, wx, dy, dz),
+    )  # fmt: skip

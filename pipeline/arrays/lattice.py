@@ -1,0 +1,46 @@
+"""Indices of a lattice and lists that grow, for kernels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays.compiled import kernel
+
+
+@kernel
+def clamped(i: int, n: int) -> int:
+    """The index of the border voxel for indices outside."""
+    return 0 if i < 0 else (n - 1 if i >= n else i)
+
+
+@kernel
+def unravelled(flat: int, shape: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Indices of a flat C-order index."""
+    rest = flat // shape[2]
+    return rest // shape[1], rest % shape[1], flat % shape[2]
+
+
+@kernel
+def nodes_near(low: float, high: float, reach: float, h: float, n: int) -> tuple[int, int]:
+    """First and one past the last of ``n`` nodes, ``h`` mm apart, within ``reach`` mm of what lies from low to high."""
+    return max(0, int(np.ceil((low - reach) / h))), min(n, int(np.floor((high + reach) / h)) + 1)
+
+
+@kernel
+def grown(array: NDArray[Any]) -> NDArray[Any]:
+    """A copy with twice the room along its first axis; what is in the second half means nothing."""
+    return np.concatenate((array, np.empty_like(array)))
+
+
+@kernel
+def steps_around(shape: tuple[int, int, int], reach: int) -> NDArray[Any]:
+    """Steps of a flat C-order index to all voxels up to ``reach`` away along each axis, ascending; 0 is one of them."""
+    side = 2 * reach + 1
+    out = np.empty(side**3, np.int64)
+    for n in range(side**3):
+        a, b, c = unravelled(n, (side, side, side))
+        out[n] = ((a - reach) * shape[1] + b - reach) * shape[2] + c - reach
+    return out

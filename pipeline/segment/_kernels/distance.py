@@ -1,0 +1,147 @@
+"""Closest points of a wall handed on from voxel to voxel, and the signed distances that follow from them.
+
+Coordinates are index * spacing (mm along the grid's axes). ``owner`` (int32 box) holds the position + 1 of a voxel's
+closest point in ``foot``, or 0. ``inside`` (uint8 box) holds 1 inside the wall.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays.compiled import door, kernel
+from pipeline.arrays.lattice import grown, unravelled
+
+QUEUED = 2
+"""Mark in ``inside``, for as long as feet are handed on, of a voxel that has one to hand on."""
+
+
+@kernel
+def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
+    return float((x - p[0]) * (x - p[0]) + (y - p[1]) * (y - p[1]) + (z - p[2]) * (z - p[2]))
+
+
+@door
+def propagate(
+    owner: NDArray[Any],
+    inside: NDArray[Any],
+    spacing: NDArray[Any],
+    voxels: NDArray[Any],
+    foot: NDArray[Any],
+    outer: float,
+) -> int:
+    """Hand closest points on from ``voxels``, which have one: to all of the inside, and outside as far as ``outer`` mm.
+
+    voxels : flat, ascending for the sake of the cache. Layer by layer; a voxel that gets a nearer foot hands it on
+    again. Returns the number of hand-overs.
+    """
+    ni, nj, nk = owner.shape
+    hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    front, following = voxels.copy(), np.empty(max(4096, voxels.shape[0]), np.int64)
+    count = visits = voxels.shape[0]
+    while count:
+        fresh = 0
+        for n in range(count):
+            i, j, k = unravelled(front[n], owner.shape)
+            inside[i, j, k] &= ~QUEUED
+            m = owner[i, j, k] - 1
+            p = foot[m]
+            for a in range(max(0, i - 1), min(ni, i + 2)):
+                for b in range(max(0, j - 1), min(nj, j + 2)):
+                    for c in range(max(0, k - 1), min(nk, k + 2)):
+                        known = owner[a, b, c]
+                        if known == m + 1:
+                            continue
+                        far = _square(a * hx, b * hy, c * hz, p)
+                        if known > 0:
+                            if far >= _square(a * hx, b * hy, c * hz, foot[known - 1]) - 1e-9:
+                                continue
+                        elif far > outer * outer and not inside[a, b, c] & 1:
+                            continue
+                        owner[a, b, c] = m + 1
+                        if inside[a, b, c] & QUEUED:
+                            continue
+                        inside[a, b, c] |= QUEUED
+                        if fresh + 1 >= following.shape[0]:
+                            following = grown(following)
+                        following[fresh] = (a * nj + b) * nk + c
+                        fresh += 1
+        visits += fresh
+        front, following = following, front
+        count = fresh
+    return int(visits)
+
+
+@door
+def lost_feet(
+    owner: NDArray[Any], spacing: NDArray[Any], voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]
+) -> NDArray[Any]:
+    """Voxels beside the surface whose foot was not found and whose neighbours' are two voxels off and more.
+
+    A branch as thin as that has its peak at the level of the wall: the wall is put through the voxel itself.
+    Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
+    """
+    limit = (2.0 * max(spacing[0], spacing[1], spacing[2])) ** 2
+    lost = np.empty(voxels.shape[0], np.int64)
+    count = 0
+    for n in range(voxels.shape[0]):
+        i, j, k = unravelled(voxels[n], owner.shape)
+        x, y, z = i * spacing[0], j * spacing[1], k * spacing[2]
+        m = owner[i, j, k] - 1
+        if good[n] or (m >= 0 and _square(x, y, z, foot[m]) < limit):
+            continue
+        foot[n, 0], foot[n, 1], foot[n, 2] = x, y, z
+        owner[i, j, k] = n + 1
+        lost[count] = n
+        count += 1
+    return lost[:count]
+
+
+@kernel
+def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], bend: float) -> float:
+    """Distance of a point from the sphere of curvature ``bend`` that osculates the surface at its foot p.
+
+    For bend 0 (a surface of flat facets, closest points exact) it is the distance to the foot.
+    """
+    ax, ay, az = x - p[0], y - p[1], z - p[2]
+    along = ax * n[0] + ay * n[1] + az * n[2]
+    square = ax * ax + ay * ay + az * az
+    lift = 1.0 + bend * along
+    far = np.sqrt(square)
+    if bend == 0.0 or lift <= 0.3:
+        return float(far)
+    # no point is further from the surface than from its foot, however bent the surface is there
+    near = along + 0.5 * bend * max(0.0, square - along * along) / lift
+    return float(min(abs(near), far))
+
+
+@door
+def distances(
+    owner: NDArray[Any],
+    inside: NDArray[Any],
+    spacing: NDArray[Any],
+    wall: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+    outer: float,
+    out: NDArray[Any],
+) -> None:
+    """Signed distance (float32) of every voxel from its owner's foot; ``outer`` where it has none.
+
+    wall : feet, normals and curvatures.  ``out`` is the inner part of the box, and may be the beginning of ``owner``'s
+    memory seen as float32: a voxel is written after it is read, and never further on.
+    """
+    foot, normal, bend = wall
+    hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    skip = (owner.shape[0] - out.shape[0]) // 2
+    for a in range(out.shape[0]):
+        i = a + skip
+        for b in range(out.shape[1]):
+            j = b + skip
+            for c in range(out.shape[2]):
+                k = c + skip
+                m = owner[i, j, k] - 1
+                d = outer
+                if m >= 0:
+                    d = _from_foot(i * hx, j * hy, k * hz, foot[m], normal[m], bend[m])
+                out[a, b, c] = -d if inside[i, j, k] & 1 else min(d, outer)

@@ -1,0 +1,64 @@
+"""Segmentation by fuzzy connectedness: what hangs together with the seeds in grey, and its thin branches.
+
+Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pipeline.segment._kernels.connect import Affinity
+from pipeline.segment.affinity import estimate_affinity
+from pipeline.segment.config import SegmentConfig
+from pipeline.segment.connect import connect, connect_relative, neighbours
+from pipeline.segment.levels import GreyLevels, levels_at
+from pipeline.segment.region import Index, Region, failed, seed_voxels
+from pipeline.segment.thin import thin_branches
+from solver.grid import Grid
+
+LEAST_CONTRAST = 2.0
+"""Contrast over the noise of one voxel below which no vessel is looked for (Dice falls below 0.97 at 2.2)."""
+
+
+def _start(grid: Grid, seeds: Index) -> tuple[GreyLevels, Index]:
+    """Levels at the seed of greatest contrast over noise, and all the seeds moved to typical grey beside them."""
+    found = [levels_at(grid, seed) for seed in seeds]
+    levels = max((f[0] for f in found), key=lambda a: a.contrast / max(a.noise, 1e-9))
+    if not levels.contrast > LEAST_CONTRAST * levels.noise:
+        got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
+        allowed = "a lumen brighter than its surroundings by twice the noise"
+        raise failed(got, allowed, "move the seed (lumen_seed_mm) well into the vessel")
+    return levels, np.array([f[1] for f in found], np.int64)
+
+
+def _connected(grid: Grid, seeds: Index, affinity: Affinity, config: SegmentConfig) -> tuple[Index, float]:
+    """Flat indices of the vessel's voxels and the number of voxels read; too few of them are no vessel."""
+    offsets = neighbours(config.adjacency)
+    if len(config.other_seeds_mm):
+        others = seed_voxels(grid, np.array(config.other_seeds_mm))
+        order, read = connect_relative(grid, seeds, others, affinity, config.threshold, offsets)
+    else:
+        order, read = connect(grid, seeds, affinity, config.threshold, offsets)
+    if len(order) < config.least_voxels:
+        allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
+        got = f"connected voxels: got {len(order)}"
+        raise failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
+    return order, read
+
+
+def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Region:
+    """The vessel that holds the seeds ((m, 3) LPS mm); raises StageError where they lie in none.
+
+    grid : C-contiguous grey, brighter inside the vessel.
+    """
+    levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
+    affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma, config.scale)
+    order, read = _connected(grid, seeds, affinity, config)
+    thin, more = thin_branches(grid, seeds, order, levels, affinity)
+    total = float(np.prod(grid.shape))
+    counters = {
+        "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
+        "voxels_visited": float(len(order)), "voxels_thin": float(len(thin)),
+    }  # fmt: skip
+    return Region(order, thin, levels, affinity.taps, counters)

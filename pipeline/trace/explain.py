@@ -1,0 +1,202 @@
+"""The way from a subtraction to the wire's curve: explain the frame in one way or several, judge, take the best.
+
+It is one tracing back end; another is a function like :func:`explained`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays.robust import spread
+from pipeline.arrays.smooth import smooth_voxels
+from pipeline.model import Array, Curve, arc_length
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm
+from pipeline.trace.config import TraceConfig
+from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
+from pipeline.trace.level import levelled
+from pipeline.trace.noise import inflation
+from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.tube import Tube, point_sigmas
+from pipeline.trace.verdict import LEAST_SEEN, SURE_CNR, Verdict, judge, note_of
+
+SAMPLE_VOXELS = 1.0
+"""Spacing of the curve's points."""
+FINE_VOXELS = 0.55
+"""Blur in which crests are looked for where strands may cross: they stay apart longest."""
+WIDE_VOXELS = 1.2
+"""Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
+WIDE_SIGMAS = 4.0
+"""and the height at which they start there: noise gives some, which are too short to matter."""
+BRIDGE_SIGMA_VOXELS = 0.5
+"""Standard deviation across the wire that a point on a bridged gap gets at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An attempt, the curve read off it (local points, their sigma, the tip's) and the verdict."""
+
+    attempt: Attempt
+    points: Array
+    sigma: Array
+    tip_sigma: float
+    length_mm: float
+    verdict: Verdict
+
+
+def _entry_parameter(tube: Tube, entry: EntryPose) -> float:
+    """Parameter at which the curve crosses the entry plane nearest the entry; 0 when it starts beyond it."""
+    u = np.linspace(0, tube.intervals, 40 * tube.intervals + 1)
+    offset = tube.at(u) - entry.point
+    along, near = offset @ entry.direction, np.linalg.norm(offset, axis=1)
+    crossing = np.flatnonzero((along[:-1] < 0) & (along[1:] >= 0) & (near[:-1] < ENTRY_REACH_MM))
+    if len(crossing) == 0:
+        return 0.0
+    n = int(crossing[np.argmin(near[crossing])])
+    share = along[n] / (along[n] - along[n + 1])
+    return float(u[n] + share * (u[n + 1] - u[n]))
+
+
+def _even_parameters(tube: Tube, start: float, step: float) -> Array:
+    """Parameters from ``start`` to the end at about equal steps of arc."""
+    u = np.linspace(start, tube.intervals, 20 * tube.intervals + 2)
+    arc = arc_length(tube.at(u))
+    return np.interp(np.linspace(0, arc[-1], max(3, round(arc[-1] / step) + 1)), arc, u)
+
+
+def _on_bridges(points: Array, attempt: Attempt, reach: float) -> NDArray[np.bool_]:
+    """Points of the curve that lie on a bridge."""
+    gaps = attempt.path.points[attempt.path.bridged]
+    if len(gaps) == 0:
+        return np.zeros(len(points), bool)
+    square = np.min(np.sum((points[:, None] - gaps[None]) ** 2, axis=2), axis=1)
+    return np.asarray(square < reach**2)
+
+
+def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> list[Candidate]:
+    """The curve of an attempt with its verdict; nothing for no attempt."""
+    if attempt is None:
+        return []
+    u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * image.voxel)
+    points = attempt.tube.at(u)
+    length = float(arc_length(image.world(points))[-1])
+    verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
+    return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
+
+
+def missed_mm(length_mm: float, entry: EntryPose, config: TraceConfig) -> float:
+    """How far a length is beyond what may differ from the expected depth, mm."""
+    if entry.expected_mm is None:
+        return 0.0
+    return max(0.0, abs(length_mm - entry.expected_mm) - config.length_tolerance_mm)
+
+
+def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, config: TraceConfig) -> bool:
+    """Whether another explanation should be tried."""
+    if not found:
+        return True
+    best, attempt = found[0], found[0].attempt
+    weak = attempt.cnr(image) < SURE_CNR or best.verdict.status is not FrameStatus.OK
+    doubts = best.verdict.doubts > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
+    return weak or doubts or missed_mm(best.length_mm, entry, config) > 0
+
+
+def _best(image: Subtraction, found: list[Candidate], entry: EntryPose, config: TraceConfig) -> Candidate:
+    """The candidate that leaves least unexplained: misfit, with a length far from the expected one held against it.
+
+    A millimetre missing or too much costs half of what a millimetre of wire explains, a flagged one a tenth.
+    """
+    if len(found) == 1:
+        return found[0]
+    costs = np.array(misfit(image, [c.attempt for c in found]))
+    h = image.voxel
+    for n, c in enumerate(found):
+        worth = c.attempt.cnr(image) ** 2 * np.pi * (c.attempt.tube.sigma / h) ** 2 / h
+        doubtful = float(c.verdict.flagged.sum()) * h
+        costs[n] += worth * (0.5 * missed_mm(c.length_mm, entry, config) + 0.1 * doubtful)
+    return found[int(np.argmin(costs))]
+
+
+def best_of(
+    image: Subtraction, entry: EntryPose, previous: Curve | None, config: TraceConfig
+) -> Candidate | None:
+    """The curve of one frame: from the frame alone; where that leaves doubts also wider and from the frame before."""
+    gap = config.longest_gap_mm
+    found = _read_off(image, cold(image, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry)
+    if _doubtful(image, found, entry, config):
+        if not found or found[0].attempt.cnr(image) > SURE_CNR:
+            found += _read_off(image, cold(image, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND), entry)
+        found += _read_off(image, cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry)
+        if previous is not None and len(previous.points_mm):
+            found += _read_off(image, warm(image, entry, previous, config.ridge_voxels, gap), entry)
+    return _best(image, found, entry, config) if found else None
+
+
+def _traces_of_wire(image: Subtraction) -> bool:
+    """Whether the lumen holds more bright voxels than noise makes: three times as many above 3.5 sigmas, and 15."""
+    sample = smooth_voxels(image.grey, gaussian_taps(1.0), image.region.within)
+    limit = 3.5 * spread(sample)
+    up, down = (int(np.sum(s * (sample - np.median(sample)) > limit)) for s in (1, -1))
+    return up > 3 * max(down, 5)
+
+
+def _no_wire(image: Subtraction) -> Curve:
+    status, allowed = FrameStatus.NO_WIRE, f"a bright line within {ENTRY_REACH_MM} mm of entry_mm"
+    do = "check entry_mm and that the frame shows a wire"
+    if _traces_of_wire(image):
+        status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
+        do = "give the curve of the frame before, check entry_mm, or scan with more dose"
+    got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
+    return Curve(
+        np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
+        counters=image.counters, levels=image.levels,
+    )  # fmt: skip
+
+
+def _curve(image: Subtraction, best: Candidate) -> Curve:
+    """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
+    attempt, verdict, tube = best.attempt, best.verdict, best.attempt.tube
+    across, along = inflation(image, best.points, tube).at(image.depth_at(best.points))
+    sigma = across * best.sigma
+    sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
+    counters = image.counters | {
+        "pieces": float(attempt.pieces), "bridges": float(attempt.path.bridges), "leftover_mm": attempt.leftover_mm,
+        "iterations": float(tube.iterations), "from_previous": float(attempt.from_previous),
+        "faint_mm": verdict.faint_mm, "double_mm": verdict.double_mm,
+    }  # fmt: skip
+    levels = image.levels | {
+        "residual_rms": tube.residual_rms, "blur_mm": tube.sigma, "cnr": attempt.cnr(image),
+        "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
+    }  # fmt: skip
+    return Curve(
+        image.world(best.points), sigma, float(along[-1]) * best.tip_sigma, verdict.flagged, verdict.status,
+        verdict.note, counters, levels=levels,
+    )  # fmt: skip
+
+
+def _faint_for_its_noise(curve: Curve) -> Curve:
+    """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
+    seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
+    if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
+        return curve
+    note = f"trace: wire: got a wire {seen:.1f} noises bright, noise counted as it is correlated; expected {LEAST_SEEN}"
+    note += " at least; scan with more dose or a smoother reconstruction kernel"
+    return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
+
+
+def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, config: TraceConfig) -> Curve:
+    """The wire of one frame from the plane of entry to the tip, LPS mm; what went wrong is its status and note.
+
+    previous : consulted only where the frame alone leaves doubts.
+    """
+    best = best_of(image, entry, previous, config)
+    if best is None:
+        return _no_wire(image)
+    if image.modelled:
+        # the lumen's own grey under the wire is taken from beside it, and the fit done again
+        image = levelled(image, dense(best.attempt.tube, image.voxel), best.attempt.tube.sigma)
+        best = _read_off(image, again(image, best.attempt, entry.direction), entry)[0]
+    return _faint_for_its_noise(_curve(image, best))

@@ -1,0 +1,139 @@
+"""Is the curve right? What the grey along it says, what it leaves unexplained, and what the manifest expected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.model import Array
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import Attempt
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.tip import extended, resampled
+
+LEAST_CNR = 2.5
+"""Contrast over noise below which a frame alone does not give a curve."""
+LEAST_WITH_PRIOR = 1.5
+"""and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
+LEAST_SEEN = 2.0
+"""The same over what noise does to the fit: noise correlated over 0.8 voxel counts 2.4-fold. Below it the wire is
+followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
+SURE_CNR = 5.0
+"""and from which crests at the finest blur are enough."""
+FAINT = 0.35
+"""Share of the usual crest grey below which there is no wire to be seen: a gap."""
+DOUBLE = 1.6
+"""Share above which two strands lie on one crest."""
+LEFTOVER_MM = 4.0
+"""Length of crests that run elsewhere from which the curve may be the wrong one."""
+MOST_FAINT_MM = 5.0
+"""Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
+MOST_DOUBLE_MM = 3.0
+"""Length of line too bright for one strand (a crossing is 1 mm) from which a frame alone does not decide."""
+MOST_OUTSIDE = 0.03
+"""Share of the curve that may lie over two voxels outside the lumen."""
+TIP_VOXELS = 4.0
+"""Length on either side of the tip over which a faint wire must be seen to end: the noise of its mean is a fifth."""
+TIP_AHEAD = 0.4
+"""Share of the usual crest grey beyond the tip from which the wire seems to go on."""
+MEAN_OVER_MM = 1.5
+"""Length over which crest grey is averaged before it is called faint or double."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """status and note of a curve (OK and empty when it stands), and the flags of its points."""
+
+    status: FrameStatus
+    note: str
+    flagged: NDArray[np.bool_]
+    faint_mm: float
+    double_mm: float
+
+    @property
+    def doubts(self) -> float:
+        """How much speaks against the curve, mm of it."""
+        return self.faint_mm + self.double_mm
+
+
+def note_of(got: str, allowed: str, do: str) -> str:
+    """What the report says of a curve that does not stand."""
+    return f"trace: wire: got {got}; expected {allowed}; {do}"
+
+
+def _averaged(values: Array, width: int) -> Array:
+    """Running mean; the ends see a shorter window."""
+    kernel = np.ones(min(width, len(values)))
+    return np.asarray(np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same"))
+
+
+def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, float]:
+    """Grey on the curve (n,) over its median along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
+
+    The blur in which grey is read leaves 0.36 of the noise, the mean the rest.
+    """
+    grey = image.along(points)
+    usual = float(np.median(grey))
+    share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
+    count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
+    gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
+    return share, 0.4 * gain / attempt.cnr(image) / float(np.sqrt(count))
+
+
+def _outside(image: Subtraction, points: Array) -> NDArray[np.bool_]:
+    """Points in the box whose nearest voxel is further than two voxels outside the wall."""
+    index = np.rint(points / image.spacing).astype(int)
+    inside = np.all((index >= 0) & (index < np.array(image.region.box.shape)), axis=1)
+    return np.asarray(inside & (image.depth_at(points) > 2.0 * image.voxel))
+
+
+def _ends_there(image: Subtraction, points: Array) -> bool:
+    """Whether the crest is nearer its usual height than nothing over the last TIP_VOXELS, and not so beyond the tip.
+
+    A previous curve says where the wire lay, not how far it has been pushed since: that the frame alone must show.
+    """
+    h = image.voxel
+    grey = image.along(resampled(extended(points, TIP_VOXELS * h, h), h))
+    count = round(TIP_VOXELS)
+    usual = float(np.median(grey[:-count]))
+    behind, ahead = float(np.mean(grey[-2 * count : -count])), float(np.mean(grey[-count:]))
+    return behind > 0.5 * usual and ahead < TIP_AHEAD * usual
+
+
+def judge(
+    image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float
+) -> Verdict:
+    """The verdict on a curve, points (n, 3) local."""
+    step = length_mm / max(1, len(points) - 1)
+    share, noise = _crest_share(image, attempt, points, step)
+    ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
+    faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM)
+    double = share > max(DOUBLE, 1.0 + 4.0 * noise)
+    outside = _outside(image, points)
+    faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
+    left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
+    # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
+    confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
+    objections = (
+        (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
+         f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
+         "scan with more dose or give the frame before"),
+        (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
+         f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
+         f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
+        (left_mm > max(LEFTOVER_MM, 0.1 * length_mm), FrameStatus.TRACE_AMBIGUOUS,
+         f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
+         "look for a second device or a wrong turn at a crossing"),
+        (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
+         f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
+         "look at the picture"),
+        (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
+         f"{double_mm:.1f} mm of line too bright for one strand", f"{MOST_DOUBLE_MM} mm at most",
+         "give the curve of the frame before, which tells strands in contact apart"),
+    )  # fmt: skip
+    first = next(
+        ((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, "")
+    )
+    return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
