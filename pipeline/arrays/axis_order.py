@@ -6,14 +6,6 @@ import numpy as np
 
 from solver.grid import Array, Grid
 
-FORWARD = (0, 1, 2)
-REVERSED = (2, 1, 0)
-
-
-def memory_axes(grid: Grid) -> tuple[int, int, int]:
-    """The order of axes in which the grid's values are C-contiguous: as they are, or reversed (Fortran)."""
-    return REVERSED if grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous else FORWARD
-
 
 def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
     """The same grid (same points in mm) with its index axes in another order; a view, never a copy."""
@@ -23,17 +15,16 @@ def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
 
 def contiguous(grid: Grid) -> Grid:
     """The grid itself if its values are C-contiguous, otherwise with a copy (of a crop, say) that is."""
-    if grid.values.flags.c_contiguous:
-        return grid
-    return grid.with_values(np.ascontiguousarray(grid.values))
+    return grid if grid.values.flags.c_contiguous else grid.with_values(np.ascontiguousarray(grid.values))
 
 
 def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
-    """The grid with C-contiguous values and the axes that undo it with :func:`reorder`.
+    """The grid with C-contiguous values, its axes reversed if that is how they lie in memory (Fortran), and its axes.
 
-    Both orders in use are their own inverse, so ``reorder(result, axes)`` gives the first order back.
+    Both orders are their own inverse, so ``reorder(result, axes)`` gives the first order back.
     """
-    axes = memory_axes(grid)
+    reverse = grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous
+    axes = (2, 1, 0) if reverse else (0, 1, 2)
     return contiguous(reorder(grid, axes)), axes
 
 
@@ -46,6 +37,4 @@ def integer_offset(grid: Grid, inner: Grid) -> Array | None:
         grid.direction, inner.direction, atol=1e-4
     )
     shift = grid.to_index(inner.origin_mm)
-    if not same or np.any(np.abs(shift - np.rint(shift)) > 0.02):
-        return None
-    return np.rint(shift)
+    return np.rint(shift) if same and np.all(np.abs(shift - np.rint(shift)) <= 0.02) else None

@@ -1,6 +1,6 @@
-"""Gaussian derivatives of a lattice at single points: nothing is filtered where nothing is asked.
+"""A blurred lattice at single voxels, and its derivatives at single points: nothing is filtered where nothing is asked.
 
-Coordinates are index * spacing (mm along the grid's axes); derivatives are per mm.
+Coordinates of points are index * spacing (mm along the grid's axes); derivatives are per mm.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import nodes_near
+from pipeline.arrays.lattice import door, kernel, nodes_near
 
 REACH = 3.0
 """Half width of the Gaussian's window in sigmas."""
@@ -102,3 +101,32 @@ def jets_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
 def values_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     """The blurred lattice (n,) at points (n, 3)."""
     return jets_at(field, np.ascontiguousarray(points))[:, 0].copy()
+
+
+@kernel
+def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -> float:
+    """The separable kernel ``taps`` (2r+1) applied at one voxel; the border voxel is repeated outside."""
+    reach = taps.shape[0] // 2
+    ni, nj, nk = volume.shape
+    total = 0.0
+    for a in range(-reach, reach + 1):
+        ia = clamped(i + a, ni)
+        plane = 0.0
+        for b in range(-reach, reach + 1):
+            jb = clamped(j + b, nj)
+            row = 0.0
+            for c in range(-reach, reach + 1):
+                row += taps[c + reach] * volume[ia, jb, clamped(k + c, nk)]
+            plane += taps[b + reach] * row
+        total += taps[a + reach] * plane
+    return total
+
+
+@door
+def smooth_voxels(grey: NDArray[Any], taps: NDArray[Any], voxels: NDArray[Any]) -> NDArray[Any]:
+    """The separable kernel ``taps`` at flat indices of a box, float32."""
+    out = np.empty(voxels.shape[0], np.float32)
+    for n in range(voxels.shape[0]):
+        i, j, k = unravelled(voxels[n], grey.shape)
+        out[n] = smoothed(grey, taps, i, j, k)
+    return out

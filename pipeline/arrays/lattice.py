@@ -1,13 +1,24 @@
-"""Indices of a lattice and lists that grow, for kernels."""
+"""What kernels of the imaging stages share: how they are compiled, indices of a lattice, lists that grow.
+
+No fast-math: a result does not depend on how the work is split into functions. Before a loop, arrays are taken out of
+a named tuple: counting references to its fields once a round makes the loop five times as long.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import kernel
+from solver._compile import on_disk
+
+HOW: dict[str, Any] = {"no_cfunc_wrapper": True}
+door = on_disk(**HOW)
+"""Compiles what Python calls: kept on disk until a source behind it changes."""
+kernel = njit(**HOW)
+"""Compiles what other kernels call: into the doors."""
 
 
 @kernel

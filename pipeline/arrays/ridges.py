@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import kernel
 from pipeline.arrays.jets import WIDEST, Blurred, jet
+from pipeline.arrays.lattice import kernel
 
 STRIDE = 0.7
 """Longest step to a crest in voxels: a window of that blur sees no further."""

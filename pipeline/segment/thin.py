@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.jets import Blurred
-from pipeline.arrays.smooth import smooth_voxels
+from pipeline.arrays.jets import Blurred, smooth_voxels
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
 from pipeline.segment._kernels.connect import Affinity

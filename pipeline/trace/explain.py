@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.jets import smooth_voxels
 from pipeline.arrays.robust import spread
-from pipeline.arrays.smooth import smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm

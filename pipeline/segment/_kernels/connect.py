@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import grown, unravelled
+from pipeline.arrays.lattice import door, grown, kernel, unravelled
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, INNER, SHIFT, SIDE, scratch, smooth_tile
 
 FULL = 255

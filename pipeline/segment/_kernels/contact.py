@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import grown, steps_around, unravelled
+from pipeline.arrays.lattice import door, grown, kernel, steps_around, unravelled
 
 
 @kernel

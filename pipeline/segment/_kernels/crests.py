@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door
 from pipeline.arrays.jets import Blurred
-from pipeline.arrays.lattice import unravelled
+from pipeline.arrays.lattice import door, unravelled
 from pipeline.arrays.ridges import new_probe, ridge_step, to_ridge
 
 ROUNDS = 6

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import grown, unravelled
+from pipeline.arrays.lattice import door, grown, kernel, unravelled
 
 QUEUED = 2
 """Mark in ``inside``, for as long as feet are handed on, of a voxel that has one to hand on."""

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import nodes_near
+from pipeline.arrays.lattice import door, kernel, nodes_near
 
 
 @door

@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import kernel
+from pipeline.arrays.lattice import kernel
 
 Four = tuple[float, float, float, float]
 

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import kernel
-from pipeline.arrays.lattice import clamped
+from pipeline.arrays.lattice import clamped, kernel
 
 SHIFT = 3
 SIDE = 1 << SHIFT

@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import clamped, grown, steps_around, unravelled
-from pipeline.arrays.smooth import smoothed
+from pipeline.arrays.jets import smoothed
+from pipeline.arrays.lattice import clamped, door, grown, kernel, steps_around, unravelled
 from pipeline.segment._kernels.spline import hessian, value_gradient
 from pipeline.segment._kernels.tiles import INNER, SHIFT, SIDE, scratch, smooth_tile
 

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import grown
+from pipeline.arrays.lattice import door, grown, kernel
 
 
 class WallModel(NamedTuple):

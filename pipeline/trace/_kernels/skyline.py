@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door
+from pipeline.arrays.lattice import door
 
 
 @door

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
 from pipeline.arrays.jets import Blurred
-from pipeline.arrays.lattice import grown, unravelled
+from pipeline.arrays.lattice import door, grown, kernel, unravelled
 from pipeline.arrays.ridges import Probe, new_probe, to_ridge
 
 LAG = 12

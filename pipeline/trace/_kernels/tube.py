@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.compiled import door, kernel
-from pipeline.arrays.lattice import grown, nodes_near, unravelled
+from pipeline.arrays.lattice import door, grown, kernel, nodes_near, unravelled
 
 BLOCKS = 14
 """Control points that one voxel may see: 5 for one strand, 10 for two in contact, with room for a third."""
