@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
 from pipeline.load import LoadError, load, read_header
-from pipeline.load.curves import RAS_TO_LPS, Branches, read_markups_branches, read_swc
-from pipeline.load.surfaces import Shapes, read_stl, read_vtp
+from pipeline.load.centrelines import Branches, read_markups_branches, read_swc
+from pipeline.load.surfaces import RAS_TO_LPS, Shapes, read_stl, read_vtp
 from pipeline.model import Lumen
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
 from pipeline.segment._kernels.wall import distances, propagate
@@ -103,12 +103,11 @@ def lumen_from_labels(path: Path, config: SegmentConfig) -> Lumen:
     return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 
 
-def read_lumen(path: Path, case: Any = None, config: Any = None) -> Lumen:
+def read_lumen(path: Path, own: SegmentConfig) -> Lumen:
     """The lumen in a file: .swc or .mrk.json (centreline with radius), .stl or .vtp (closed surface), else label map.
 
-    ``config`` : SegmentConfig, or a Config that holds one. Raises LoadError when the file does not hold a lumen.
+    Raises LoadError when the file does not hold a lumen.
     """
-    own = getattr(config, "segment", config) or SegmentConfig()
     name = path.name.lower()
     if not path.exists():
         msg = f"{path}: no such file; check lumen in the manifest (relative to the manifest itself)"
