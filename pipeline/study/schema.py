@@ -37,51 +37,40 @@ def _problem(*problems: str) -> PydanticCustomError:
     return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
 
 
-def _given(value: Any, kind: type, allowed: str) -> None:
-    if not isinstance(value, kind):
-        msg = f"Input should be {allowed}"
+def _source(value: Any, info: ValidationInfo) -> Source:
+    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
+    if not isinstance(value, str):
+        msg = "Input should be a valid string"
         raise ValueError(msg)
-
-
-def _base(info: ValidationInfo) -> Path:
-    return Path((info.context or {}).get("folder", ""))
+    name, _, dataset = value.partition("#")
+    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
 
 
 def _path(value: Any, info: ValidationInfo) -> Path:
-    """A path, relative to the manifest."""
-    _given(value, str, "a valid string")
-    return _base(info) / str(value)
-
-
-def _source(value: Any, info: ValidationInfo) -> Source:
-    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
-    _given(value, str, "a valid string")
-    name, _, dataset = value.partition("#")
-    return Source(_base(info) / name, dataset)
+    """A file, relative to the manifest."""
+    return _source(value, info).path
 
 
 def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
     """A list of sources, or a pattern whose matches come in natural order."""
     if isinstance(value, list):
         return tuple(_source(item, info) for item in value)
-    _given(value, str, "a valid string or a list of them")
-    name, _, dataset = value.partition("#")
-    if not any(mark in name for mark in "*?["):
-        return (_source(value, info),)
-    base = _base(info)
-    found = sorted(base.glob(name), key=lambda p: natural_key(p.name))
+    source, base = _source(value, info), Path((info.context or {}).get("folder", ""))
+    pattern = value.partition("#")[0]
+    if not any(mark in pattern for mark in "*?["):
+        return (source,)
+    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
     if not found:
         problem = f"{info.field_name} = {value!r} matches no file below {base}"
         raise _problem(problem)
-    return tuple(Source(p, dataset) for p in found)
+    return tuple(Source(path, source.dataset) for path in found)
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
-    _given(value, str, "a valid string")
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
     if value not in wires:
-        problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(value, wires)}"
+        problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
         raise _problem(*[problem] * bool(wires))
     return wires[value]
@@ -89,18 +78,18 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
 
 def _not_yet(value: Any, info: ValidationInfo) -> Any:
     """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
-    if info.field_name == "parameters" and value is not None:
-        problem = "parameters cannot be read in this version; write the values into [wires] and [case.wall]"
-        raise _problem(problem)
-    if value == "fit":
-        problem = 'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame'
+    problem = {
+        "parameters": "parameters cannot be read in this version; write the values into [wires] and [case.wall]",
+        "roll_deg": 'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame',
+    }[info.field_name or ""]
+    if value == "fit" or info.field_name == "parameters":
         raise _problem(problem)
     return value
 
 
-ASource = Annotated[Source, BeforeValidator(_source)]
+SourceText = Annotated[Source, BeforeValidator(_source)]
 Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-APath = Annotated[Path, BeforeValidator(_path)]
+PathText = Annotated[Path, BeforeValidator(_path)]
 
 
 class Strict(BaseModel):
@@ -115,7 +104,7 @@ class Case(Strict):
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
     role: Literal["validation", "calibration"] = "validation"
     group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1)
-    reference: ASource | None = None
+    reference: SourceText | None = None
     frames: Sources = ()
     entry_mm: Vector
     entry_direction: Direction
@@ -123,12 +112,12 @@ class Case(Strict):
     wire: Annotated[Wire, BeforeValidator(_wire)]
     insertion_mm: tuple[Positive, ...] | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
-    lumen: ASource | None = None
+    lumen: SourceText | None = None
     traces: Sources = ()
-    parameters: Annotated[APath | None, BeforeValidator(_not_yet)] = None
+    parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
     roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
-    truth: APath | None = None
+    truth: PathText | None = None
     wall: Wall = Wall()
 
     @property
