@@ -12,7 +12,7 @@ import numpy as np
 from pipeline import results
 from pipeline.summary import intervals, pooled_rms
 from reports import tables
-from reports.schema import FAILURES_COLUMNS, SUMMARY_COLUMNS, names
+from reports.schema import FAILURES, POINTS, SUMMARY, Table
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ def found_results(out: Path) -> list[dict[str, Any]]:
     return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
 
 
-def _only(row: dict[str, Any], columns: Any) -> dict[str, Any]:
-    allowed = set(names(columns))
+def _only(row: dict[str, Any], table: Table) -> dict[str, Any]:
+    allowed = set(table.names)
     return {k: v for k, v in row.items() if k in allowed}
 
 
 def _point_errors(out: Path, case: str) -> Any:
     path = out / "cases" / case / "points.csv.gz"
-    return tables.read_points(path)["error_mm"].to_numpy() if path.exists() else np.zeros(0)
+    return tables.read(path, POINTS)["error_mm"].to_numpy() if path.exists() else np.zeros(0)
 
 
 def overall(out: Path, found: list[dict[str, Any]], draws: int = 2000) -> dict[str, Any]:
@@ -76,9 +76,9 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
     found = found_results(out)
     rows = [result["summary"] for result in found]
-    tables.write_summary(out / "summary.csv", [_only(row, SUMMARY_COLUMNS) for row in rows])
+    tables.write(out / "summary.csv", SUMMARY, [_only(row, SUMMARY) for row in rows])
     failures = [row for result in found for row in result["failures"]]
-    tables.write_failures(out / "failures.csv", [_only(row, FAILURES_COLUMNS) for row in failures])
+    tables.write(out / "failures.csv", FAILURES, [_only(row, FAILURES) for row in failures])
     if run_info is not None:
         info = run_info | {"cases": [row["case"] for row in rows], "overall": overall(out, found)}
         results.write_json(out / name, info)

@@ -19,6 +19,7 @@ from pipeline.scans import projections, voxels
 from pipeline.summary import NULLS, skill_of
 from reports import export, frames_file, tables
 from reports.atomic import write_text
+from reports.schema import ERRORS, POINTS
 
 NAN = float("nan")
 
@@ -86,19 +87,19 @@ def point_columns(frames: list[Frame]) -> dict[str, Any]:
     return {name: np.concatenate(values) for name, values in parts.items()}
 
 
-def _scan_of(lumen: Lumen) -> frames_file.Scan:
+def _scan_of(lumen: Lumen) -> frames_file.ScanCrop:
     """Geometry of the crop, with the lumen's silhouettes for outlines."""
     grid = lumen.distance
     inside = Volume(
         (np.asarray(grid.values) < 0).astype(np.uint8), grid.spacing_mm, grid.origin_mm, grid.direction
     )
     silhouettes = dict(enumerate(projections(inside, (0.0, 1.0))))
-    return frames_file.Scan(grid.spacing_mm, grid.origin_mm, grid.direction, grid.shape, silhouettes)
+    return frames_file.ScanCrop(grid.spacing_mm, grid.origin_mm, grid.direction, grid.shape, silhouettes)
 
 
-def _arrays_of(frame: Frame) -> frames_file.Frame:
+def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
     curve, wire, errors = frame.curve, frame.simulated, frame.comparison
-    return frames_file.Frame(
+    return frames_file.FrameArrays(
         frame.index,
         traced_mm=None if curve is None else curve.points_mm,
         trace_sigma_mm=None if curve is None else curve.sigma_mm,
@@ -231,10 +232,10 @@ def _first_sentence(frames: list[Frame]) -> str:
 
 def write_tables(folder: Path, run: CaseRun, view: bool = True) -> None:
     """Everything of a case but result.json, which is written last: its presence says that the case is complete."""
-    tables.write_errors(folder / "errors.csv", [error_row(f) for f in run.frames])
+    tables.write(folder / "errors.csv", ERRORS, [error_row(f) for f in run.frames])
     columns = point_columns(run.frames)
     if columns:
-        tables.write_points(folder / "points.csv.gz", columns)
+        tables.write(folder / "points.csv.gz", POINTS, columns)
     scan = None if run.lumen is None else _scan_of(run.lumen)
     frames_file.write_frames(folder / "frames.h5", scan, map(_arrays_of, run.frames))
     if view:

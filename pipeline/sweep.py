@@ -15,6 +15,7 @@ from pipeline.aggregate import found_results
 from pipeline.run_case import Job
 from pipeline.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
+from reports.schema import SWEEP
 
 COPIED = ("rms_mm", "tip_median_mm", "truth_rms_mm", "skill", "frames_ok")
 
@@ -57,7 +58,7 @@ def write_sweep(out: Path, points: Sequence[Point]) -> None:
     rows = [_row("(plain)", "", result) for result in found_results(out)]
     for point in points:
         rows += [_row(point.parameter, point.value, r) for r in found_results(out / "sweep" / point.folder)]
-    tables.write_sweep(out / "sweep.csv", rows)
+    tables.write(out / "sweep.csv", SWEEP, rows)
 
 
 def _row(parameter: str, value: str, result: dict[str, Any]) -> dict[str, Any]:

@@ -9,16 +9,19 @@ from typing import Any
 import pandas as pd
 
 NOTHING = "–"
+_LEVEL = {"min", "median", "max"}
 
 
 def number(value: Any, digits: int = 3) -> str:
     """A number with ``digits`` significant digits, no exponent between 0.0001 and a million; – for none."""
     if value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value)):
         return NOTHING
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return {True: "yes", False: "no"}.get(value, str(value)) if isinstance(value, bool) else str(value)
-    if isinstance(value, int) or value == 0 or math.isinf(value):
-        return f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, float):
+        return str(value)
+    if value == 0 or math.isinf(value):
+        return f"{value:g}"
     exponent = math.floor(math.log10(abs(value)))
     if not -4 <= exponent < 6:
         return f"{value:.{digits}g}"
@@ -32,10 +35,16 @@ def interval(low: Any, high: Any) -> str:
 
 
 def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted keys and texts of a nested mapping, in its order; empty values are left out."""
+    """Dotted keys and texts of a nested mapping, in its order; empty values are left out.
+
+    A level (a mapping of min, median and max, such as the contrast over all frames) is one text.
+    """
     for key, value in tree.items():
         name = f"{prefix}{key}"
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value.keys() == _LEVEL:
+            if value["median"] is not None:
+                yield name, f"{number(value['median'])} ({interval(value['min'], value['max'])})"
+        elif isinstance(value, Mapping):
             yield from flatten(value, f"{name}.")
         elif value not in (None, "", [], ()):
             yield name, _text(value)

@@ -1,24 +1,34 @@
-"""The three projection planes: which array axes a picture shows, in mm, and the sheet of panels they fill."""
+"""The three projection planes: which array axes a picture shows, in mm, and what is drawn in a panel of one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from reports.figures._style import new_figure
-from reports.frames_file import Scan
+from reports.figures._style import Look, new_figure
+from reports.frames_file import FrameArrays, ScanCrop
 
 Array = NDArray[np.float64]
-Plane = tuple[int, int]
-# drawn from left to right: projection axis -> (axis across, axis up)
-PLANES: tuple[tuple[int, Plane], ...] = ((1, (0, 2)), (0, (1, 2)), (2, (0, 1)))
+
+
+class Plane(NamedTuple):
+    """Array axes: the one projected along, the one drawn across and the one drawn up."""
+
+    along: int
+    across: int
+    up: int
+
+
+PLANES = (Plane(1, 0, 2), Plane(0, 1, 2), Plane(2, 0, 1))  # from left to right
+WIDTH_INCH = 10.0
 _LPS_NAMES = ("x, towards left", "y, towards back", "z, towards head")
-_WIDTH_INCH = 10.0
 _LABELS_INCH = 0.62  # what an axis title and its ticks take beside a panel
 _ROW_INCH = (1.5, 4.6)
 _MARGIN_MM = 5.0
@@ -32,7 +42,7 @@ class View:
     The coordinates are LPS where the array axes are the patient's, else they start at the crop's corner.
     """
 
-    scan: Scan
+    scan: ScanCrop
     low: Array
     high: Array
 
@@ -50,11 +60,16 @@ class View:
         """Coordinates (n, 3) of LPS points along the array axes, mm."""
         return np.asarray(self.scan.to_index(points_mm) * self.scan.spacing_mm + self._start())
 
-    def extent(self, across: int, up: int) -> tuple[float, float, float, float]:
+    def extent(self, plane: Plane) -> tuple[float, float, float, float]:
         """Left, right, bottom, top of a whole picture in mm, at the outer faces of its voxels."""
         low = self._start() - 0.5 * self.scan.spacing_mm
         high = low + np.array(self.scan.shape) * self.scan.spacing_mm
-        return float(low[across]), float(high[across]), float(low[up]), float(high[up])
+        return (
+            float(low[plane.across]),
+            float(high[plane.across]),
+            float(low[plane.up]),
+            float(high[plane.up]),
+        )
 
     def label(self, axis: int) -> str:
         """Name of an axis with its unit."""
@@ -64,14 +79,14 @@ class View:
         return self.scan.origin_mm if self.aligned else np.zeros(3)
 
 
-def whole(scan: Scan) -> View:
+def whole(scan: ScanCrop) -> View:
     """The whole crop."""
     view = View(scan, np.zeros(3), np.zeros(3))
     low = view.coordinates(scan.origin_mm[None])[0] - 0.5 * scan.spacing_mm
     return View(scan, low, low + np.array(scan.shape) * scan.spacing_mm)
 
 
-def around(scan: Scan, curves: Iterable[Array], margin_mm: float = _MARGIN_MM) -> View:
+def around(scan: ScanCrop, curves: Iterable[Array], margin_mm: float = _MARGIN_MM) -> View:
     """The box of the curves and a margin, cut at the crop; the whole crop where there is no curve."""
     everything = whole(scan)
     points = [everything.coordinates(c) for c in curves if len(c)]
@@ -86,38 +101,47 @@ def around(scan: Scan, curves: Iterable[Array], margin_mm: float = _MARGIN_MM) -
 
 def sheet(view: View, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
     """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""
-    widths = [float(view.size[across]) for _, (across, _) in PLANES]
-    height = max(float(view.size[up]) for _, (_, up) in PLANES)
+    widths = [float(view.size[plane.across]) for plane in PLANES]
+    height = max(float(view.size[plane.up]) for plane in PLANES)
     widths += [0.75 * height] if square else []
-    room = _WIDTH_INCH - _LABELS_INCH * len(widths)
+    room = WIDTH_INCH - _LABELS_INCH * len(widths)
     row_inch = float(np.clip(room * height / sum(widths), *_ROW_INCH))
-    figure = new_figure(rows * (row_inch + 0.42) + 0.55, _WIDTH_INCH)
+    figure = new_figure(rows * (row_inch + 0.42) + 0.55, WIDTH_INCH)
     axes = figure.subplots(rows, len(widths), squeeze=False, width_ratios=widths)
-    return figure, [list(axes[r]) for r in range(rows)]
+    return figure, [list(row) for row in axes]
 
 
-def show(axes: Axes, picture: NDArray[np.uint8], view: View, plane: Plane) -> None:
-    """Draw a projection in grey; the picture is indexed (across, up)."""
-    low, high = np.percentile(picture, _WINDOW_PERCENTILES)
-    axes.imshow(
-        picture.T,
-        cmap="gray",
-        vmin=low,
-        vmax=max(high, low + 1),
-        origin="lower",
-        extent=view.extent(*plane),
-        interpolation="nearest",
-    )
+def show(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
+    """Draw a frame's projection in grey, where it has one; pictures are indexed (across, up)."""
+    if plane.along in frame.mips:
+        picture = frame.mips[plane.along]
+        low, high = np.percentile(picture, _WINDOW_PERCENTILES)
+        window: Look = {"cmap": "gray", "vmin": low, "vmax": max(high, low + 1), "interpolation": "nearest"}
+        axes.imshow(picture.T, origin="lower", extent=view.extent(plane), **window)
 
 
-def dress(axes: Axes, view: View, plane: Plane, bounds: Sequence[Array] | None = None) -> None:
+def draw_curve(axes: Axes, points_mm: Array, view: View, plane: Plane, tip: float = 0, **look: Any) -> None:
+    """Draw a curve (n, 3), LPS mm, with a dot of size ``tip`` at its end."""
+    coordinates = view.coordinates(points_mm)
+    across, up = coordinates[:, plane.across], coordinates[:, plane.up]
+    axes.plot(across, up, **look)
+    if tip:
+        axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
+
+
+def points_table(points_mm: Array, **labels: Any) -> pd.DataFrame:
+    """Points (n, 3) as rows of labels and coordinates."""
+    xyz = ["x_mm", "y_mm", "z_mm"]
+    return pd.DataFrame(points_mm, columns=xyz).assign(**labels)[[*labels, *xyz]]
+
+
+def dress(axes: Axes, view: View, plane: Plane) -> None:
     """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
-    across, up = plane
-    low, high = bounds if bounds is not None else (view.low, view.high)
+    low, high = view.low, view.high
     axes.set_aspect("equal")
-    axes.set_xlim(low[across], high[across])
-    downward = view.aligned and up == 1
-    axes.set_ylim((high[up], low[up]) if downward else (low[up], high[up]))
-    axes.set_xlabel(view.label(across), fontsize=8)
-    axes.set_ylabel(view.label(up), fontsize=8)
+    axes.set_xlim(low[plane.across], high[plane.across])
+    bottom, top = low[plane.up], high[plane.up]
+    axes.set_ylim((top, bottom) if view.aligned and plane.up == 1 else (bottom, top))
+    axes.set_xlabel(view.label(plane.across), fontsize=8)
+    axes.set_ylabel(view.label(plane.up), fontsize=8)
     axes.tick_params(labelsize=7)

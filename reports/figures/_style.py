@@ -6,15 +6,17 @@ Colours are those of Okabe and Ito (2008). Line styles and markers repeat what c
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -24,11 +26,15 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from reports.atomic import write_bytes
-from reports.tables import write_table
+from reports.schema import ERRORS
+from reports.tables import write_csv
 
+Array = NDArray[np.floating[Any]]
+Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
 SIMULATED, TRACED, TRUTH = BLUE, ORANGE, GREEN
+PALETTE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {
     "load": "#BFBFBF",
@@ -38,12 +44,27 @@ STAGE_COLOURS = {
     "compare": PURPLE,
     "report": YELLOW,
 }
-# the trivial predictors: column, what the legend says, colour, line style, marker
-NULLS = (
-    ("null_centreline_rms_mm", "centreline", PURPLE, "--", "s"),
-    ("null_shortest_rms_mm", "shortest path", GREY, ":", "v"),
-    ("null_min_bending_rms_mm", "least bending", GREEN, "-.", "D"),
-    ("null_previous_rms_mm", "previous frame", "black", (0, (1, 3)), "x"),
+# the styles that columns of the schema name, in the order in which they are drawn: the later lie over the earlier
+LINES: dict[str, Look] = {
+    "simulated high": {"color": SIMULATED, "linewidth": 0.9, "marker": "^", "markersize": 3},
+    "truth": {"color": TRUTH, "linewidth": 3.5, "alpha": 0.6},
+    "simulated": {"color": SIMULATED, "marker": "o", "markersize": 4},
+    "floor": {"color": TRACED, "linewidth": 1.0},
+    "traced": {"color": TRACED, "marker": "o", "markersize": 4},
+    "traced high": {"color": TRACED, "linestyle": ":", "marker": "^", "markersize": 4},
+    "traced tip": {"color": VERMILION, "linestyle": "--", "marker": "s", "markersize": 4},
+    "truth tip": {"color": TRUTH, "linestyle": "--", "linewidth": 1.0},
+    "overlap": {"color": VERMILION, "marker": "s", "markersize": 4},
+}
+# colour, line style and marker of the trivial predictors, in the order of their columns
+_PREDICTOR_LINES: tuple[tuple[str, Any, str], ...] = (
+    (PURPLE, "--", "s"),
+    (GREY, ":", "v"),
+    (GREEN, "-.", "D"),
+    ("black", (0, (1, 3)), "x"),
+    (SKY, (0, (5, 1)), "P"),
+    (VERMILION, (0, (3, 1, 1, 1)), "*"),
+    (YELLOW, (0, (6, 3)), "X"),
 )
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
@@ -58,6 +79,19 @@ class Drawing:
     figure: Figure
     table: pd.DataFrame
     compact: bool = False
+
+
+def predictors() -> Iterator[tuple[str, str, str, Any, str]]:
+    """Column, label, colour, line style and marker of every trivial predictor of the schema, the centreline first."""
+    for column, line in zip(ERRORS.shown("predictors"), cycle(_PREDICTOR_LINES), strict=False):
+        yield column.name, column.shown["predictors"], *line
+
+
+def lines(place: str) -> list[tuple[str, str, Look]]:
+    """Column, label and style of every line that the schema shows at a place, in the order of drawing."""
+    rank, spare = {style: i for i, style in enumerate(LINES)}, cycle(reversed(PALETTE))
+    columns = sorted(ERRORS.shown(place), key=lambda column: rank.get(column.style, len(rank)))
+    return [(c.name, c.shown[place], LINES.get(c.style) or {"color": next(spare)}) for c in columns]
 
 
 def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool = True) -> Figure:
@@ -78,7 +112,7 @@ def save(drawing: Drawing, path: Path) -> None:
     buffer = io.BytesIO()
     picture.save(buffer, format="png")
     write_bytes(path, buffer.getvalue())
-    write_table(path.with_suffix(".csv"), drawing.table)
+    write_csv(path.with_suffix(".csv"), drawing.table)
 
 
 def _in_palette(pixels: NDArray[np.uint8]) -> Image.Image:
@@ -112,6 +146,11 @@ def plain(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
+def legend(owner: Any, *entries: Any, **place: Any) -> None:
+    """Small print without a frame, for a panel or a figure; entries: handles and labels, else all there are."""
+    owner.legend(*entries, frameon=False, fontsize=8, **place)
+
+
 def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
     """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
     numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
@@ -119,16 +158,50 @@ def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
     if len(kept) and kept.max() > _LOG_FROM_RATIO * kept.min():
         axes.set_yscale("log")
         axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        plain_decades(axes.yaxis)
     else:
         axes.set_ylim(bottom=0.0)
+
+
+def plain_decades(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Ticks of a logarithmic axis: these multiples of the powers of ten, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def heat_map(
+    axes: Axes,
+    grid: Array,
+    edges: tuple[Array, Array],
+    label: str,
+    clip: float,
+    bar: Look | None = None,
+    **cells: Any,
+) -> None:
+    """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left light grey.
+
+    clip : the percentile at which colours end: one wild value must not turn all others dark.
+    bar, cells : what else matplotlib is told of the colour bar and of the cells.
+    """
+    top = max(float(np.nanpercentile(grid, clip)), 1e-9) if np.isfinite(grid).any() else 1.0
+    mesh = axes.pcolormesh(*edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, **cells)
+    extend = "max" if (grid > top).any() else "neither"
+    figure: Any = axes.get_figure()
+    figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **(bar or {}))
+    axes.set_facecolor("0.93")
+    plain(axes)
+    axes.grid(visible=False)
 
 
 def whole_numbers(axis: Any) -> None:
     """Ticks at integers only: there is no frame 2.5."""
     axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+
+
+def thinned(count: int, most: int) -> NDArray[np.int_]:
+    """Places of at most ``most`` of ``count`` things, evenly spread, the first and the last among them."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
 
 
 def has(table: pd.DataFrame, *columns: str) -> bool:

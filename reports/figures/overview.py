@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,14 +12,16 @@ from matplotlib.figure import Figure
 
 from reports.case_files import GOOD
 from reports.figures._style import (
-    PURPLE,
-    SEQUENTIAL,
     SIMULATED,
     VERMILION,
     Drawing,
+    Look,
     has,
+    heat_map,
+    legend,
     new_figure,
     plain,
+    predictors,
     whole_numbers,
 )
 
@@ -42,30 +43,28 @@ class RunFiles:
 
 def case_frame_map(run: RunFiles) -> Drawing | None:
     """95th percentile error of every frame of every case; a cross is a frame without result."""
-    table = _long(run)
+    # a case without scans has nothing to show here, unless it failed
+    known = {name: t for name, t in run.errors.items() if (t["status"] != "simulated").any()}
+    columns = ["case", "frame", "status", "p95_mm"]
+    parts = [t.assign(case=name)[columns] for name, t in known.items()]
+    table = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
     failed = ~table["status"].isin(GOOD).to_numpy(dtype=bool)
     if not has(table, "p95_mm") and not failed.any():
         return None
-    cases = list(dict.fromkeys(table["case"]))
-    grid = np.full((len(cases), int(table["frame"].max()) + 1), np.nan)
+    cases, frames = list(known), table["frame"].to_numpy(dtype=int)
     rows = table["case"].map({name: i for i, name in enumerate(cases)}).to_numpy(dtype=int)
-    grid[rows, table["frame"].to_numpy(dtype=int)] = table["p95_mm"].to_numpy()
-    figure, axes = _tall(len(cases))
-    axes.set_facecolor("0.93")
+    grid = np.full((len(cases), int(frames.max()) + 1), np.nan)
+    grid[rows, frames] = table["p95_mm"].to_numpy()
+    figure, axes = _tall(cases)
     edges = np.arange(grid.shape[1] + 1) - 0.5, np.arange(len(cases) + 1) - 0.5
-    top = max(float(np.nanpercentile(grid, _CLIP_PERCENTILE)), 1e-9) if np.isfinite(grid).any() else 1.0
-    clipped = bool((grid > top).any())
-    mesh = axes.pcolormesh(
-        *edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, edgecolors="white", linewidth=0.4
-    )
-    axes.plot(table["frame"].to_numpy(dtype=int)[failed], rows[failed], "x", color=VERMILION, markersize=5)
-    extend = "max" if clipped else "neither"
-    figure.colorbar(mesh, ax=axes, label="95th percentile, mm", extend=extend, **_bar(figure))
-    _name_rows(axes, cases)
+    # a colour bar of readable size at the top, however tall the figure is
+    share = min(1.0, _BAR_INCH / figure.get_figheight())
+    bar: Look = {"shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
+    look: Look = {"edgecolors": "white", "linewidth": 0.4}
+    heat_map(axes, grid, edges, "95th percentile, mm", _CLIP_PERCENTILE, bar, **look)
+    axes.plot(frames[failed], rows[failed], "x", color=VERMILION, markersize=5)
     axes.set_xlabel("frame")
     whole_numbers(axes.xaxis)
-    plain(axes)
-    axes.grid(visible=False)
     return Drawing(figure, table)
 
 
@@ -74,51 +73,29 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
     table = run.summary[run.summary["rms_mm"].notna()]
     if len(table) < 2:
         return None
-    shown = table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", "null_centreline_rms_mm"]]
-    figure, axes = _tall(len(table))
+    column, label, colour, _, marker = next(predictors())
+    figure, axes = _tall(list(table["case"]))
     places = np.arange(len(table))
     axes.hlines(places, table["rms_low_mm"], table["rms_high_mm"], color=SIMULATED, linewidth=2)
-    validation = (table["role"] != "calibration").to_numpy(dtype=bool)
-    for chosen, marker, label in (
-        (validation, "o", "simulated"),
-        (~validation, "D", "simulated (calibration)"),
-    ):
+    calibration = (table["role"] == "calibration").fillna(value=False).to_numpy(dtype=bool)
+    looks = (~calibration, "o", "simulated"), (calibration, "D", "simulated (calibration)")
+    for chosen, shape, name in looks:
         if chosen.any():
-            axes.plot(
-                table["rms_mm"].to_numpy()[chosen], places[chosen], marker, color=SIMULATED, label=label
-            )
-    axes.plot(
-        table["null_centreline_rms_mm"], places, "s", color=PURPLE, fillstyle="none", label="centreline"
-    )
-    _name_rows(axes, list(table["case"]))
+            axes.plot(table["rms_mm"][chosen], places[chosen], shape, color=SIMULATED, label=name)
+    axes.plot(table[column], places, marker, color=colour, fillstyle="none", label=label)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
-    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    legend(axes, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     plain(axes)
-    return Drawing(figure, shown)
+    return Drawing(figure, table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column]])
 
 
-def _long(run: RunFiles) -> pd.DataFrame:
-    # a case without scans has nothing to show here, unless it failed
-    known = {name: t for name, t in run.errors.items() if (t["status"] != "simulated").any()}
-    parts = [t[["frame", "status", "p95_mm"]].assign(case=name) for name, t in known.items()]
-    columns = ["case", "frame", "status", "p95_mm"]
-    return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
-
-
-def _tall(n_rows: int) -> tuple[Figure, Axes]:
-    figure = new_figure(float(np.clip(1.3 + 0.24 * n_rows, 2.2, _MAX_INCH)))
-    return figure, figure.subplots()
-
-
-def _bar(figure: Figure) -> dict[str, Any]:
-    """A colour bar of readable size at the top, however tall the figure is."""
-    share = min(1.0, _BAR_INCH / figure.get_figheight())
-    return {"pad": 0.01, "shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
-
-
-def _name_rows(axes: Axes, names: Sequence[str]) -> None:
+def _tall(names: Sequence[str]) -> tuple[Figure, Axes]:
+    """A figure with one named row per case, the first at the top."""
+    figure = new_figure(float(np.clip(1.3 + 0.24 * len(names), 2.2, _MAX_INCH)))
+    axes = figure.subplots()
     every = -(-len(names) // _MAX_NAMES)
-    axes.set_yticks(range(0, len(names), every), list(names)[::every], fontsize=8)
+    axes.set_yticks(range(0, len(names), every), names[::every], fontsize=8)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.tick_params(axis="x", labeltop=len(names) >= _TOP_TICKS_FROM)
+    return figure, axes

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
-from reports.figures._style import STAGE_COLOURS, Drawing, has, new_figure, plain, whole_numbers
+from reports.figures._style import STAGE_COLOURS, Drawing, has, legend, new_figure, plain, whole_numbers
 
 
 def run_time(case: CaseFiles) -> Drawing | None:
@@ -38,7 +38,7 @@ def _stacked(axes: Axes, errors: pd.DataFrame, stages: list[str]) -> None:
     axes.set_xlabel("frame")
     axes.set_ylabel("seconds")
     whole_numbers(axes.xaxis)
-    axes.legend(frameon=False, fontsize=8, ncols=3)
+    legend(axes, ncols=3)
     axes.set_ylim(top=1.25 * max(float(base.max()), 1e-9))
     plain(axes)
 

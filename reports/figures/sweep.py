@@ -7,25 +7,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from reports.figures._style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    Drawing,
-    has,
-    new_figure,
-    plain,
-)
+from reports.figures._style import GREY, PALETTE, Drawing, Look, has, legend, new_figure, plain
 from reports.figures.overview import RunFiles
 
 UNCHANGED = "(plain)"  # the parameter of the rows in which nothing was changed
-_CYCLE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
 _MAX_CASES = 6  # beyond, one colour and no names: the spread is what is read
 _LOG_FROM_RATIO = 5.0
 _STYLES = (("rms_mm", "-o", "traced"), ("truth_rms_mm", ":D", "true"))
@@ -46,27 +32,29 @@ def sensitivity(run: RunFiles) -> Drawing | None:
         axes.set_xlabel(str(parameter))
     for axes in panels[len(parameters) :]:
         axes.remove()
-    _legend(figure, panels[0])
+    handles, labels = panels[0].get_legend_handles_labels()
+    if handles:
+        legend(figure, handles, labels, loc="outside upper left", ncols=3)
     return Drawing(figure, run.sweep)
 
 
 def _panel(axes: Axes, rows: pd.DataFrame, unchanged: pd.DataFrame) -> None:
-    places = _places(rows["value"])
+    rows = rows.assign(place=_places(rows["value"]))
     cases = list(dict.fromkeys(rows["case"]))
+    few = len(cases) <= _MAX_CASES
     for i, case in enumerate(cases):
-        colour = _CYCLE[i % len(_CYCLE)] if len(cases) <= _MAX_CASES else GREY
-        mine = rows.assign(place=places)[(rows["case"] == case).to_numpy()].sort_values("place")
-        name = f"{case}: " if 1 < len(cases) <= _MAX_CASES else ""
+        colour = PALETTE[i % len(PALETTE)] if few else GREY
+        mine = rows[(rows["case"] == case).to_numpy()].sort_values("place")
+        name = f"{case}: " if few and len(cases) > 1 else ""
         for column, style, what in _STYLES:
             if has(mine, column):
-                label = f"{name}to the {what} wire" if len(cases) <= _MAX_CASES else None
+                label = f"{name}to the {what} wire" if few else None
                 axes.plot(mine["place"], mine[column], style, color=colour, markersize=4, label=label)
         if case in unchanged.index and np.isfinite(unchanged.loc[case, "rms_mm"]):
+            look: Look = {"color": colour, "linestyle": "--", "linewidth": 0.9}
             label = "nothing changed, to the traced wire" if i == 0 else None
-            axes.axhline(
-                unchanged.loc[case, "rms_mm"], color=colour, linestyle="--", linewidth=0.9, label=label
-            )
-    _value_axis(axes, rows["value"], places)
+            axes.axhline(unchanged.loc[case, "rms_mm"], label=label, **look)
+    _value_axis(axes, rows)
     # the whole range from zero: a slope must not be drawn steeper than it is
     shown = [rows["rms_mm"], rows["truth_rms_mm"], unchanged["rms_mm"]]
     axes.set_ylim(bottom=0.0, top=1.1 * max(float(np.nan_to_num(values.max())) for values in shown))
@@ -74,26 +62,19 @@ def _panel(axes: Axes, rows: pd.DataFrame, unchanged: pd.DataFrame) -> None:
     plain(axes)
 
 
-def _places(values: pd.Series[Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+def _places(values: pd.Series[Any]) -> pd.Series[float]:
     """Numbers as they are; words in their order."""
     numbers = pd.to_numeric(values, errors="coerce")
-    if numbers.notna().all():
-        return numbers.to_numpy(dtype=float)
     order = {value: i for i, value in enumerate(dict.fromkeys(values))}
-    return values.map(order).to_numpy(dtype=float)
+    return (numbers if numbers.notna().all() else values.map(order)).astype(float)
 
 
-def _value_axis(axes: Axes, values: pd.Series[Any], places: np.ndarray[Any, np.dtype[np.float64]]) -> None:
-    numeric = bool(pd.to_numeric(values, errors="coerce").notna().all())
+def _value_axis(axes: Axes, rows: pd.DataFrame) -> None:
+    places = rows["place"]
+    numeric = bool(pd.to_numeric(rows["value"], errors="coerce").notna().all())
     if numeric and places.min() > 0 and places.max() > _LOG_FROM_RATIO * places.min():
         axes.set_xscale("log")
         axes.minorticks_off()
-    known = dict(zip(places, values, strict=True))
-    axes.set_xticks(sorted(known), [str(known[place]) for place in sorted(known)])
+    known = dict(sorted(zip(places, rows["value"], strict=True)))
+    axes.set_xticks(list(known), [str(value) for value in known.values()])
     axes.margins(x=0.15)
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper left", ncols=3, frameon=False, fontsize=8)

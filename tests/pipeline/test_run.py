@@ -13,8 +13,8 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
-from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS, SUMMARY_COLUMNS, names
-from reports.tables import read_errors
+from reports.schema import ERRORS, POINTS, SUMMARY
+from reports.tables import read
 
 SIZE, FRAMES = 64, 4
 
@@ -57,7 +57,7 @@ def run(study: Path, out: Path, *more: str) -> int:
 
 
 def errors_of(out: Path) -> pd.DataFrame:
-    return read_errors(next((out / "cases").iterdir()) / "errors.csv")
+    return read(next((out / "cases").iterdir()) / "errors.csv", ERRORS)
 
 
 def test_every_frame_is_ok_and_near_the_truth(finished: Path, study: Path) -> None:
@@ -85,9 +85,9 @@ def test_the_output_tree_is_complete(finished: Path) -> None:
 
 def test_the_columns_are_the_contract(finished: Path) -> None:
     case = finished / "cases" / "bifurcation"
-    assert tuple(pd.read_csv(case / "errors.csv").columns) == names(ERRORS_COLUMNS)
-    assert tuple(pd.read_csv(case / "points.csv.gz").columns) == names(POINTS_COLUMNS)
-    assert tuple(pd.read_csv(finished / "summary.csv").columns) == names(SUMMARY_COLUMNS)
+    assert tuple(pd.read_csv(case / "errors.csv").columns) == ERRORS.names
+    assert tuple(pd.read_csv(case / "points.csv.gz").columns) == POINTS.names
+    assert tuple(pd.read_csv(finished / "summary.csv").columns) == SUMMARY.names
     with h5py.File(case / "frames.h5") as file:
         group = file["frames/000"]
         assert {"traced_mm", "simulated_mm", "error_mm", "arc_mm", "contact_force_N"} <= set(group)
@@ -219,7 +219,7 @@ def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path,
     assert main(["report", str(tmp_path / "shards")]) == 0
     for out in ("pool", "shards"):
         for case in ("bifurcation", "second"):
-            table = read_errors(tmp_path / out / "cases" / case / "errors.csv")
+            table = read(tmp_path / out / "cases" / case / "errors.csv", ERRORS)
             pd.testing.assert_frame_equal(without_times(table), without_times(errors_of(finished)))
         assert len(pd.read_csv(tmp_path / out / "summary.csv")) == 2
 
@@ -228,7 +228,7 @@ def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> 
     both = two_cases(study, tmp_path / "study", broken=True)
     out = tmp_path / "out"
     assert run(both, out) == 1
-    statuses = list(read_errors(out / "cases" / "second" / "errors.csv")["status"])
+    statuses = list(read(out / "cases" / "second" / "errors.csv", ERRORS)["status"])
     assert statuses == ["ok", "load_failed", "ok", "ok"]
     failures = pd.read_csv(out / "failures.csv")
     assert list(failures["case"]) == ["second"]

@@ -14,9 +14,9 @@ import pytest
 
 from reports import tables
 from reports.case_files import find_cases, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES
+from reports.figures import CASE_FIGURES, RUN_FIGURES, declared
 from reports.html import render_case, render_index
-from reports.sections import declared
+from reports.schema import ERRORS, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 
 PAGE_BUDGET = 2_000_000
@@ -145,10 +145,10 @@ def test_embedding_makes_one_file(run: Path, tmp_path: Path) -> None:
 
 
 def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
-    summary = tables.read_summary(run / "summary.csv").set_index("case")
+    summary = tables.read(run / "summary.csv", SUMMARY).set_index("case")
     text = (run / "cases" / "cow-seed-100" / "report.html").read_text(encoding="utf-8")
     assert f"<b>{summary.loc['cow-seed-100', 'rms_mm']:.3f}</b>" in text
-    errors = tables.read_errors(run / "cases" / "cow-seed-100" / "errors.csv")
+    errors = tables.read(run / "cases" / "cow-seed-100" / "errors.csv", ERRORS)
     assert f"<td>{errors['p95_mm'][5]:.3f}</td>" in text
 
 

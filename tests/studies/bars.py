@@ -6,14 +6,15 @@ import json
 import sys
 from pathlib import Path
 
-from reports.tables import read_errors
+from reports.schema import ERRORS
+from reports.tables import read
 
 
 def row(out: Path) -> str:
     """Frames ok, tracing in voxels (median frame), simulated against truth, peak memory."""
     case = next((out / "cases").iterdir())
     table, result = (
-        read_errors(case / "errors.csv"),
+        read(case / "errors.csv", ERRORS),
         json.loads((case / "result.json").read_text(encoding="utf-8")),
     )
     voxel = min(result["geometry"]["spacing_mm"])
