@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
@@ -81,6 +83,11 @@ def read_json(path: Path) -> dict[str, Any]:
 def find_cases(out_dir: Path) -> list[Path]:
     """Folders of the cases of a run, by name."""
     return sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
+
+
+def thinned(count: int, most: int) -> NDArray[np.int_]:
+    """Places of at most ``most`` of ``count`` frames, evenly spread, the first and the last among them."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
 
 
 def _frames(path: Path) -> tuple[ScanCrop | None, tuple[int, ...]]:

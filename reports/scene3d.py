@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.atomic import write_text
-from reports.case_files import CaseFiles
+from reports.case_files import CaseFiles, thinned
 from reports.export import PolyData, read_vtp
-from reports.figures._style import SIMULATED, TRACED, TRUTH, thinned
+from reports.figures._style import SIMULATED, TRACED, TRUTH
 
 MISSING = "No 3D scene: plotly is not installed; `pip install wireval[report3d]` adds it."
 _SCRIPT = "plotly.min.js"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.figures import declared, figures_of
-from reports.figures._style import DOTS_PER_INCH, save
+from reports.figures._drawing import DOTS_PER_INCH, save
 
 Section = dict[str, Any]
 """figure, title, read and bad as declared; source and numbers: links, or the files themselves as data URIs; width and

@@ -65,6 +65,11 @@ def read_if_there(path: Path | None, table: Table) -> pd.DataFrame:
     return read(path, table) if path is not None and path.exists() else _conform(pd.DataFrame(), table)
 
 
+def has(content: pd.DataFrame, *columns: str) -> bool:
+    """Say whether any of the columns has a value."""
+    return any(content[column].notna().any() for column in columns if column in content)
+
+
 def _conform(content: pd.DataFrame, table: Table) -> pd.DataFrame:
     """The columns of the table in their kinds, then those in excess."""
     extra = {name: content[name] for name in content.columns if name not in table.names}

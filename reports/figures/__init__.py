@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from reports.figures._style import Drawing
+from reports.figures._drawing import Drawing
 from reports.figures.overview import RunFiles
 
 __all__ = ["CASE_FIGURES", "RUN_FIGURES", "Drawing", "RunFiles", "declared", "figures_of"]

@@ -7,7 +7,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reports.case_files import CaseFiles
-from reports.figures._style import Drawing, has, heat_map, new_figure, whole_numbers
+from reports.figures._axes import heat_map, whole_numbers
+from reports.figures._drawing import Drawing, new_figure
+from reports.tables import has
 
 Array = NDArray[np.float64]
 _CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
@@ -51,7 +53,7 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
-    heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, rasterized=True)
+    heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, bar={}, rasterized=True)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("arc length from the entry along the simulated wire, mm")
     axes.set_ylabel("frame")

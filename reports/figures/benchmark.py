@@ -11,18 +11,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.figures._style import (
-    BLUE,
-    GREY,
-    PALETTE,
-    Drawing,
-    Look,
-    has,
-    legend,
-    new_figure,
-    plain,
-    plain_decades,
-)
+from reports.figures._axes import legend, plain, plain_decades
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._style import BLUE, GREY, PALETTE, Look
+from reports.tables import has
 
 _STYLES = tuple(zip((*PALETTE, "black", GREY), "osD^vPX*", strict=True))
 _MAX_COLUMNS = 3

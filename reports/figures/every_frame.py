@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from reports.case_files import GOOD, CaseFiles
+from reports.case_files import GOOD, CaseFiles, thinned
+from reports.figures._drawing import Drawing, new_figure
 from reports.figures._planes import PLANES, WIDTH_INCH, Plane, View, around, draw_curve, show
-from reports.figures._style import ORANGE, SKY, VERMILION, Drawing, Look, new_figure, thinned
+from reports.figures._style import ORANGE, SKY, VERMILION, Look
 from reports.frames_file import FrameArrays
 
 _COLUMNS = 6

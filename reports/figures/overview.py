@@ -11,19 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.case_files import GOOD
-from reports.figures._style import (
-    SIMULATED,
-    VERMILION,
-    Drawing,
-    Look,
-    has,
-    heat_map,
-    legend,
-    new_figure,
-    plain,
-    predictors,
-    whole_numbers,
-)
+from reports.figures._axes import heat_map, legend, plain, whole_numbers
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._style import SIMULATED, VERMILION, Look, predictors
+from reports.tables import has
 
 _CLIP_PERCENTILE = 98.0  # one lost frame must not turn the others dark
 _MAX_INCH = 24.0

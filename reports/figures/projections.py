@@ -10,6 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
+from reports.figures._drawing import Drawing
 from reports.figures._planes import (
     PLANES,
     Array,
@@ -22,7 +23,7 @@ from reports.figures._planes import (
     sheet,
     show,
 )
-from reports.figures._style import GREEN, ORANGE, SKY, Drawing, Look
+from reports.figures._style import GREEN, ORANGE, SKY, Look
 from reports.frames_file import FrameArrays, ScanCrop
 
 # drawn in this order: the later lie over the earlier

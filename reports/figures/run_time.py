@@ -7,7 +7,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
-from reports.figures._style import STAGE_COLOURS, Drawing, has, legend, new_figure, plain, whole_numbers
+from reports.figures._axes import legend, plain, whole_numbers
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._style import STAGE_COLOURS
+from reports.tables import has
 
 
 def run_time(case: CaseFiles) -> Drawing | None:

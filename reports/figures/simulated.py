@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from reports.case_files import CaseFiles
+from reports.case_files import CaseFiles, thinned
+from reports.figures._drawing import Drawing
 from reports.figures._planes import PLANES, Array, Plane, View, draw_curve, dress, points_table, sheet, whole
-from reports.figures._style import Drawing, thinned
 
 _MAX_WIRES = 12
 _COLOURS = "viridis"

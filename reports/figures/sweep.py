@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from reports.figures._style import GREY, PALETTE, Drawing, Look, has, legend, new_figure, plain
+from reports.figures._axes import legend, plain
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._style import GREY, PALETTE, Look
 from reports.figures.overview import RunFiles
+from reports.tables import has
 
 UNCHANGED = "(plain)"  # the parameter of the rows in which nothing was changed
 _MAX_CASES = 6  # beyond, one colour and no names: the spread is what is read

@@ -14,8 +14,9 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _planes, _style
-from reports.figures._style import STAGE_COLOURS, positive_axis, predictors
+from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _drawing, _planes, _style
+from reports.figures._axes import positive_axis
+from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
 from tests.reports.fake_results import FakeCase, write_run
@@ -226,12 +227,12 @@ def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float]
 def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:
     sizes = []
     for compact in (False, True):
-        figure = _style.new_figure(2.0, 3.0, fitted=False)
+        figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
         axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
         path = tmp_path / f"{compact}.png"
-        _style.save(_style.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
+        _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
