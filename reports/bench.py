@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports import _grids
-from reports._format import NOTHING
-from reports._pages import write_page
+from reports._content import NOTHING, Grid, grid
+from reports._pages import draw_sections, write_page
 from reports.figures.benchmark import BenchFiles
 from reports.schema import BENCH, CLAIMS, ORDERS, STRESS, Column
-from reports.sections import draw_sections
 from reports.tables import read, read_if_there, write_csv
 
 TARGETS_MM = (0.1, 0.01)
@@ -77,12 +75,10 @@ def pareto_front(
     error: np.ndarray[Any, Any], cost: np.ndarray[Any, Any]
 ) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Mark the points (n,) that no other point beats in error and cost; NaN is never on the front."""
+    order = np.lexsort((cost, error))
+    costs = np.where(np.isfinite(error), cost, np.nan)[order]
     front = np.zeros(len(error), dtype=bool)
-    cheapest = np.inf
-    for i in np.lexsort((cost, error)):
-        if np.isfinite(error[i]) and cost[i] < cheapest:
-            front[i] = True
-            cheapest = cost[i]
+    front[order] = costs < np.fmin.accumulate(np.append(np.inf, costs))[:-1]
     return front
 
 
@@ -118,18 +114,17 @@ def _numeric(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.assign(**{c: v for c, v in extra.items() if v.notna().equals(rows[c].notna())})
 
 
-def _claims(claims: pd.DataFrame) -> _grids.Grid | None:
+def _claims(claims: pd.DataFrame) -> Grid | None:
     """The table of promises; a broken one is marked."""
     verdicts = claims["met"].map({True: "met", False: "NOT MET"}).astype("string").fillna("")
     return _grid(claims.assign(met=verdicts).fillna({"aim": ""}), bad=verdicts == "NOT MET")
 
 
-def _grid(table: pd.DataFrame, bad: Any = None) -> _grids.Grid | None:
+def _grid(table: pd.DataFrame, bad: Any = None) -> Grid | None:
     """Every column, with its meaning where it has one; None without rows."""
     known = {column.name: column.meaning for column in (*BENCH, *STRESS, *CLAIMS)}
-    numeric = {str(name): pd.api.types.is_numeric_dtype(table[name]) for name in table.columns}
-    columns = [
-        Column(name, "-", known.get(name, ""), "float" if is_number else "text")
-        for name, is_number in numeric.items()
-    ]
-    return _grids.grid(table, columns, bad, nothing=NOTHING) if len(table) else None
+    kinds = {
+        n: "float" if pd.api.types.is_numeric_dtype(table[n]) else "text" for n in map(str, table.columns)
+    }
+    columns = [Column(name, "-", known.get(name, ""), kind) for name, kind in kinds.items()]
+    return grid(table, columns, bad, nothing=NOTHING) if len(table) else None

@@ -46,8 +46,7 @@ class CaseFiles:
 
         A case that crashed has this row too, with the number of its frames, and none of the other files.
         """
-        found: Mapping[str, Any] = self.result.get("summary") or self.result.get("statistics", {})
-        return found
+        return dict(self.result.get("summary") or self.result.get("statistics", {}))
 
     def read_frame(self, frame: int) -> FrameArrays:
         """Read the arrays of one frame from the disk; kept by nobody."""

@@ -41,19 +41,15 @@ class Difference:
     def by_column(self) -> pd.DataFrame:
         """Per column: pairs, median change, worst change (in the bad direction), regressions."""
         paired = self.rows[self.rows["change"].notna()]
-        paired = paired.assign(
-            worse=paired["change"] * paired["column"].map(_sign), bad=paired["verdict"] == "regression"
-        )
-        return (
-            paired.groupby("column", sort=False)
-            .agg(
-                pairs=("change", "size"),
-                median_change=("change", "median"),
-                worst=("worse", "max"),
-                regressions=("bad", "sum"),
-            )
-            .reset_index()
-        )
+        worse = paired["change"] * paired["column"].map(_sign)
+        columns = paired.assign(worse=worse).groupby("column", sort=False)
+        table = {
+            "pairs": columns.size(),
+            "median_change": columns["change"].median(),
+            "worst": columns["worse"].max(),
+            "regressions": columns["verdict"].agg(lambda verdicts: int((verdicts == "regression").sum())),
+        }
+        return pd.DataFrame(table).reset_index()
 
     @property
     def sentence(self) -> str:
@@ -64,12 +60,10 @@ class Difference:
             return f"{n_cases} cases compared: no regression"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
-        before, after, allowed = (
-            f"{v:.4g}" if isinstance(v, float) else str(v) for v in first[["before", "after", "allowed"]]
-        )
+        shown = [f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after", "allowed"]]]
         return (
             f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
-            f"{before} -> {after} (allowed {allowed})"
+            f"{shown[0]} -> {shown[1]} (allowed {shown[2]})"
         )
 
 
@@ -108,29 +102,27 @@ def diff_tables(
     rows: list[Row] = []
     for case in dict.fromkeys([*before, *after]):
         if case in before and case in after:
-            rows += _case_rows(case, before[case], after[case], tolerance)
+            rows += [(case, *row) for row in _case_rows(before[case], after[case], tolerance)]
         else:
             rows.append((case, pd.NA, *_one_sided("case", case in before)))
     return Difference(pd.DataFrame(rows, columns=_HEADER))
 
 
-def _case_rows(
-    case: str, before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str, float]
-) -> Iterator[Row]:
+def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str, float]) -> Iterator[Row]:
     old, new = ({row["frame"]: row for row in table.to_dict("records")} for table in (before, after))
     for frame in sorted({*old, *new}):
-        if frame not in old or frame not in new:
-            yield case, frame, *_one_sided("frame", frame in old)
-            continue
-        yield case, frame, *_status(old[frame]["status"], new[frame]["status"])
-        for name, allowed in tolerance.items():
-            yield case, frame, *_value(name, old[frame][name], new[frame][name], allowed)
+        if frame in old and frame in new:
+            yield frame, *_status(old[frame]["status"], new[frame]["status"])
+            for name, allowed in tolerance.items():
+                yield frame, *_value(name, old[frame][name], new[frame][name], allowed)
+        else:
+            yield frame, *_one_sided("frame", frame in old)
 
 
 def _one_sided(what: str, was_there: bool) -> Row:
-    """A case or frame that only one of the runs has."""
-    sides = ("present", "missing", math.nan, math.nan, "regression")
-    return (what, *(sides if was_there else ("missing", "present", math.nan, math.nan, "new")))
+    """A case or frame that only one of the runs has: column, before, after, change, allowed, verdict."""
+    sides = ("present", "missing") if was_there else ("missing", "present")
+    return what, *sides, math.nan, math.nan, "regression" if was_there else "new"
 
 
 def _status(before: object, after: object) -> Row:
@@ -140,23 +132,16 @@ def _status(before: object, after: object) -> Row:
 
 def _value(name: str, before: Any, after: Any, allowed: float) -> Row:
     old, new = (math.nan if pd.isna(value) else float(value) for value in (before, after))
-    change = new - old
-    if math.isnan(old):
-        verdict = "same" if math.isnan(new) else "new"
-    elif math.isnan(new):
-        verdict = "regression"
-    else:
-        verdict = _judge(name, change, allowed)
-    return name, old, new, change, allowed, verdict
+    return name, old, new, new - old, allowed, _verdict(name, old, new, allowed)
 
 
-def _judge(name: str, change: float, allowed: float) -> str:
-    if change == 0:
-        return "same"
+def _verdict(name: str, old: float, new: float, allowed: float) -> str:
+    if old == new or math.isnan(old):
+        return "same" if old == new or math.isnan(new) else "new"
     directed = bool(ERRORS[name].better)
-    worse = change * _sign(name) if directed else abs(change)
+    worse = (new - old) * _sign(name) if directed else abs(new - old)
     # a change of exactly the allowed size is allowed, whatever its last bit
-    if worse > allowed * (1 + 1e-9):
+    if math.isnan(new) or worse > allowed * (1 + 1e-9):
         return "regression"
     return "better" if directed and worse < 0 else "within"
 

@@ -60,6 +60,12 @@ class FrameArrays:
     mips: Pictures = field(default_factory=dict)
     trace_flags: Array | None = None
 
+    @property
+    def curves(self) -> dict[str, Array]:
+        """The wires that the frame has, in the order of drawing: the later lie over the earlier."""
+        wires = {"traced": self.traced_mm, "true": self.truth_mm, "simulated": self.simulated_mm}
+        return {name: points for name, points in wires.items() if points is not None and len(points)}
+
 
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 _ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips"))
@@ -90,9 +96,8 @@ def read_scan(path: Path) -> ScanCrop | None:
         group = file["scan"]
         spacing, origin, direction, shape = (np.array(group.attrs[key], float) for key in _GEOMETRY)
         nx, ny, nz = (int(n) for n in shape)
-        return ScanCrop(
-            spacing, origin, direction.reshape(3, 3), (nx, ny, nz), _read_pictures(group, "lumen_mip")
-        )
+        pictures = _read_pictures(group, "lumen_mip")
+        return ScanCrop(spacing, origin, direction.reshape(3, 3), (nx, ny, nz), pictures)
 
 
 def frame_numbers(path: Path) -> tuple[int, ...]:

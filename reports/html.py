@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from reports import _grids
-from reports._format import flatten, settings, size
-from reports._pages import write_page
+from reports import _content
+from reports._content import flatten, settings, size
+from reports._pages import draw_sections, write_page
 from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import RunFiles, declared
 from reports.scene3d import write_scene
 from reports.schema import FAILURES, SUMMARY, SWEEP
-from reports.sections import draw_sections
 from reports.tables import read_if_there
 
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
@@ -39,13 +38,13 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         **{key: result.get(key, "") for key in ("role", "group")},
         "failures": _case_failures(case),
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
-        "cards": _grids.cards(declared("cards"), case.statistics),
+        "cards": _content.cards(declared("cards"), case.statistics),
         "points": (case_dir / "points.csv.gz").exists(),
         "compared": bool(case.errors["rms_mm"].notna().any()),
         "scene": scene.name if scene else "",
         "scene_note": scene_note,
         "sections": sections,
-        "frames": _grids.frames(case.errors) if len(case.errors) else None,
+        "frames": _content.frames(case.errors) if len(case.errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
         "physics": list(flatten({k: result.get(k, {}) for k in ("wire", "wall", "entry", "geometry")})),
         "config": settings(result.get("config", {})),
@@ -70,12 +69,12 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         **_headline(cases, bool(failures)),
         "failures": failures,
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
-        "cards": _grids.overall(next((run["overall"] for run in infos if run.get("overall")), {})),
+        "cards": _content.overall(next((run["overall"] for run in infos if run.get("overall")), {})),
         "sections": draw_sections(
             "run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed
         ),
-        "cases": _grids.cases(summary, links),
-        "sweep": _grids.sweep(sweep) if len(sweep) else None,
+        "cases": _content.cases(summary, links),
+        "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
         "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
         "version": _version(infos),
@@ -131,10 +130,8 @@ def _headline(cases: list[CaseFiles], failed: bool) -> dict[str, Any]:
 def _files(case_dir: Path) -> list[dict[str, str]]:
     paths = [case_dir / name for name in _LISTED_FILES]
     paths += sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
-    names = {path: path.relative_to(case_dir).as_posix() for path in paths if path.exists()}
-    return [
-        {"name": name, "link": quote(name), "size": size(path.stat().st_size)} for path, name in names.items()
-    ]
+    found = {path.relative_to(case_dir).as_posix(): path.stat().st_size for path in paths if path.exists()}
+    return [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
 
 
 def _version(infos: Sequence[Any]) -> str:

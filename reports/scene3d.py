@@ -22,11 +22,7 @@ MISSING = "No 3D scene: plotly is not installed; `pip install wireval[report3d]`
 _SCRIPT = "plotly.min.js"
 _MAX_TRIANGLES = 30_000  # about 1 MB of page
 _MAX_FRAMES = 40
-_CURVES = (
-    ("traced_mm", "traced", TRACED),
-    ("simulated_mm", "simulated", SIMULATED),
-    ("truth_mm", "true", TRUTH),
-)
+_COLOURS = {"traced": TRACED, "simulated": SIMULATED, "true": TRUTH}
 
 
 def write_scene(case: CaseFiles) -> tuple[Path | None, str]:
@@ -60,19 +56,16 @@ def decimate(surface: PolyData, max_triangles: int = _MAX_TRIANGLES) -> PolyData
     vertices, triangles = surface.points_mm, surface.triangles
     size = float(np.ptp(vertices, axis=0).max()) / 400 if len(vertices) else 1.0
     while len(triangles) > max_triangles:
-        vertices, triangles = _merge(surface, size)
+        keys = np.floor(surface.points_mm / size).astype(np.int64)
+        _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        vertices = np.zeros((len(counts), 3))
+        np.add.at(vertices, inverse.ravel(), surface.points_mm)
+        vertices /= counts[:, None]
+        corners = inverse.ravel()[surface.triangles]
+        a, b, c = corners.T
+        triangles = corners[(a != b) & (b != c) & (c != a)].astype(np.int64)
         size *= 1.25
     return PolyData(vertices, triangles=triangles)
-
-
-def _merge(surface: PolyData, size: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    keys = np.floor(surface.points_mm / size).astype(np.int64)
-    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    merged = np.zeros((len(counts), 3))
-    np.add.at(merged, inverse.ravel(), surface.points_mm)
-    corners = inverse.ravel()[surface.triangles]
-    a, b, c = corners.T
-    return merged / counts[:, None], corners[(a != b) & (b != c) & (c != a)].astype(np.int64)
 
 
 def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
@@ -80,9 +73,8 @@ def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
     wires = {}
     for place in thinned(len(case.frames), _MAX_FRAMES):
         number = case.frames[place]
-        frame = case.read_frame(number)
-        mine = [(getattr(frame, field), label, colour) for field, label, colour in _CURVES]
-        drawn = [_line(points, label, colour, go) for points, label, colour in mine if points is not None]
+        curves = case.read_frame(number).curves
+        drawn = [_line(curves[name], name, go) for name in _COLOURS if name in curves]
         if drawn:
             wires[number] = drawn
     for trace in list(wires.values())[-1] if wires else ():
@@ -90,10 +82,10 @@ def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
     return wires
 
 
-def _line(points: NDArray[np.float64], label: str, colour: str, go: Any) -> Any:
+def _line(points: NDArray[np.float64], name: str, go: Any) -> Any:
     x, y, z = np.round(points, 3).T
-    style = {"color": colour, "width": 6 if label != "true" else 3}
-    return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=label, line=style, visible=False)
+    style = {"color": _COLOURS[name], "width": 6 if name != "true" else 3}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line=style, visible=False)
 
 
 def _lumen(surface: PolyData, go: Any) -> Any:
@@ -107,14 +99,8 @@ def _lumen(surface: PolyData, go: Any) -> Any:
 def _layout(counts: Mapping[int, int], n_fixed: int) -> dict[str, Any]:
     """Axes and a slider over the frames; counts: the lines of each frame, after ``n_fixed`` that are always seen."""
     owner = np.repeat(list(counts), list(counts.values()))
-    steps = [
-        {
-            "method": "restyle",
-            "label": str(number),
-            "args": [{"visible": [True] * n_fixed + (owner == number).tolist()}],
-        }
-        for number in counts
-    ]
+    seen = {str(number): [True] * n_fixed + (owner == number).tolist() for number in counts}
+    steps = [{"method": "restyle", "label": n, "args": [{"visible": v}]} for n, v in seen.items()]
     slider = {"active": len(steps) - 1, "steps": steps, "currentvalue": {"prefix": "frame "}}
     axes = {f"{axis}axis": {"title": {"text": f"{axis} (LPS), mm"}} for axis in "xyz"}
     layout = {"scene": {"aspectmode": "data", **axes}, "sliders": [slider] if steps else [], "height": 720}

@@ -12,10 +12,9 @@ import difflib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
-from typing import Any
 
+_DECLARED = tomllib.loads((Path(__file__).parent / "columns.toml").read_text(encoding="utf-8"))
 POOLED = {
     "points": "from all points of all frames",
     "rms": "root of the mean square over frames, weighted by their number of points",
@@ -36,7 +35,7 @@ PLACES = (
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table. Raises ValueError for a rule of pooling or a place that does not exist."""
+    """One column of a table. Raises ValueError for a kind, a rule or a place that does not exist."""
 
     name: str
     """The header, exactly as written."""
@@ -57,12 +56,10 @@ class Column:
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored in silence."""
-        wrong = [*({self.pooled} - {"", *POOLED}), *(set(self.shown) - set(PLACES))]
+        known = ("float", "integer", "boolean", "text", "low", "high", *POOLED, *PLACES)
+        wrong = {self.kind, self.better, self.pooled, *self.shown} - {"", *known}
         if wrong:
-            known = ", ".join((*POOLED, *PLACES))
-            msg = (
-                f"column {self.name}: got {wrong[0]!r}, which is neither pooling nor place; known are {known}"
-            )
+            msg = f"column {self.name}: got {min(wrong)!r}; known are {', '.join(known)}"
             raise ValueError(msg)
 
     def with_word(self, word: str) -> str:
@@ -89,7 +86,7 @@ class Table:
     def __init__(self, file: str, pooled_in: Table | None = None) -> None:
         """The table of columns.toml for a file; ``pooled_in`` gets the pooled columns that it does not have."""
         self.file = file
-        self.columns = tuple(Column(**entry) for entry in _declared()[file])
+        self.columns = tuple(Column(**entry) for entry in _DECLARED[file])
         self._pooled_in = pooled_in
         for column in self.columns:
             self._pool(column)
@@ -139,11 +136,6 @@ class Table:
     def _pool(self, column: Column) -> None:
         if self._pooled_in and column.pooled and column.pooled_name not in self._pooled_in.names:
             self._pooled_in.add(column.pooled_column())
-
-
-@cache
-def _declared() -> dict[str, list[dict[str, Any]]]:
-    return tomllib.loads((Path(__file__).parent / "columns.toml").read_text(encoding="utf-8"))
 
 
 def predictor(name: str, label: str, meaning: str) -> Column:

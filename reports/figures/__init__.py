@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from reports.figures._drawing import Drawing
-from reports.figures.overview import RunFiles
+from reports.figures.run import RunFiles
 
 __all__ = ["CASE_FIGURES", "RUN_FIGURES", "Drawing", "RunFiles", "declared", "figures_of"]
 

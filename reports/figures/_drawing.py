@@ -1,8 +1,9 @@
-"""A figure from nothing to its files: one size and resolution, no display, no pyplot; the PNG and its numbers."""
+"""A figure from nothing to its files, without display or pyplot: made, its panels furnished, saved as PNG and CSV."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,19 +11,24 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
 
 from reports.atomic import write_bytes
-from reports.figures._style import BLUE, GREEN, ORANGE, SKY, VERMILION
+from reports.figures._style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, VERMILION, Look
 from reports.tables import write_csv
 
+Array = NDArray[np.floating[Any]]
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
+_LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
@@ -41,6 +47,73 @@ def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool 
     figure = Figure(figsize=(width_inch, height_inch), dpi=DOTS_PER_INCH, layout=layout)
     FigureCanvasAgg(figure)
     return figure
+
+
+def lattice(
+    count: int, most_across: int, row_inch: float, more_inch: float = 0.0, width_inch: float = WIDTH_INCH
+) -> tuple[Figure, list[Axes]]:
+    """A figure of ``count`` panels, row by row; ``more_inch`` is what legends need beside the rows."""
+    across = min(count, most_across)
+    rows = -(-count // across)
+    figure = new_figure(row_inch * rows + more_inch, width_inch)
+    panels = list(figure.subplots(rows, across, squeeze=False).ravel())
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
+def plain(axes: Axes) -> None:
+    """Light grid, no box."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(visible=True, color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def legend(owner: Any, *entries: Any, **place: Any) -> None:
+    """Small print without a frame, for a panel or a figure; entries: handles and labels, else all there are."""
+    owner.legend(*entries, frameon=False, fontsize=8, **place)
+
+
+def whole_numbers(axis: Axis) -> None:
+    """Ticks at integers only: there is no frame 2.5."""
+    axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+
+
+def plain_decades(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Ticks of a logarithmic axis: these multiples of the powers of ten, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
+    """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
+    numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
+    kept = numbers[np.isfinite(numbers) & (numbers > 0)]
+    if len(kept) and kept.max() > _LOG_FROM_RATIO * kept.min():
+        axes.set_yscale("log")
+        axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
+        plain_decades(axes.yaxis)
+    else:
+        axes.set_ylim(bottom=0.0)
+
+
+def heat_map(
+    axes: Axes, grid: Array, edges: tuple[Array, Array], label: str, clip: float, bar: Look, **cells: Any
+) -> None:
+    """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left light grey.
+
+    clip : the percentile at which colours end: one wild value must not turn all others dark.
+    bar, cells : what else matplotlib is told of the colour bar and of the cells.
+    """
+    top = max(float(np.nanpercentile(grid, clip)), 1e-9) if np.isfinite(grid).any() else 1.0
+    mesh = axes.pcolormesh(*edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, **cells)
+    extend = "max" if (grid > top).any() else "neither"
+    figure: Any = axes.get_figure()
+    figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)
+    axes.set_facecolor("0.93")
+    plain(axes)
+    axes.grid(visible=False)
 
 
 def save(drawing: Drawing, path: Path) -> None:

@@ -38,7 +38,7 @@ _WINDOW_PERCENTILES = (2.0, 99.8)  # keeps the wire's peak from making the vesse
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What of the crop is shown: mm along the array axes, from ``low`` to ``high``.
+    """What of the crop is shown, mm along the array axes from ``low`` to ``high``, and what is drawn of it.
 
     The coordinates are LPS where the array axes are the patient's, else they start at the crop's corner.
     """
@@ -61,20 +61,56 @@ class View:
         """Coordinates (n, 3) of LPS points along the array axes, mm."""
         return np.asarray(self.scan.to_index(points_mm) * self.scan.spacing_mm + self._start())
 
+    def faces(self) -> tuple[Array, Array]:
+        """The outer faces of the whole crop's voxels, mm along the array axes."""
+        low = self._start() - 0.5 * self.scan.spacing_mm
+        return low, low + np.array(self.scan.shape) * self.scan.spacing_mm
+
     def extent(self, plane: Plane) -> tuple[float, float, float, float]:
         """Left, right, bottom, top of a whole picture in mm, at the outer faces of its voxels."""
-        low = self._start() - 0.5 * self.scan.spacing_mm
-        high = low + np.array(self.scan.shape) * self.scan.spacing_mm
-        return (
-            float(low[plane.across]),
-            float(high[plane.across]),
-            float(low[plane.up]),
-            float(high[plane.up]),
-        )
+        low, high = self.faces()
+        return low[plane.across], high[plane.across], low[plane.up], high[plane.up]
 
     def label(self, axis: int) -> str:
         """Name of an axis with its unit."""
         return f"{_LPS_NAMES[axis]}, mm" if self.aligned else f"array axis {axis}, mm from the corner"
+
+    def sheet(self, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
+        """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""
+        widths = [float(self.size[plane.across]) for plane in PLANES]
+        height = max(float(self.size[plane.up]) for plane in PLANES)
+        widths += [0.75 * height] if square else []
+        room = WIDTH_INCH - _LABELS_INCH * len(widths)
+        row_inch = float(np.clip(room * height / sum(widths), *_ROW_INCH))
+        figure = new_figure(rows * (row_inch + 0.42) + 0.55, WIDTH_INCH)
+        axes = figure.subplots(rows, len(widths), squeeze=False, width_ratios=widths)
+        return figure, [list(row) for row in axes]
+
+    def show(self, axes: Axes, frame: FrameArrays, plane: Plane) -> None:
+        """Draw a frame's projection in grey, where it has one; pictures are indexed (across, up)."""
+        if plane.along in frame.mips:
+            picture = frame.mips[plane.along]
+            low, high = np.percentile(picture, _WINDOW_PERCENTILES)
+            window: Look = {"cmap": "gray", "vmin": low, "vmax": max(high, low + 1)}
+            extent = self.extent(plane)
+            axes.imshow(picture.T, origin="lower", interpolation="nearest", extent=extent, **window)
+
+    def draw(self, axes: Axes, points_mm: Array, plane: Plane, tip: float = 0, **look: Any) -> None:
+        """Draw a curve (n, 3), LPS mm, with a dot of size ``tip`` at its end."""
+        across, up = self.coordinates(points_mm)[:, plane[1:]].T
+        axes.plot(across, up, **look)
+        if tip:
+            axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
+
+    def dress(self, axes: Axes, plane: Plane) -> None:
+        """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
+        axes.set_aspect("equal")
+        axes.set_xlim(self.low[plane.across], self.high[plane.across])
+        limits = self.low[plane.up], self.high[plane.up]
+        axes.set_ylim(limits[::-1] if self.aligned and plane.up == 1 else limits)
+        axes.set_xlabel(self.label(plane.across), fontsize=8)
+        axes.set_ylabel(self.label(plane.up), fontsize=8)
+        axes.tick_params(labelsize=7)
 
     def _start(self) -> Array:
         return self.scan.origin_mm if self.aligned else np.zeros(3)
@@ -82,67 +118,23 @@ class View:
 
 def whole(scan: ScanCrop) -> View:
     """The whole crop."""
-    view = View(scan, np.zeros(3), np.zeros(3))
-    low = view.coordinates(scan.origin_mm[None])[0] - 0.5 * scan.spacing_mm
-    return View(scan, low, low + np.array(scan.shape) * scan.spacing_mm)
+    return View(scan, *View(scan, np.zeros(3), np.zeros(3)).faces())
 
 
-def around(scan: ScanCrop, curves: Iterable[Array], margin_mm: float = _MARGIN_MM) -> View:
+def around(scan: ScanCrop, curves: Iterable[Array]) -> View:
     """The box of the curves and a margin, cut at the crop; the whole crop where there is no curve."""
     everything = whole(scan)
     points = [everything.coordinates(c) for c in curves if len(c)]
     if not points:
         return everything
     stacked = np.concatenate(points)
-    low = np.maximum(stacked.min(axis=0) - margin_mm, everything.low)
-    high = np.minimum(stacked.max(axis=0) + margin_mm, everything.high)
+    low = np.maximum(stacked.min(axis=0) - _MARGIN_MM, everything.low)
+    high = np.minimum(stacked.max(axis=0) + _MARGIN_MM, everything.high)
     # a curve outside the crop would give a box inside out
     return View(scan, low, high) if np.all(high > low) else everything
-
-
-def sheet(view: View, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
-    """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""
-    widths = [float(view.size[plane.across]) for plane in PLANES]
-    height = max(float(view.size[plane.up]) for plane in PLANES)
-    widths += [0.75 * height] if square else []
-    room = WIDTH_INCH - _LABELS_INCH * len(widths)
-    row_inch = float(np.clip(room * height / sum(widths), *_ROW_INCH))
-    figure = new_figure(rows * (row_inch + 0.42) + 0.55, WIDTH_INCH)
-    axes = figure.subplots(rows, len(widths), squeeze=False, width_ratios=widths)
-    return figure, [list(row) for row in axes]
-
-
-def show(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
-    """Draw a frame's projection in grey, where it has one; pictures are indexed (across, up)."""
-    if plane.along in frame.mips:
-        picture = frame.mips[plane.along]
-        low, high = np.percentile(picture, _WINDOW_PERCENTILES)
-        window: Look = {"cmap": "gray", "vmin": low, "vmax": max(high, low + 1), "interpolation": "nearest"}
-        axes.imshow(picture.T, origin="lower", extent=view.extent(plane), **window)
-
-
-def draw_curve(axes: Axes, points_mm: Array, view: View, plane: Plane, tip: float = 0, **look: Any) -> None:
-    """Draw a curve (n, 3), LPS mm, with a dot of size ``tip`` at its end."""
-    coordinates = view.coordinates(points_mm)
-    across, up = coordinates[:, plane.across], coordinates[:, plane.up]
-    axes.plot(across, up, **look)
-    if tip:
-        axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
 
 
 def points_table(points_mm: Array, **labels: Any) -> pd.DataFrame:
     """Points (n, 3) as rows of labels and coordinates."""
     xyz = ["x_mm", "y_mm", "z_mm"]
     return pd.DataFrame(points_mm, columns=xyz).assign(**labels)[[*labels, *xyz]]
-
-
-def dress(axes: Axes, view: View, plane: Plane) -> None:
-    """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
-    low, high = view.low, view.high
-    axes.set_aspect("equal")
-    axes.set_xlim(low[plane.across], high[plane.across])
-    bottom, top = low[plane.up], high[plane.up]
-    axes.set_ylim((top, bottom) if view.aligned and plane.up == 1 else (bottom, top))
-    axes.set_xlabel(view.label(plane.across), fontsize=8)
-    axes.set_ylabel(view.label(plane.up), fontsize=8)
-    axes.tick_params(labelsize=7)

@@ -7,8 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reports.case_files import CaseFiles
-from reports.figures._axes import heat_map, whole_numbers
-from reports.figures._drawing import Drawing, new_figure
+from reports.figures._drawing import Drawing, heat_map, new_figure, whole_numbers
 from reports.tables import has
 
 Array = NDArray[np.float64]

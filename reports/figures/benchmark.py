@@ -11,13 +11,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.figures._axes import legend, plain, plain_decades
-from reports.figures._drawing import Drawing, new_figure
+from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, plain_decades
 from reports.figures._style import BLUE, GREY, PALETTE, Look
 from reports.tables import has
 
 _STYLES = tuple(zip((*PALETTE, "black", GREY), "osD^vPX*", strict=True))
-_MAX_COLUMNS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,20 +122,15 @@ def _panels(
 ) -> Figure:
     """One panel per scene, which ``draw`` fills with the scene's rows: logarithmic axes, one legend above."""
     count = rows["scene"].nunique()
-    wide = min(count, _MAX_COLUMNS)
-    tall = -(-count // wide)
-    figure = new_figure(3.4 * tall + 0.6, 9.0 if wide > 1 else 6.5)
-    panels = figure.subplots(tall, wide, squeeze=False).ravel()
+    figure, panels = lattice(count, 3, row_inch=3.4, more_inch=0.6, width_inch=9.0 if count > 1 else 6.5)
     entries: dict[Any, Any] = {}
-    for axes, (scene, mine) in zip(panels, rows.groupby("scene", sort=False), strict=False):
+    for axes, (scene, mine) in zip(panels, rows.groupby("scene", sort=False), strict=True):
         axes.set_title(str(scene), loc="left", fontsize=9)
         axes.set_xlabel(xlabel)
         axes.set_ylabel(ylabel)
         draw(axes, mine)
         _log_axes(axes)
         entries |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    for axes in panels[count:]:
-        axes.remove()
     legend(figure, list(entries.values()), list(entries), loc="outside upper left", ncols=5)
     return figure
 

@@ -10,11 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.case_files import CaseFiles
-from reports.figures._axes import legend, plain, positive_axis
-from reports.figures._drawing import Drawing, new_figure
+from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import GREY, SIMULATED, TRACED, VERMILION, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
+
+_Panel = tuple[Axes, list[str]]  # with the columns that it shows
 
 
 def error_by_depth(case: CaseFiles) -> Drawing | None:
@@ -43,15 +44,15 @@ def tip_by_depth(case: CaseFiles) -> Drawing | None:
     good = _by_depth(case.good)
     if not has(good, "tip_mm"):
         return None
-    figure, (top, bottom), shown = _two_panels(good, 4.6, "tip_by_depth", "tip_angle_by_depth")
+    figure, (top, tips), (bottom, angles) = _two_panels(good, 4.6, "tip_by_depth", "tip_angle_by_depth")
     wrong = good[good["branch_ok"].eq(other=False).fillna(value=False).astype(bool)]
     if len(wrong):
         _line(top, wrong, "tip_mm", "tips in different branches", marker="X", linestyle="", color=VERMILION)
-    positive_axis(top, [good["tip_mm"]])
+    positive_axis(top, [good[column] for column in tips])
     bottom.set_ylim(bottom=0.0)
     _mark_failed(top, case)
     _finish({top: "tip distance, mm", bottom: "tip angle, degrees"})
-    return Drawing(figure, _table(case, [*shown, "branch_ok"]))
+    return Drawing(figure, _table(case, [*tips, *angles, "branch_ok"]))
 
 
 def truth_by_depth(case: CaseFiles) -> Drawing | None:
@@ -59,11 +60,11 @@ def truth_by_depth(case: CaseFiles) -> Drawing | None:
     good = _by_depth(case.good)
     if not has(good, "trace_mean_mm", "trace_max_mm", "trace_tip_mm", "truth_rms_mm", "truth_tip_mm"):
         return None
-    figure, (top, bottom), shown = _two_panels(good, 5.4, "trace_by_depth", "truth_by_depth")
-    positive_axis(top, [good[column] for column, *_ in lines("trace_by_depth")])
-    positive_axis(bottom, [good[column] for column, *_ in lines("truth_by_depth")])
+    figure, (top, traced), (bottom, simulated) = _two_panels(good, 5.4, "trace_by_depth", "truth_by_depth")
+    positive_axis(top, [good[column] for column in traced])
+    positive_axis(bottom, [good[column] for column in simulated])
     _finish({top: "traced to true wire, mm", bottom: "simulated wire, mm"})
-    return Drawing(figure, _table(case, ["rms_mm", *shown]))
+    return Drawing(figure, _table(case, ["rms_mm", *traced, *simulated]))
 
 
 def skill_by_depth(case: CaseFiles) -> Drawing | None:
@@ -87,11 +88,11 @@ def forces_by_depth(case: CaseFiles) -> Drawing | None:
     good = _by_depth(case.good)
     if not has(good, "push_force_N", "max_penetration_mm"):
         return None
-    figure, (top, bottom), shown = _two_panels(good, 4.6, "force_by_depth", "overlap_by_depth")
+    figure, (top, forces), (bottom, overlaps) = _two_panels(good, 4.6, "force_by_depth", "overlap_by_depth")
     top.axhline(0.0, color="0.6", linewidth=0.8)
     bottom.set_ylim(bottom=0.0)
     _finish({top: "push force, N", bottom: "deepest overlap\nwith the wall, mm"})
-    return Drawing(figure, _table(case, shown))
+    return Drawing(figure, _table(case, [*forces, *overlaps]))
 
 
 def _by_depth(table: pd.DataFrame) -> pd.DataFrame:
@@ -104,13 +105,12 @@ def _table(case: CaseFiles, columns: Sequence[str]) -> pd.DataFrame:
     return case.errors[list(dict.fromkeys(["frame", "status", "insertion_mm", *columns]))]
 
 
-def _two_panels(
-    good: pd.DataFrame, height_inch: float, top: str, bottom: str
-) -> tuple[Figure, tuple[Axes, Axes], list[str]]:
-    """A figure of two panels with the lines of two places, its axes and its columns."""
+def _two_panels(good: pd.DataFrame, height_inch: float, *places: str) -> tuple[Figure, _Panel, _Panel]:
+    """A figure of two panels, one above the other, with the lines of two places."""
     figure = new_figure(height_inch)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    return figure, (upper, lower), [*_lines(upper, good, top), *_lines(lower, good, bottom)]
+    panels = zip(figure.subplots(2, 1, sharex=True), places, strict=True)
+    top, bottom = ((axes, _lines(axes, good, place)) for axes, place in panels)
+    return figure, top, bottom
 
 
 def _lines(axes: Axes, good: pd.DataFrame, place: str) -> list[str]:

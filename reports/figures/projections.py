@@ -1,4 +1,4 @@
-"""The scan seen along its three axes with the traced and the simulated wire over it."""
+"""Scan, lumen and wires seen along the array axes: a few frames large, every frame small, a case without scans."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
-from reports.case_files import CaseFiles
-from reports.figures._drawing import Drawing
-from reports.figures._planes import (
-    PLANES,
-    Array,
-    Plane,
-    View,
-    around,
-    draw_curve,
-    dress,
-    points_table,
-    sheet,
-    show,
-)
-from reports.figures._style import GREEN, ORANGE, SKY, Look
+from reports.case_files import GOOD, CaseFiles, thinned
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._planes import PLANES, WIDTH_INCH, Plane, View, around, points_table, whole
+from reports.figures._style import GREEN, ORANGE, SKY, VERMILION, Look
 from reports.frames_file import FrameArrays, ScanCrop
 
-# drawn in this order: the later lie over the earlier
-_CURVES: dict[str, Look] = {
+_LARGE: dict[str, Look] = {
     "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.8},
     "true": {"color": GREEN, "linestyle": ":", "linewidth": 1.2},
     "simulated": {"color": SKY, "linestyle": (0, (4, 2)), "linewidth": 1.2},
 }
+_SMALL: dict[str, Look] = {
+    "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.6},
+    "simulated": {"color": SKY, "linestyle": "--", "linewidth": 1.0},
+}
 _MAX_FAILED = 3
 _TIP_WINDOW_MM = 10.0
+_COLUMNS = 6  # of the sheet of every frame
+_MAX_FRAMES = 36
+_TITLE_INCH = 0.24
+_PANEL_INCH = (0.9, 3.0)
+_MAX_WIRES = 12  # of a case without scans
 
 
 def projections(case: CaseFiles) -> Drawing | None:
@@ -42,15 +42,10 @@ def projections(case: CaseFiles) -> Drawing | None:
     if case.scan is None or good.empty:
         return None
     numbers = good["frame"].astype(int).tolist()
-    named = (
-        (numbers[0], "first"),
-        (numbers[len(numbers) // 2], "middle"),
-        (numbers[-1], "last"),
-        (numbers[int(good["rms_mm"].to_numpy().argmax())], "worst"),
-    )
+    worst = int(good["rms_mm"].to_numpy().argmax())
     titles: dict[int, list[str]] = {}
-    for number, title in named:
-        titles.setdefault(number, []).append(title)
+    for title, place in (("first", 0), ("middle", len(numbers) // 2), ("last", -1), ("worst", worst)):
+        titles.setdefault(numbers[place], []).append(title)
     chosen = [(n, " and ".join(titles[n])) for n in sorted(titles) if n in case.frames]
     return _draw(case, case.scan, chosen)
 
@@ -65,14 +60,77 @@ def failed_projections(case: CaseFiles) -> Drawing | None:
     return _draw(case, case.scan, with_picture[:_MAX_FAILED])
 
 
+def every_frame(case: CaseFiles) -> Drawing | None:
+    """Up to 36 frames, evenly thinned, each with its status or error; the traced and the simulated wire."""
+    table = case.errors[case.errors["frame"].isin(case.frames)]
+    if case.scan is None or len(table) < 2:
+        return None
+    table = table.iloc[thinned(len(table), _MAX_FRAMES)]
+    frames = [case.read_frame(number) for number in table["frame"].tolist()]
+    if not any(frame.mips for frame in frames):
+        return None
+    view = around(case.scan, [f.curves[name] for f in frames for name in _SMALL if name in f.curves])
+    plane = max(PLANES, key=lambda plane: float(view.size[plane.across] * view.size[plane.up]))
+    rows, width = -(-len(frames) // _COLUMNS), WIDTH_INCH / _COLUMNS
+    height = float(np.clip(width * view.size[plane.up] / view.size[plane.across], *_PANEL_INCH))
+    # thirty small panels without labels: a fixed lattice needs no fitting, which is most of the drawing time
+    figure = new_figure(rows * (height + _TITLE_INCH), WIDTH_INCH, fitted=False)
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    step = _TITLE_INCH / (height + _TITLE_INCH) / rows
+    figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - step, 0.04, _TITLE_INCH / height)
+    for axes in panels:
+        axes.set_axis_off()
+    for axes, frame, status, rms in zip(panels, frames, table["status"], table["rms_mm"], strict=False):
+        view.show(axes, frame, plane)
+        for name in _SMALL:
+            if name in frame.curves:
+                view.draw(axes, frame.curves[name], plane, **_SMALL[name])
+        axes.set_xlim(view.low[plane.across], view.high[plane.across])
+        axes.set_ylim(view.low[plane.up], view.high[plane.up])
+        axes.set_aspect("equal")
+        good = status in GOOD
+        text = f"{frame.frame}: {rms:.2f} mm" if good and np.isfinite(rms) else f"{frame.frame}: {status}"
+        axes.set_title(text, fontsize=8, loc="left", pad=2, color="black" if good else VERMILION)
+    return Drawing(figure, table[["frame", "status", "insertion_mm", "rms_mm"]], compact=True)
+
+
+def simulated_wires(case: CaseFiles) -> Drawing | None:
+    """Up to a dozen depths, the deepest last, in the three projections of the lumen."""
+    compared = bool(case.errors["rms_mm"].notna().any())
+    if case.scan is None or compared or not case.frames:
+        return None
+    deep = case.good[case.good["insertion_mm"].notna()]
+    picked = deep.iloc[thinned(len(deep), _MAX_WIRES)]
+    chosen = zip(picked["frame"].tolist(), picked["insertion_mm"].tolist(), strict=True)
+    read = [(n, depth, case.read_frame(n).curves.get("simulated")) for n, depth in chosen if n in case.frames]
+    wires = [(n, depth, points) for n, depth, points in read if points is not None]
+    if not wires:
+        return None
+    view = whole(case.scan)
+    figure, (row,) = view.sheet(1)
+    depths = [depth for _, depth, _ in wires]
+    scale = ScalarMappable(Normalize(min(depths), max(max(depths), min(depths) + 1e-9)), colormaps["viridis"])
+    # deep wires first and wide, shallow ones over them and thin: each is seen where it differs
+    widths = np.linspace(3.2, 1.0, len(wires))
+    for axes, plane in zip(row, PLANES, strict=True):
+        _outline(axes, view, plane)
+        for (_, depth, points), width in zip(reversed(wires), widths, strict=True):
+            colour = scale.to_rgba(np.array(depth))
+            view.draw(axes, points, plane, tip=4, color=colour, linewidth=width)
+        view.dress(axes, plane)
+    figure.colorbar(scale, ax=row, label="insertion depth, mm", pad=0.01, aspect=30, shrink=0.8)
+    parts = [points_table(points, frame=n, insertion_mm=depth) for n, depth, points in wires]
+    return Drawing(figure, pd.concat(parts))
+
+
 def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) -> Drawing | None:
     """One row per frame: the three projections, and the tip close by where any frame has a curve."""
     if not chosen:
         return None
     frames = [case.read_frame(number) for number, _ in chosen]
-    curves = [points for frame in frames for points in _curves(frame).values()]
+    curves = [points for frame in frames for points in frame.curves.values()]
     view = around(scan, curves)
-    figure, rows = sheet(view, len(chosen), square=bool(curves))
+    figure, rows = view.sheet(len(chosen), square=bool(curves))
     for frame, (number, title), row in zip(frames, chosen, rows, strict=True):
         for axes, plane in zip(row, PLANES, strict=False):
             _panel(axes, frame, view, plane)
@@ -90,27 +148,21 @@ def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) ->
     return Drawing(figure, pd.concat([_table(frame) for frame in frames]), compact=True)
 
 
-def _curves(frame: FrameArrays) -> dict[str, Array]:
-    """The curves that a frame has, in the order of drawing."""
-    arrays = {"traced": frame.traced_mm, "true": frame.truth_mm, "simulated": frame.simulated_mm}
-    return {label: points for label, points in arrays.items() if points is not None and len(points)}
-
-
 def _panel(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
     if plane.along not in frame.mips:
         axes.set_facecolor("0.25")
-    show(axes, frame, view, plane)
-    for label, points in _curves(frame).items():
-        draw_curve(axes, points, view, plane, tip=3, label=label, **_CURVES[label])
-    dress(axes, view, plane)
+    view.show(axes, frame, plane)
+    for label, points in frame.curves.items():
+        view.draw(axes, points, plane, tip=3, label=label, **_LARGE[label])
+    view.dress(axes, plane)
 
 
 def _tip_panel(axes: Axes, frame: FrameArrays, view: View) -> None:
     """Close to the tip, along the axis in which the wire's end is seen longest."""
-    if not _curves(frame):
+    if not frame.curves:
         axes.remove()
         return
-    end = view.coordinates(next(iter(_curves(frame).values())))
+    end = view.coordinates(next(iter(frame.curves.values())))
     tip, half = end[-1], 0.5 * _TIP_WINDOW_MM
     near = end[np.linalg.norm(end - tip, axis=1) < half]
     plane = max(PLANES, key=lambda plane: float(np.ptp(near, axis=0)[list(plane[1:])].sum()))
@@ -119,6 +171,19 @@ def _tip_panel(axes: Axes, frame: FrameArrays, view: View) -> None:
 
 
 def _table(frame: FrameArrays) -> pd.DataFrame:
-    parts = [points_table(points, frame=frame.frame, curve=label) for label, points in _curves(frame).items()]
+    parts = [points_table(points, frame=frame.frame, curve=label) for label, points in frame.curves.items()]
     nothing = pd.DataFrame([[frame.frame, "none"]], columns=["frame", "curve"])
     return pd.concat(parts or [nothing])
+
+
+def _outline(axes: Axes, view: View, plane: Plane) -> None:
+    """The lumen's silhouette, where the file has one with an inside and an outside."""
+    mask = (view.scan.lumen_mips.get(plane.along, np.zeros((1, 1))) > 0).astype(float)
+    if min(mask.shape) < 2 or mask.min() == mask.max():
+        return
+    left, right, bottom, top = view.extent(plane)
+    half = 0.5 * view.scan.spacing_mm
+    across = np.linspace(left + half[plane.across], right - half[plane.across], mask.shape[0])
+    up = np.linspace(bottom + half[plane.up], top - half[plane.up], mask.shape[1])
+    axes.contourf(across, up, mask.T, levels=[0.5, 1.5], colors=["0.90"])
+    axes.contour(across, up, mask.T, levels=[0.5], colors=["0.45"], linewidths=0.7)

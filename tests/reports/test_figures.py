@@ -15,7 +15,7 @@ from PIL import Image
 from reports import tables
 from reports.case_files import CaseFiles, read_case
 from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _drawing, _planes, _style
-from reports.figures._axes import positive_axis
+from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
