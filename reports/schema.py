@@ -114,12 +114,13 @@ class Table:
     def add(self, column: Column, before: str = "") -> None:
         """Take in a column from outside, ``before`` another or else before the timings, and its pooled column.
 
-        Raises ValueError where the table has a column of that name.
+        Raises ValueError where the table has a column of that name, or none of the name ``before``.
         """
         if column.name in self.names:
             msg = f"{self.file} has a column {column.name!r}; choose another name"
             raise ValueError(msg)
         followers = [before] if before else [c.name for c in self.columns if c.unit == "s"]
+        self.check(followers, self.file)
         place = self.names.index(followers[0]) if followers else len(self.columns)
         self.columns = (*self.columns[:place], column, *self.columns[place:])
         self._pool(column)

@@ -119,6 +119,8 @@ def test_what_would_be_ignored_in_silence_is_refused(change: dict[str, object]) 
 def test_a_name_is_taken_once() -> None:
     with pytest.raises(ValueError, match=r"errors\.csv has a column 'rms_mm'"):
         ERRORS.add(Column("rms_mm", "mm", "another one"))
+    with pytest.raises(ValueError, match="did you mean rms_mm"):
+        ERRORS.add(Column("x_mm", "mm", "anything"), before="rmse_mm")
     with pytest.raises(KeyError):
         ERRORS["rmse_mm"]
 
