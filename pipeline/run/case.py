@@ -89,10 +89,10 @@ def run_case(job: Job) -> None:
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     """Every file of the case; result.json last, since it says that the case is complete."""
     case = rows.rows_of(job.case, known, log, job.settings.config.compare.bootstrap)
-    tables.write(job.folder / "errors.csv", ERRORS, case.errors)
+    tables.write(job.folder / ERRORS.file, ERRORS, case.errors)
     points = rows.point_columns(known.frames)
     if points:
-        tables.write(job.folder / "points.csv.gz", POINTS, points)
+        tables.write(job.folder / POINTS.file, POINTS, points)
     views.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
         views.write_view(job.folder / "view", known)

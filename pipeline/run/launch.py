@@ -23,6 +23,9 @@ from pipeline.study.settings import to_toml
 from pipeline.study.suggest import did_you_mean
 from reports.atomic import write_text
 from reports.html import render_index
+from reports.schema import ERRORS, POINTS
+
+CASE_FILES = (ERRORS.file, POINTS.file, "frames.h5", "report.html")
 
 
 class UsageError(Exception):
@@ -132,6 +135,10 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
         if not outcome.done:
             job = outcome.job
             job.folder.mkdir(parents=True, exist_ok=True)
+            for (
+                name
+            ) in CASE_FILES:  # of an earlier run: they would stand beside this result and belong to another
+                (job.folder / name).unlink(missing_ok=True)
             with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
                 handle.write(outcome.log + "\n")
             crashed(job.case, outcome.error).write(job.folder)
