@@ -65,7 +65,7 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
-	$(BIN)/python -m pipeline.run.warm_up
+	$(BIN)/python -m pipeline.warm_up
 	touch $@
 
 # run time against error with the promised figures; 5,000 random scenes; other simulators (needs the network once)

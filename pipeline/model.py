@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
 
+from pipeline.ranges import FiniteProfile, NonNegative, Positive, PositiveProfile
 from pipeline.status import FrameStatus
 from solver.grid import Grid, read_only
 
@@ -22,11 +24,57 @@ Levels = Mapping[str, float]
 """What was measured (a noise, a blur, a share), by name; over frames such numbers have a median."""
 
 
+@dataclass(frozen=True)
+class Wire:
+    """A guide wire. Profiles are functions of the distance from the tip (mm): one number, or pairs."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    name: str
+    radius_mm: Positive
+    bending_stiffness_N_mm2: PositiveProfile
+    rest_curvature_per_mm: FiniteProfile = 0.0
+    torsional_stiffness_N_mm2: Annotated[float, Field(gt=0)] = float("inf")
+
+
+@dataclass(frozen=True)
+class Wall:
+    """The vessel's elastic wall: its stiffness per mm of wire, and Coulomb friction."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    stiffness_N_mm2: Positive = 2.0
+    friction: NonNegative = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Clamp:
+    """Where the wire is held: entry_mm (3,) LPS, direction (3,) of length 1; note and warning are for the report.
+
+    material_axis : (3,) where material axis 1 points at roll 0; None: the world axis least aligned with direction.
+    """
+
+    entry_mm: Array
+    direction: Array
+    material_axis: Array | None = None
+    note: str = ""
+    warning: str = ""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in ("entry_mm", "direction", "material_axis"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+
 @dataclass(frozen=True, eq=False)
 class Volume(Grid):
-    """Grey values of one scan (or of a crop of it), indexed x, y, z; ``assumed`` says what the file lacked."""
+    """Grey values of one scan (or of a crop of it), indexed x, y, z.
+
+    assumed : what the file lacked.     made_of : what the values were read from, where they are as read; it stands
+    for them in the keys of stored results.
+    """
 
     assumed: tuple[str, ...] = ()
+    made_of: object = None
 
 
 @dataclass(frozen=True, eq=False)

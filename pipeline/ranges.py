@@ -1,10 +1,11 @@
-"""Kinds of numbers that users may give; pydantic refuses anything else at the door, by name."""
+"""Kinds of values that users may give; pydantic refuses any other at the door, naming the place and what was found."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, ValidationInfo
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -12,3 +13,49 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=0)]
 PositiveCount = Annotated[int, Field(ge=1)]
+Vector = tuple[Finite, Finite, Finite]
+Profile = float | list[tuple[float, float]]
+"""A number for the whole wire, or pairs (distance from the tip in mm, value), linear between, constant beyond."""
+
+
+def _not_zero(value: Vector) -> Vector:
+    if math.hypot(*value) < 1e-9:
+        msg = "a direction of length zero; give three numbers that are not all 0"
+        raise ValueError(msg)
+    return value
+
+
+def _unit(value: Vector) -> Vector:
+    size = math.hypot(*_not_zero(value))
+    return value[0] / size, value[1] / size, value[2] / size
+
+
+def _checked(value: Profile, name: str | None, lowest: float) -> Profile:
+    pairs = [(0.0, value)] if isinstance(value, (int, float)) else value
+    if not pairs:
+        msg = f"{name}: an empty profile; give a number or [[distance from tip mm, value], ...]"
+        raise ValueError(msg)
+    distances = [s for s, _ in pairs]
+    if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
+        msg = f"{name}: distances from the tip {distances} must be >= 0 and must not decrease"
+        raise ValueError(msg)
+    if any(not math.isfinite(v) or v < lowest for _, v in pairs):
+        above = "" if lowest < 0 else " and above 0"
+        msg = f"{name}: values {[v for _, v in pairs]} must be finite{above}"
+        raise ValueError(msg)
+    return value
+
+
+def _positive_profile(value: Profile, info: ValidationInfo) -> Profile:
+    return _checked(value, info.field_name, 1e-12)
+
+
+def _finite_profile(value: Profile, info: ValidationInfo) -> Profile:
+    return _checked(value, info.field_name, -math.inf)
+
+
+Axis = Annotated[Vector, AfterValidator(_not_zero)]
+Direction = Annotated[Vector, AfterValidator(_unit)]
+"""A vector that is made to have length 1."""
+PositiveProfile = Annotated[Profile, AfterValidator(_positive_profile)]
+FiniteProfile = Annotated[Profile, AfterValidator(_finite_profile)]

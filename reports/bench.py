@@ -11,56 +11,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from reports._format import number
-from reports._pages import write_page
-from reports.figures.benchmark import BenchFiles, convergence, orders, pareto, stress_outcomes
-from reports.schema import Column
-from reports.sections import draw_sections
-from reports.tables import empty_table, read_table, write_table
+from reports._content import NOTHING, Grid, grid
+from reports._pages import draw_sections, write_page
+from reports.figures.benchmark import BenchFiles
+from reports.schema import BENCH, CLAIMS, ORDERS, STRESS, Column
+from reports.tables import read, read_if_there, write_csv
 
-BENCH_COLUMNS: tuple[Column, ...] = (
-    Column("scene", "-", "name of the scene", "text"),
-    Column("method", "-", "the solver's method, or another simulator", "text"),
-    Column("segment_mm", "mm", "length of the wire's segments"),
-    Column("hull", "-", "how the wire's thickness meets the wall", "text"),
-    Column("tolerance", "1", "stopping tolerance", "float"),
-    Column("ms_per_mm", "ms/mm", "milliseconds per millimetre inserted", "float", "low"),
-    Column("tip_error_mm", "mm", "distance of the tip from the converged reference's", "float", "low"),
-    Column("shape_error_mm", "mm", "root mean square distance from the converged reference", "float", "low"),
-    Column("iterations", "1", "iterations per millimetre or per step, as the benchmark says", "float", "low"),
-)
-STRESS_COLUMNS: tuple[Column, ...] = (
-    Column("axis", "-", "what is extreme in the scene", "text"),
-    Column("outcome", "-", "converged, or the status", "text"),
-    Column("count", "1", "number of scenes; 1 where each has its own row", "integer"),
-    Column("iterations_median", "1", "iterations, or sweeps of the closed form, of a scene"),
-    Column("iterations_max", "1", "the most iterations of a scene"),
-    Column("worst_residual", "1", "largest moment left in a wire called converged, relative to its largest"),
-    Column("worst_stretch", "1", "largest change of a segment's length, relative"),
-    Column("seconds_max", "s", "processor time of the slowest scene"),
-    Column("slowest", "-", "number of that scene", "integer"),
-)
-CLAIM_COLUMNS: tuple[Column, ...] = (
-    Column("claim", "-", "what is promised", "text"),
-    Column("value", "1", "what was measured, in the row's unit"),
-    Column("unit", "-", "unit of the value", "text"),
-    Column("aim", "-", "what it should be, empty where it is only reported", "text"),
-    Column("met", "-", "whether it is", "boolean"),
-)
-ORDER_COLUMNS: tuple[Column, ...] = (
-    Column("against", "-", "scene and error: what was made smaller, with its unit", "text"),
-    Column("size", "mm", "how large it was"),
-    Column("error", "-", "the error there, in the row's unit", "float", "low"),
-    Column("unit", "-", "unit of the error", "text"),
-    Column("order", "1", "slope of the logarithms over all its rows"),
-    Column("aim", "-", "what the order should be", "text"),
-)
-BENCH_FIGURES = {
-    "pareto": pareto,
-    "convergence": convergence,
-    "orders": orders,
-    "stress_outcomes": stress_outcomes,
-}
 TARGETS_MM = (0.1, 0.01)
 
 
@@ -81,17 +37,19 @@ def render_bench(
     """
     bench = read_bench(bench_csv, stress_csv, claims_csv, orders_csv)
     best = recommended(bench.rows)
-    write_table(out_dir / "recommended.csv", best)
-    counts = bench.stress.groupby(["axis", "outcome"], sort=False)["count"].sum().reset_index()
+    write_csv(out_dir / "recommended.csv", best)
+    outcomes = bench.outcomes().astype(int)
+    whole = bench.stress[bench.stress["axis"] == "all"].drop(columns="axis")
     page = {
         "title": "wireval benchmark",
         "note": note,
-        "sections": draw_sections("bench", BENCH_FIGURES, bench, out_dir, embed),
-        "recommended": _grid(best) if len(best) else None,
-        "claims": _claims(bench.claims) if len(bench.claims) else None,
+        "sections": draw_sections("bench", bench, out_dir, embed),
+        "recommended": _grid(best),
+        "claims": _claims(bench.claims),
         "rows": _grid(bench.rows.drop(columns="on_front")),
-        "stress": _grid(_crosstab(counts)) if len(counts) else None,
-        "stress_numbers": _numbers(bench.stress),
+        "stress": _grid(outcomes.assign(all=outcomes.sum(axis=1)).reset_index()),
+        # a table that has counts alone says nothing of how much and how well
+        "stress_numbers": _grid(whole) if whole["iterations_max"].notna().any() else None,
         "source": bench_csv.name,
     }
     return write_page("bench.html.j2", page, out_dir / "bench.html")
@@ -104,34 +62,23 @@ def read_bench(
     orders_csv: Path | None = None,
 ) -> BenchFiles:
     """Read the rows of a benchmark, marking the Pareto front of each scene, and what else there is of it."""
-    rows = _numeric(read_table(bench_csv, BENCH_COLUMNS))
-    rows["on_front"] = False
+    rows = _numeric(read(bench_csv, BENCH)).assign(on_front=False)
     for _, mine in rows.groupby("scene", sort=False):
-        rows.loc[mine.index, "on_front"] = pareto_front(
-            mine["shape_error_mm"].to_numpy(), mine["ms_per_mm"].to_numpy()
-        )
-    stress, claims, points = (
-        read_table(path, columns) if path else empty_table(columns)
-        for path, columns in (
-            (stress_csv, STRESS_COLUMNS),
-            (claims_csv, CLAIM_COLUMNS),
-            (orders_csv, ORDER_COLUMNS),
-        )
-    )
+        front = pareto_front(mine["shape_error_mm"].to_numpy(), mine["ms_per_mm"].to_numpy())
+        rows.loc[mine.index, "on_front"] = front
+    stress = read_if_there(stress_csv, STRESS)
     stress["count"] = stress["count"].fillna(1).astype(int)
-    return BenchFiles(rows, stress, claims, points)
+    return BenchFiles(rows, stress, read_if_there(claims_csv, CLAIMS), read_if_there(orders_csv, ORDERS))
 
 
 def pareto_front(
     error: np.ndarray[Any, Any], cost: np.ndarray[Any, Any]
 ) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Mark the points (n,) that no other point beats in error and cost; NaN is never on the front."""
+    order = np.lexsort((cost, error))
+    costs = np.where(np.isfinite(error), cost, np.nan)[order]
     front = np.zeros(len(error), dtype=bool)
-    cheapest = np.inf
-    for i in np.lexsort((cost, error)):
-        if np.isfinite(error[i]) and cost[i] < cheapest:
-            front[i] = True
-            cheapest = cost[i]
+    front[order] = costs < np.fmin.accumulate(np.append(np.inf, costs))[:-1]
     return front
 
 
@@ -146,11 +93,10 @@ def recommended(rows: pd.DataFrame) -> pd.DataFrame:
         within = rows[(worst <= target) & rows["ms_per_mm"].notna()]
         if len(within):
             fastest = rows.loc[within.groupby("scene", sort=False)["ms_per_mm"].idxmin()]
-            found.append(fastest.drop(columns="on_front", errors="ignore").assign(target_mm=target))
-    if not found:
-        return pd.DataFrame(columns=["target_mm", *rows.columns])
-    table = pd.concat(found, ignore_index=True)
-    return table[["target_mm", *[c for c in table.columns if c != "target_mm"]]]
+            fastest.insert(0, "target_mm", target)
+            found.append(fastest.drop(columns="on_front", errors="ignore"))
+    nothing = pd.DataFrame(columns=["target_mm", *rows.columns])
+    return pd.concat(found, ignore_index=True) if found else nothing
 
 
 def _worst_from_here(rows: pd.DataFrame) -> pd.Series[float]:
@@ -164,45 +110,21 @@ def _worst_from_here(rows: pd.DataFrame) -> pd.Series[float]:
 
 def _numeric(rows: pd.DataFrame) -> pd.DataFrame:
     """Columns beyond the named ones are numbers where every value of theirs is."""
-    known = {c.name for c in BENCH_COLUMNS}
-    extra = {c: pd.to_numeric(rows[c], errors="coerce") for c in rows.columns if c not in known}
+    extra = {c: pd.to_numeric(rows[c], errors="coerce") for c in rows.columns if c not in BENCH.names}
     return rows.assign(**{c: v for c, v in extra.items() if v.notna().equals(rows[c].notna())})
 
 
-def _crosstab(counts: pd.DataFrame) -> pd.DataFrame:
-    """One row per axis, one column per outcome, and the sum."""
-    table = counts.pivot_table(index="axis", columns="outcome", values="count", fill_value=0, sort=False)
-    table = table.astype(int)
-    table["all"] = table.sum(axis=1)
-    return table.reset_index()
-
-
-def _numbers(stress: pd.DataFrame) -> dict[str, Any] | None:
-    """How much and how well, by outcome, over all scenes; None where the table has counts alone."""
-    whole = stress[stress["axis"] == "all"].drop(columns="axis")
-    return _grid(whole) if len(whole) and whole["iterations_max"].notna().any() else None
-
-
-def _claims(claims: pd.DataFrame) -> dict[str, Any]:
+def _claims(claims: pd.DataFrame) -> Grid | None:
     """The table of promises; a broken one is marked."""
-    words = {True: "met", False: "NOT MET"}
-    verdicts = ["" if pd.isna(met) else words[bool(met)] for met in claims["met"]]
-    grid = _grid(claims.assign(met=pd.array(verdicts, dtype="string")).fillna({"aim": ""}))
-    for row, verdict in zip(grid["rows"], verdicts, strict=True):
-        row["bad"] = verdict == words[False]
-    return grid
+    verdicts = claims["met"].map({True: "met", False: "NOT MET"}).astype("string").fillna("")
+    return _grid(claims.assign(met=verdicts).fillna({"aim": ""}), bad=verdicts == "NOT MET")
 
 
-def _grid(table: pd.DataFrame) -> dict[str, Any]:
-    meanings = {c.name: c.meaning for c in (*BENCH_COLUMNS, *STRESS_COLUMNS, *CLAIM_COLUMNS)}
-    kept = [str(c) for c in table.columns if table[c].notna().any()]
-    text = {c: not pd.api.types.is_numeric_dtype(table[c]) for c in kept}
-    heads = [{"name": c, "meaning": meanings.get(c, ""), "text": text[c]} for c in kept]
-    rows = [
-        {
-            "cells": [{"value": number(r[c]), "text": text[c], "link": "", "detail": ""} for c in kept],
-            "bad": False,
-        }
-        for r in table.to_dict("records")
-    ]
-    return {"columns": heads, "rows": rows}
+def _grid(table: pd.DataFrame, bad: Any = None) -> Grid | None:
+    """Every column, with its meaning where it has one; None without rows."""
+    known = {column.name: column.meaning for column in (*BENCH, *STRESS, *CLAIMS)}
+    kinds = {
+        n: "float" if pd.api.types.is_numeric_dtype(table[n]) else "text" for n in map(str, table.columns)
+    }
+    columns = [Column(name, "-", known.get(name, ""), kind) for name, kind in kinds.items()]
+    return grid(table, columns, bad, nothing=NOTHING) if len(table) else None

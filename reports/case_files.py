@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from reports import frames_file, tables
-from reports.frames_file import Frame, Scan
-from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS
+from reports.frames_file import FrameArrays, ScanCrop
+from reports.schema import ERRORS, POINTS
 
 GOOD = ("ok", "simulated")
 
@@ -25,7 +27,7 @@ class CaseFiles:
     result: Mapping[str, Any]
     errors: pd.DataFrame
     points: pd.DataFrame
-    scan: Scan | None
+    scan: ScanCrop | None
     frames: tuple[int, ...]
 
     @property
@@ -38,7 +40,15 @@ class CaseFiles:
         """Rows of errors.csv whose frame is ok (or simulated, where there is nothing to compare with)."""
         return self.errors[self.errors["status"].isin(GOOD)]
 
-    def read_frame(self, frame: int) -> Frame:
+    @property
+    def statistics(self) -> Mapping[str, Any]:
+        """The case's row of summary.csv as its result.json has it, as in the last line on the terminal.
+
+        A case that crashed has this row too, with the number of its frames, and none of the other files.
+        """
+        return dict(self.result.get("summary", {}))
+
+    def read_frame(self, frame: int) -> FrameArrays:
         """Read the arrays of one frame from the disk; kept by nobody."""
         return frames_file.read_frame(self.folder / "frames.h5", frame)
 
@@ -48,12 +58,9 @@ def read_case(folder: Path, points: bool = True) -> CaseFiles:
 
     points : False leaves points.csv.gz unread, by far the largest table, where a page of the run needs none.
     """
-    frames = folder / "frames.h5"
-    errors = _table(folder / "errors.csv", tables.read_errors, ERRORS_COLUMNS)
-    samples = tables.empty_table(POINTS_COLUMNS)
-    if points:
-        samples = _table(folder / "points.csv.gz", tables.read_points, POINTS_COLUMNS)
-    scan, numbers = _frames(frames) if frames.exists() else (None, ())
+    errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
+    samples = tables.read_if_there(folder / POINTS.file if points else None, POINTS)
+    scan, numbers = _frames(folder / "frames.h5")
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, scan, numbers)
 
 
@@ -74,18 +81,17 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def find_cases(out_dir: Path) -> list[Path]:
     """Folders of the cases of a run, by name."""
-    root = out_dir / "cases"
-    return sorted(p for p in root.iterdir() if p.is_dir()) if root.is_dir() else []
+    return sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
 
 
-def _table(path: Path, read: Any, columns: Any) -> pd.DataFrame:
-    if path.exists():
-        table: pd.DataFrame = read(path)
-        return table
-    return tables.empty_table(columns)
+def thinned(count: int, most: int) -> NDArray[np.int_]:
+    """Places of at most ``most`` of ``count`` frames, evenly spread, the first and the last among them."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
 
 
-def _frames(path: Path) -> tuple[Scan | None, tuple[int, ...]]:
+def _frames(path: Path) -> tuple[ScanCrop | None, tuple[int, ...]]:
+    if not path.exists():
+        return None, ()
     try:
         return frames_file.read_scan(path), frames_file.frame_numbers(path)
     except OSError as error:

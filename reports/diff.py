@@ -7,19 +7,20 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from reports.case_files import GOOD, find_cases
-from reports.schema import ERRORS_COLUMNS, check_names
-from reports.tables import empty_table, read_errors
+from reports.schema import ERRORS
+from reports.tables import read_if_there
 
 DEFAULT_TOLERANCE = Path(__file__).parent / "baseline" / "tolerance.toml"
-_BETTER = {c.name: c.better for c in ERRORS_COLUMNS}
-_HEADER = ("case", "frame", "column", "before", "after", "change", "allowed", "verdict")
+_HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
+Row = tuple[Any, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +42,14 @@ class Difference:
         """Per column: pairs, median change, worst change (in the bad direction), regressions."""
         paired = self.rows[self.rows["change"].notna()]
         worse = paired["change"] * paired["column"].map(_sign)
-        table = paired.assign(worse=worse).groupby("column", sort=False)
-        return pd.DataFrame(
-            {
-                "pairs": table.size(),
-                "median_change": table["change"].median(),
-                "worst": table["worse"].max(),
-                "regressions": table["verdict"].agg(lambda v: int((v == "regression").sum())),
-            }
-        ).reset_index()
+        columns = paired.assign(worse=worse).groupby("column", sort=False)
+        table = {
+            "pairs": columns.size(),
+            "median_change": columns["change"].median(),
+            "worst": columns["worse"].max(),
+            "regressions": columns["verdict"].agg(lambda verdicts: int((verdicts == "regression").sum())),
+        }
+        return pd.DataFrame(table).reset_index()
 
     @property
     def sentence(self) -> str:
@@ -60,16 +60,17 @@ class Difference:
             return f"{n_cases} cases compared: no regression"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
+        shown = [f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after", "allowed"]]]
         return (
             f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
-            f"{_show(first['before'])} -> {_show(first['after'])} (allowed {_show(first['allowed'])})"
+            f"{shown[0]} -> {shown[1]} (allowed {shown[2]})"
         )
 
 
 def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
     """Read column = allowed change. Raises ValueError for an unknown column or a negative or absent number."""
     table = tomllib.loads(path.read_text(encoding="utf-8"))
-    check_names(table, ERRORS_COLUMNS, str(path))
+    ERRORS.check(table, str(path))
     for name, value in table.items():
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not value >= 0:
@@ -81,9 +82,13 @@ def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
 def diff_folders(out_a: Path, out_b: Path, tolerance: Mapping[str, float]) -> Difference:
     """Compare the errors.csv of every case of two output folders, ``out_a`` being the one to hold against.
 
-    Raises ValueError where ``out_a`` has no case: a gate without a reference would always be open.
+    A case without errors.csv has no frames. Raises ValueError where ``out_a`` has no case: a gate without a
+    reference would always be open.
     """
-    before, after = _tables(out_a), _tables(out_b)
+    before, after = (
+        {folder.name: read_if_there(folder / ERRORS.file, ERRORS) for folder in find_cases(out)}
+        for out in (out_a, out_b)
+    )
     if not before:
         msg = f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote"
         raise ValueError(msg)
@@ -94,84 +99,53 @@ def diff_tables(
     before: Mapping[str, pd.DataFrame], after: Mapping[str, pd.DataFrame], tolerance: Mapping[str, float]
 ) -> Difference:
     """Compare errors tables by case. A missing case or frame, and a status that is no longer ok, regress."""
-    rows: list[tuple[object, ...]] = []
+    rows: list[Row] = []
     for case in dict.fromkeys([*before, *after]):
-        if case not in after:
-            rows.append((case, pd.NA, "case", "present", "missing", math.nan, math.nan, "regression"))
-        elif case not in before:
-            rows.append((case, pd.NA, "case", "missing", "present", math.nan, math.nan, "new"))
+        if case in before and case in after:
+            rows += [(case, *row) for row in _case_rows(before[case], after[case], tolerance)]
         else:
-            rows += _case_rows(case, before[case], after[case], tolerance)
-    return Difference(pd.DataFrame(rows, columns=list(_HEADER)))
+            rows.append((case, pd.NA, *_one_sided("case", case in before)))
+    return Difference(pd.DataFrame(rows, columns=_HEADER))
 
 
-def _case_rows(
-    case: str, before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str, float]
-) -> list[tuple[object, ...]]:
-    old = {row["frame"]: row for row in before.to_dict("records")}
-    new = {row["frame"]: row for row in after.to_dict("records")}
-    rows: list[tuple[object, ...]] = []
+def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str, float]) -> Iterator[Row]:
+    old, new = ({row["frame"]: row for row in table.to_dict("records")} for table in (before, after))
     for frame in sorted({*old, *new}):
-        if frame not in new:
-            rows.append((case, frame, "frame", "present", "missing", math.nan, math.nan, "regression"))
-        elif frame not in old:
-            rows.append((case, frame, "frame", "missing", "present", math.nan, math.nan, "new"))
+        if frame in old and frame in new:
+            yield frame, *_status(old[frame]["status"], new[frame]["status"])
+            for name, allowed in tolerance.items():
+                yield frame, *_value(name, old[frame][name], new[frame][name], allowed)
         else:
-            rows.append((case, frame, *_status(old[frame]["status"], new[frame]["status"])))
-            rows += [
-                (case, frame, *_value(name, old[frame][name], new[frame][name], allowed))
-                for name, allowed in tolerance.items()
-            ]
-    return rows
+            yield frame, *_one_sided("frame", frame in old)
 
 
-def _status(before: object, after: object) -> tuple[object, ...]:
+def _one_sided(what: str, was_there: bool) -> Row:
+    """A case or frame that only one of the runs has: column, before, after, change, allowed, verdict."""
+    sides = ("present", "missing") if was_there else ("missing", "present")
+    return what, *sides, math.nan, math.nan, "regression" if was_there else "new"
+
+
+def _status(before: object, after: object) -> Row:
     verdict = "same" if before == after else "better" if after in GOOD else "regression"
     return "status", before, after, math.nan, math.nan, verdict
 
 
-def _value(name: str, before: object, after: object, allowed: float) -> tuple[object, ...]:
-    old, new = _number(before), _number(after)
-    change = new - old
-    if math.isnan(old):
-        verdict = "same" if math.isnan(new) else "new"
-    elif math.isnan(new):
-        verdict = "regression"
-    else:
-        verdict = _judge(name, change, allowed)
-    return name, old, new, change, allowed, verdict
+def _value(name: str, before: Any, after: Any, allowed: float) -> Row:
+    old, new = (math.nan if pd.isna(value) else float(value) for value in (before, after))
+    return name, old, new, new - old, allowed, _verdict(name, old, new, allowed)
 
 
-def _judge(name: str, change: float, allowed: float) -> str:
-    if change == 0:
-        return "same"
-    worse = abs(change) if not _BETTER[name] else change * _sign(name)
+def _verdict(name: str, old: float, new: float, allowed: float) -> str:
+    if old == new or math.isnan(old):
+        return "same" if old == new or math.isnan(new) else "new"
+    directed = bool(ERRORS[name].better)
+    worse = (new - old) * _sign(name) if directed else abs(new - old)
     # a change of exactly the allowed size is allowed, whatever its last bit
-    if worse > allowed * (1 + 1e-9):
+    if math.isnan(new) or worse > allowed * (1 + 1e-9):
         return "regression"
-    return "better" if _BETTER[name] and worse < 0 else "within"
+    return "better" if directed and worse < 0 else "within"
 
 
 def _sign(name: str) -> float:
-    return -1.0 if _BETTER.get(name) == "high" else 1.0
-
-
-def _number(value: object) -> float:
-    return (
-        math.nan
-        if value is None or value is pd.NA
-        else float(str(value).replace("True", "1").replace("False", "0"))
-    )
-
-
-def _show(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _tables(out: Path) -> dict[str, pd.DataFrame]:
-    """Tables by case; a case without errors.csv has no frames."""
-    found = {folder.name: folder / "errors.csv" for folder in find_cases(out)}
-    return {
-        name: read_errors(path) if path.exists() else empty_table(ERRORS_COLUMNS)
-        for name, path in found.items()
-    }
+    """-1 where more is better, else 1."""
+    return -1.0 if ERRORS[name].better == "high" else 1.0

@@ -2,7 +2,7 @@
 
     /scan                attributes spacing_mm (3), origin_mm (3), direction (3, 3), shape (3): the vessel's crop
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
-    /frames/NNN          attributes: scalars such as status;   datasets: the fields of ``Frame`` that are not None
+    /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
 
 Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
@@ -26,7 +26,7 @@ Pictures = Mapping[int, NDArray[np.uint8]]
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class ScanCrop:
     """Geometry of the vessel's crop in LPS mm, and the lumen's projections by array axis."""
 
     spacing_mm: Array
@@ -41,7 +41,7 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class FrameArrays:
     """Arrays of one frame; what does not apply is None.
 
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
@@ -60,31 +60,44 @@ class Frame:
     mips: Pictures = field(default_factory=dict)
     trace_flags: Array | None = None
 
+    @property
+    def curves(self) -> dict[str, Array]:
+        """The wires that the frame has, in the order of drawing: the later lie over the earlier."""
+        wires = {"traced": self.traced_mm, "true": self.truth_mm, "simulated": self.simulated_mm}
+        return {name: points for name, points in wires.items() if points is not None and len(points)}
 
-_ARRAYS = tuple(f.name for f in fields(Frame) if f.name not in ("frame", "mips"))
+
+_GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
+_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips"))
 
 
-def write_frames(path: Path, scan: Scan | None, frames: Iterable[Frame]) -> None:
+def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
     """Write frames.h5; ``frames`` may be a generator, so that one frame is held at a time."""
     with replacing(path) as temporary, h5py.File(temporary, "w") as file:
-        group = file.create_group("frames")
+        everything = file.create_group("frames")
         if scan is not None:
-            _write_scan(file.create_group("scan"), scan)
+            group = file.create_group("scan")
+            for key in _GEOMETRY:
+                group.attrs[key] = np.asarray(getattr(scan, key))
+            _write_pictures(group, "lumen_mip", scan.lumen_mips)
         for frame in frames:
-            _write_frame(group.create_group(f"{frame.frame:03d}"), frame)
+            group = everything.create_group(f"{frame.frame:03d}")
+            for name in _ARRAYS:
+                if getattr(frame, name) is not None:
+                    group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
+            _write_pictures(group, "mip", frame.mips)
 
 
-def read_scan(path: Path) -> Scan | None:
+def read_scan(path: Path) -> ScanCrop | None:
     """The crop's geometry, or None where the file has none."""
     with h5py.File(path, "r") as file:
         if "scan" not in file or "spacing_mm" not in file["scan"].attrs:
             return None
         group = file["scan"]
-        nx, ny, nz = (int(n) for n in group.attrs["shape"])
-        geometry = [np.array(group.attrs[key], float) for key in ("spacing_mm", "origin_mm", "direction")]
-        return Scan(
-            geometry[0], geometry[1], geometry[2].reshape(3, 3), (nx, ny, nz), _pictures(group, "lumen_mip")
-        )
+        spacing, origin, direction, shape = (np.array(group.attrs[key], float) for key in _GEOMETRY)
+        nx, ny, nz = (int(n) for n in shape)
+        pictures = _read_pictures(group, "lumen_mip")
+        return ScanCrop(spacing, origin, direction.reshape(3, 3), (nx, ny, nz), pictures)
 
 
 def frame_numbers(path: Path) -> tuple[int, ...]:
@@ -93,27 +106,13 @@ def frame_numbers(path: Path) -> tuple[int, ...]:
         return tuple(sorted(int(name) for name in file.get("frames", ())))
 
 
-def read_frame(path: Path, frame: int) -> Frame:
+def read_frame(path: Path, frame: int) -> FrameArrays:
     """Arrays of one frame. Raises KeyError where the file does not have it."""
     with h5py.File(path, "r") as file:
         names = {int(name): name for name in file["frames"]}
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
-        return Frame(frame, mips=_pictures(group, "mip"), **arrays)
-
-
-def _write_scan(group: Any, scan: Scan) -> None:
-    for key in ("spacing_mm", "origin_mm", "direction", "shape"):
-        group.attrs[key] = np.asarray(getattr(scan, key))
-    _write_pictures(group, "lumen_mip", scan.lumen_mips)
-
-
-def _write_frame(group: Any, frame: Frame) -> None:
-    for name in _ARRAYS:
-        values = getattr(frame, name)
-        if values is not None:
-            group.create_dataset(name, data=np.asarray(values, dtype=np.float64))
-    _write_pictures(group, "mip", frame.mips)
+        return FrameArrays(frame, mips=_read_pictures(group, "mip"), **arrays)
 
 
 def _write_pictures(group: Any, prefix: str, pictures: Pictures) -> None:
@@ -122,5 +121,5 @@ def _write_pictures(group: Any, prefix: str, pictures: Pictures) -> None:
         group.create_dataset(f"{prefix}_{axis}", data=picture, compression="gzip", compression_opts=1)
 
 
-def _pictures(group: Any, prefix: str) -> Pictures:
+def _read_pictures(group: Any, prefix: str) -> Pictures:
     return {axis: np.array(group[f"{prefix}_{axis}"]) for axis in range(3) if f"{prefix}_{axis}" in group}

@@ -6,7 +6,7 @@ scene refers to it: 4.8 MB once instead of in each of 300 cases.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.atomic import write_text
-from reports.case_files import CaseFiles
+from reports.case_files import CaseFiles, thinned
 from reports.export import PolyData, read_vtp
 from reports.figures._style import SIMULATED, TRACED, TRUTH
 
@@ -22,11 +22,7 @@ MISSING = "No 3D scene: plotly is not installed; `pip install wireval[report3d]`
 _SCRIPT = "plotly.min.js"
 _MAX_TRIANGLES = 30_000  # about 1 MB of page
 _MAX_FRAMES = 40
-_CURVES = (
-    ("traced_mm", "traced", TRACED),
-    ("simulated_mm", "simulated", SIMULATED),
-    ("truth_mm", "true", TRUTH),
-)
+_COLOURS = {"traced": TRACED, "simulated": SIMULATED, "true": TRUTH}
 
 
 def write_scene(case: CaseFiles) -> tuple[Path | None, str]:
@@ -37,19 +33,21 @@ def write_scene(case: CaseFiles) -> tuple[Path | None, str]:
     except ImportError:
         return None, MISSING
     surface = case.folder / "view" / "lumen.vtp"
-    frames = _chosen(case)
-    if not frames and not surface.exists():
+    if not case.frames and not surface.exists():
         return None, ""
-    traces, groups = _wires(case, frames, go)
+    wires = _wires(case, go)
     lumen = [_lumen(decimate(read_vtp(surface)), go)] if surface.exists() else []
-    figure = go.Figure([*lumen, *traces], _layout(groups, len(lumen)))
-    folder = _script_folder(case.folder)
-    if not (folder / _SCRIPT).exists():
-        write_text(folder / _SCRIPT, get_plotlyjs())
-    up = "../../" if folder != case.folder else ""
+    traces = [*lumen, *(line for lines in wires.values() for line in lines)]
+    figure = go.Figure(traces, _layout({frame: len(lines) for frame, lines in wires.items()}, len(lumen)))
+    # the run's folder where the case lies in one (OUT/cases/ID), else the case's own
+    inside = case.folder.parent.name == "cases"
+    script = (case.folder.parent.parent if inside else case.folder) / _SCRIPT
+    if not script.exists():
+        write_text(script, get_plotlyjs())
     path = case.folder / "scene3d.html"
+    source = f"{'../../' if inside else ''}{_SCRIPT}"
     # a fixed id: the same results give the same bytes
-    write_text(path, figure.to_html(include_plotlyjs=f"{up}{_SCRIPT}", full_html=True, div_id="scene"))
+    write_text(path, figure.to_html(include_plotlyjs=source, full_html=True, div_id="scene"))
     return path, ""
 
 
@@ -58,48 +56,36 @@ def decimate(surface: PolyData, max_triangles: int = _MAX_TRIANGLES) -> PolyData
     vertices, triangles = surface.points_mm, surface.triangles
     size = float(np.ptp(vertices, axis=0).max()) / 400 if len(vertices) else 1.0
     while len(triangles) > max_triangles:
-        vertices, triangles = _merge(surface, size)
+        keys = np.floor(surface.points_mm / size).astype(np.int64)
+        _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        vertices = np.zeros((len(counts), 3))
+        np.add.at(vertices, inverse.ravel(), surface.points_mm)
+        vertices /= counts[:, None]
+        corners = inverse.ravel()[surface.triangles]
+        a, b, c = corners.T
+        triangles = corners[(a != b) & (b != c) & (c != a)].astype(np.int64)
         size *= 1.25
     return PolyData(vertices, triangles=triangles)
 
 
-def _merge(surface: PolyData, size: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    keys = np.floor(surface.points_mm / size).astype(np.int64)
-    _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    merged = np.zeros((len(counts), 3))
-    np.add.at(merged, inverse.ravel(), surface.points_mm)
-    corners = inverse.ravel()[surface.triangles]
-    a, b, c = corners.T
-    return merged / counts[:, None], corners[(a != b) & (b != c) & (c != a)].astype(np.int64)
-
-
-def _chosen(case: CaseFiles) -> list[int]:
-    """Frames with a wire, evenly thinned to what a slider can show."""
-    count = min(len(case.frames), _MAX_FRAMES)
-    places = np.unique(np.linspace(0, max(len(case.frames) - 1, 0), count).round().astype(int))
-    return [case.frames[i] for i in places]
-
-
-def _wires(case: CaseFiles, frames: Sequence[int], go: Any) -> tuple[list[Any], list[tuple[int, int]]]:
-    """Line traces, and for each frame that has any (frame, number of its traces)."""
-    traces: list[Any] = []
-    groups = []
-    for number in frames:
-        frame = case.read_frame(number)
-        mine = [(getattr(frame, field), label, colour) for field, label, colour in _CURVES]
-        drawn = [_line(points, label, colour, go) for points, label, colour in mine if points is not None]
+def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
+    """The lines of each frame that has any, evenly thinned to what a slider can show; the last frame's are seen."""
+    wires = {}
+    for place in thinned(len(case.frames), _MAX_FRAMES):
+        number = case.frames[place]
+        curves = case.read_frame(number).curves
+        drawn = [_line(curves[name], name, go) for name in _COLOURS if name in curves]
         if drawn:
-            groups.append((number, len(drawn)))
-            traces += drawn
-    for trace in traces[len(traces) - groups[-1][1] :] if groups else ():
+            wires[number] = drawn
+    for trace in list(wires.values())[-1] if wires else ():
         trace.visible = True
-    return traces, groups
+    return wires
 
 
-def _line(points: NDArray[np.float64], label: str, colour: str, go: Any) -> Any:
+def _line(points: NDArray[np.float64], name: str, go: Any) -> Any:
     x, y, z = np.round(points, 3).T
-    style = {"color": colour, "width": 6 if label != "true" else 3}
-    return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=label, line=style, visible=False)
+    style = {"color": _COLOURS[name], "width": 6 if name != "true" else 3}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line=style, visible=False)
 
 
 def _lumen(surface: PolyData, go: Any) -> Any:
@@ -110,22 +96,12 @@ def _lumen(surface: PolyData, go: Any) -> Any:
     )
 
 
-def _layout(groups: Sequence[tuple[int, int]], n_fixed: int) -> dict[str, Any]:
-    owner = np.repeat([number for number, _ in groups], [n for _, n in groups])
-    steps = [
-        {
-            "method": "restyle",
-            "label": str(number),
-            "args": [{"visible": [True] * n_fixed + (owner == number).tolist()}],
-        }
-        for number, _ in groups
-    ]
+def _layout(counts: Mapping[int, int], n_fixed: int) -> dict[str, Any]:
+    """Axes and a slider over the frames; counts: the lines of each frame, after ``n_fixed`` that are always seen."""
+    owner = np.repeat(list(counts), list(counts.values()))
+    seen = {str(number): [True] * n_fixed + (owner == number).tolist() for number in counts}
+    steps = [{"method": "restyle", "label": n, "args": [{"visible": v}]} for n, v in seen.items()]
     slider = {"active": len(steps) - 1, "steps": steps, "currentvalue": {"prefix": "frame "}}
     axes = {f"{axis}axis": {"title": {"text": f"{axis} (LPS), mm"}} for axis in "xyz"}
     layout = {"scene": {"aspectmode": "data", **axes}, "sliders": [slider] if steps else [], "height": 720}
     return layout | {"margin": {"l": 0, "r": 0, "t": 20, "b": 50}}
-
-
-def _script_folder(case_dir: Path) -> Path:
-    """The run's folder where the case lies in one (OUT/cases/ID), else the case's own."""
-    return case_dir.parent.parent if case_dir.parent.name == "cases" else case_dir

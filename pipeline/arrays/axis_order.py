@@ -38,3 +38,9 @@ def integer_offset(grid: Grid, inner: Grid) -> Array | None:
     )
     shift = grid.to_index(inner.origin_mm)
     return np.rint(shift) if same and np.all(np.abs(shift - np.rint(shift)) <= 0.02) else None
+
+
+def corners_mm(grid: Grid) -> Array:
+    """The centres of the grid's eight corner voxels (8, 3), LPS mm."""
+    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in grid.shape], indexing="ij"), -1).reshape(-1, 3)
+    return grid.to_mm(ends)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, kernel, nodes_near
+from pipeline.arrays.lattice import clamped, door, kernel, nodes_near, unravelled
 
 REACH = 3.0
 """Half width of the Gaussian's window in sigmas."""

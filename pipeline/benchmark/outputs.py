@@ -9,7 +9,8 @@ import pandas as pd
 
 from pipeline.benchmark.claim import Claim
 from pipeline.run.provenance import collect
-from reports.bench import BENCH_COLUMNS, CLAIM_COLUMNS, ORDER_COLUMNS, recommended, render_bench
+from reports.bench import recommended, render_bench
+from reports.schema import BENCH, CLAIMS, ORDERS
 
 SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"
 CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
@@ -40,7 +41,7 @@ def note() -> str:
 
 def write_claims(found: Sequence[Claim], out: Path) -> None:
     """claims.csv, a row a claim, and orders.csv, a row for each point that an order was fitted to."""
-    rows = [{column.name: getattr(c, column.name) for column in CLAIM_COLUMNS} for c in found]
+    rows = [{name: getattr(c, name) for name in CLAIMS.names} for c in found]
     pd.DataFrame(rows).to_csv(out / CLAIMS_CSV, index=False)
     points = [
         {
@@ -54,13 +55,13 @@ def write_claims(found: Sequence[Claim], out: Path) -> None:
         for c in found
         for size, error in zip(c.sizes, c.errors, strict=True)
     ]
-    pd.DataFrame(points, columns=[c.name for c in ORDER_COLUMNS]).to_csv(out / ORDERS_CSV, index=False)
+    pd.DataFrame(points, columns=list(ORDERS.names)).to_csv(out / ORDERS_CSV, index=False)
 
 
 def write_page(out: Path) -> Path:
     """Join what lies in the folder into bench.csv and render it."""
     parts = [pd.read_csv(out / name) for name in (SOLVER_CSV, PEERS_CSV) if (out / name).exists()]
-    empty = pd.DataFrame(columns=[c.name for c in BENCH_COLUMNS])
+    empty = pd.DataFrame(columns=list(BENCH.names))
     table = pd.concat(parts, ignore_index=True) if parts else empty
     table.to_csv(out / BENCH_CSV, index=False)
     others = [out / name if (out / name).exists() else None for name in (STRESS_CSV, CLAIMS_CSV, ORDERS_CSV)]

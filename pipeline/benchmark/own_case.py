@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from pipeline.benchmark.scenes import BenchScene
-from pipeline.run.cache import Store, default_root
-from pipeline.run.progress import CaseProgress
-from pipeline.run.stages import CaseRun, run_stages
-from pipeline.simulate.replay import rolls
+from pipeline.run.log import Log
+from pipeline.run.stages import Context, run_stages
+from pipeline.run.stages.load import rolls
+from pipeline.run.store import Store, default_root
 from pipeline.study.config import Config
-from pipeline.study.manifest import Case, read_manifest
+from pipeline.study.manifest import read_manifest
+from pipeline.study.schema import Case
 
 
 class NoScene(ValueError):
@@ -28,12 +28,10 @@ def scene_of(case: Case, config: Config) -> BenchScene:
     if not case.insertion_mm:
         msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
         raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")
-    with TemporaryDirectory() as folder:
-        progress = CaseProgress(case.id, Path(folder) / "log.txt", quiet=True)
-        run = CaseRun(case, config, Store(default_root()), progress, "segment")
-        run_stages(run)
-    if run.failure is not None or run.lumen is None:
-        msg = f"bench: case {case.id!r}: {run.failure}"
+    silent = Log(lambda *_: None)
+    known = run_stages(Context(case, config, Store(default_root()), silent), until="segment")
+    if known.failure is not None or known.lumen is None:
+        msg = f"bench: case {case.id!r}: {known.failure}"
         raise NoScene(msg)
     return BenchScene(
         case.id,
@@ -43,12 +41,12 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         entry_mm=case.entry_mm,
         direction=case.entry_direction,
         material_axis=case.material_axis,
-        roll_deg=rolls(case, len(case.insertion_mm), config.simulate)[-1],
+        roll_deg=rolls(case.roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
         radius_mm=case.wire.radius_mm,
         stiffness=case.wire.bending_stiffness_N_mm2,
         rest=case.wire.rest_curvature_per_mm,
         torsion=case.wire.torsional_stiffness_N_mm2,
         wall_stiffness=case.wall.stiffness_N_mm2,
         friction=case.wall.friction,
-        ready=run.lumen.distance,
+        ready=known.lumen.distance,
     )

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+import argparse
 
 from pipeline.commands.common import say
-from pipeline.run.cache import Store, default_root
+
+HELP = "the stage store"
 
 
-def main(args: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    action = parser.add_mutually_exclusive_group(required=True)
+    action.add_argument("--info", action="store_true", help="where the stage store lies and how large it is")
+    action.add_argument("--prune", action="store_true", help="empty it")
+
+
+def main(args: argparse.Namespace) -> int:
     """Exit 0."""
+    from pipeline.run.store import Store, default_root
+
     store = Store(default_root())
     if args.prune:
         count, size = store.prune()

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+import argparse
+from pathlib import Path
 
-from pipeline.commands.common import complain, resolved_settings, say
-from pipeline.study.check import check
-from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.settings import SettingsError
+from pipeline.commands.common import add_settings, complain, resolved_settings, say
+
+HELP = "list every problem of a manifest at once; reads headers only"
 
 
-def main(args: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    parser.add_argument("manifest", type=Path, metavar="MANIFEST")
+    add_settings(parser)
+
+
+def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, 2 otherwise."""
+    from pipeline.study.check import check
+    from pipeline.study.manifest import ManifestError, read_manifest
+    from pipeline.study.settings import SettingsError
+
     try:
         manifest, settings = read_manifest(args.manifest), resolved_settings(args)
     except (ManifestError, SettingsError) as error:
         return complain(error.problems, str(args.manifest))
-    problems = check(manifest, settings.config)
+    problems = check(manifest.cases, settings.config)
     if problems:
         return complain(problems, str(args.manifest))
     frames = sum(case.frame_count for case in manifest.cases)

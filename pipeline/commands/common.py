@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from argparse import Namespace
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pipeline.study.settings import Resolved, Setting, parse_assignment, read_settings, resolve
+if TYPE_CHECKING:
+    from pipeline.study.settings import Resolved, Setting
 
 
-def settings_of(args: Namespace) -> list[Setting]:
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """-c and --set."""
+    add = parser.add_argument
+    add("-c", "--config", type=Path, action="append", default=[], metavar="CFG", help="settings (TOML)")
+    add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
+
+
+def settings_of(args: argparse.Namespace) -> list[Setting]:
     """Settings files first, then --set; raises SettingsError."""
+    from pipeline.study.settings import parse_assignment, read_settings
+
     read = [setting for path in args.config for setting in read_settings(path)]
     return read + [parse_assignment(text) for text in args.settings]
 
 
-def resolved_settings(args: Namespace) -> Resolved:
+def resolved_settings(args: argparse.Namespace) -> Resolved:
     """The settings in force; raises SettingsError listing every problem."""
+    from pipeline.study.settings import resolve
+
     return resolve(settings_of(args))
 
 

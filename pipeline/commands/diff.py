@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import argparse
 import tomllib
-from argparse import Namespace
+from pathlib import Path
 
 from pipeline.commands.common import complain, say
-from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
+
+HELP = "paired differences of two outputs; exit 1 on a regression"
 
 
-def main(args: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    add = parser.add_argument
+    add("first", type=Path, metavar="OUT_A", help="the baseline")
+    add("second", type=Path, metavar="OUT_B", help="the candidate")
+    add("--tolerance", type=Path, metavar="T", help="TOML, column = allowed increase; a default ships")
+
+
+def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression, 2 on wrong input."""
+    from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
+
     try:
         tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
         difference = diff_folders(args.first, args.second, tolerance)

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+import argparse
+from pathlib import Path
 
 from pipeline.commands.common import complain, say
-from pipeline.commands.run import last_line
-from pipeline.run.aggregate import aggregate, found_results
-from reports.html import render_case, render_index
+
+HELP = "rebuild tables, figures and pages from result files"
 
 
-def main(args: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    parser.add_argument("out", type=Path, metavar="OUT")
+    parser.add_argument(
+        "--embed", action="store_true", help="put the pictures into the pages: one file a page"
+    )
+
+
+def main(args: argparse.Namespace) -> int:
     """Exit 0 if all cases are ok, 1 if some failed, 2 if there are none."""
-    if not (args.out / "cases").is_dir() or not found_results(args.out):
-        return complain(
-            [f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"], "OUT"
-        )
+    from pipeline.run.aggregate import aggregate
+    from pipeline.run.launch import last_line
+    from pipeline.run.results import found_results
+    from reports.html import render_case, render_index
+
+    found = found_results(args.out)
+    if not found:
+        problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
+        return complain([problem], "OUT")
     totals = aggregate(args.out)
-    for result in found_results(args.out):
-        if result["frames"]:
-            render_case(args.out / "cases" / result["case"], embed=args.embed)
-    index = render_index(args.out, embed=args.embed)
-    say(last_line(totals, index))
+    for result in found:
+        if result.frames:
+            render_case(args.out / "cases" / result.case, embed=args.embed)
+    say(last_line(totals, render_index(args.out, embed=args.embed)))
     return 0 if totals.all_ok else 1

@@ -3,12 +3,31 @@
 from __future__ import annotations
 
 import sys
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from pipeline.commands.common import complain, say
 from pipeline.study.suggest import did_you_mean
+
+HELP = "write a synthetic study with truth, as real files"
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """What may follow the verb."""
+    add = parser.add_argument
+    add("name", nargs="?", metavar="NAME", help="a scene of the catalogue; --list names them")
+    add("-o", "--out", type=Path, metavar="DIR")
+    add("--list", action="store_true", help="name the scenes, each with its reason")
+    add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii")
+    add("--background", type=Path, metavar="VOLUME", help="paint a wire into this real scan")
+    add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"))
+    add("--frames", type=int, metavar="N")
+    add("--size", type=int, metavar="N", help="voxels along each axis")
+    add("--voxel-mm", type=float, metavar="V")
+    add("--seed", type=int, default=0, metavar="S")
+    add("--scanner", default="psf", choices=("psf", "conebeam"))
 
 
 def _progress(done: int, total: int) -> None:

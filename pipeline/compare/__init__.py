@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.compare.metrics import Comparison, TruthErrors, compare, compare_truth, point_to_curve, rms
+from pipeline.compare.curves import Comparison, compare, compare_truth
+from pipeline.compare.distance import point_to_curve
+from pipeline.compare.metrics import rms
 
-__all__ = ["Comparison", "TruthErrors", "compare", "compare_truth", "point_to_curve", "rms"]
+__all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]

@@ -1,12 +1,12 @@
 """Trivial predictors: what anybody would guess without a simulator. Skill is measured against them.
 
 All but ``previous`` are told where the wire ends up (the deepest traced tip), which a simulator is not: beating them is
-not easy, and that is the point.
+not easy, and that is the point. ``register`` adds one, with its column.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,53 +14,116 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from pipeline.arrays.polyline import smooth, to_length
-from pipeline.model import Array, Curve, Lumen
+from pipeline.compare.distance import point_to_curve
+from pipeline.compare.metrics import rms
+from pipeline.model import Array, Clamp, Lumen
+from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, VesselWall, relax
 
 CENTRE_POWER = 3
 """Cost = (clearance + voxel)^-3: high enough to hold the path on the medial line in bends (at 2 it cuts corners)."""
-
-
 ROOM_MM = 8.0
 """Paths are looked for in the traced wires' box and this much around it: a detour outside is no predictor."""
-STRAIGHT_WIRE = {"segment_mm": 1.0, "bending_stiffness_N_mm2": 10.0}
-HARD_WALL_N_MM2 = 100.0  # with EI = 10 N mm^2 a wire sinks in by less than 0.05 mm: bending alone decides
+HARD_WALL_N_MM2 = 100.0
+"""With EI = 10 N mm^2 a wire sinks in by less than 0.05 mm: bending alone decides."""
 
 
 @dataclass(frozen=True, eq=False)
-class Nulls:
-    """Paths (n, 3) LPS mm from the entry towards the deepest tip; None where there is none."""
+class Clues:
+    """What a predictor may know of a case: lumen, clamp, the wire's radius, and the deepest traced wire (n, 3)."""
 
     lumen: Lumen
-    entry_direction: Array
+    clamp: Clamp
     radius_mm: float
-    centreline: Array | None = None
-    shortest: Array | None = None
-
-    def at_depth(self, name: str, depth_mm: float) -> Array | None:
-        """A predictor's wire of the given length."""
-        path = getattr(self, name)
-        return None if path is None or len(path) < 2 else to_length(path, depth_mm)
+    deepest_mm: Array
 
     @cached_property
-    def _hard_wall(self) -> VesselWall:
+    def room(self) -> Grid:
+        """The signed distance around the traced wires."""
+        return _room(self.lumen, np.vstack([self.clamp.entry_mm, self.deepest_mm]))
+
+    @cached_property
+    def centreline(self) -> Array | None:
+        """The lumen's centreline (n, 3) from the entry towards the deepest tip; None where they are not joined."""
+        clearance = -np.asarray(self.room.values, dtype=np.float64)
+        voxel = float(self.room.spacing_mm.mean())
+        return self._path(
+            np.where(clearance > 0, (np.maximum(clearance, 0) + voxel) ** -CENTRE_POWER, np.inf)
+        )
+
+    @cached_property
+    def shortest(self) -> Array | None:
+        """The shortest path (n, 3) that leaves the wire's radius to the wall."""
+        clearance = -np.asarray(self.room.values, dtype=np.float64)
+        return self._path(
+            np.where(clearance > min(self.radius_mm, 0.5 * float(clearance.max())), 1.0, np.inf)
+        )
+
+    def _path(self, cost: Array) -> Array | None:
+        path = voxel_path(self.room, cost, self.clamp.entry_mm, self.deepest_mm[-1])
+        return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
+
+    @cached_property
+    def hard_wall(self) -> VesselWall:
+        """The lumen's wall for a wire that only wants to be straight."""
         return VesselWall(self.lumen.distance, stiffness_N_mm2=HARD_WALL_N_MM2)
 
-    def min_bending(self, depth_mm: float) -> Array | None:
-        """The curve of least bending in the lumen: a straight wire laid on the centreline and let go."""
-        start = self.at_depth("centreline", depth_mm)
-        if start is None:
-            return None
-        wire = GuideWire(radius_mm=self.radius_mm, **STRAIGHT_WIRE)
-        solution = relax(
-            wire,
-            self._hard_wall,
-            depth_mm=depth_mm,
-            entry_mm=start[0],
-            entry_direction=self.entry_direction,
-            start_mm=start,
-        )
-        return np.asarray(solution.joints_mm) if solution.converged else None
+
+Guess = Callable[[Clues, float, Array | None], Array | None]
+"""From the clues, a depth (mm) and the last trusted trace (n, 3) before the frame to a wire (m, 3), or None."""
+
+
+def of_path(path: Array | None, depth_mm: float) -> Array | None:
+    """A path cut at, or continued straight to, a depth."""
+    return None if path is None or len(path) < 2 else to_length(path, depth_mm)
+
+
+def min_bending(clues: Clues, depth_mm: float, _previous: Array | None = None) -> Array | None:
+    """The curve of least bending in the lumen: a straight wire laid on the centreline and let go."""
+    start = of_path(clues.centreline, depth_mm)
+    if start is None:
+        return None
+    solution = relax(
+        GuideWire(segment_mm=1.0, radius_mm=clues.radius_mm, bending_stiffness_N_mm2=10.0),
+        clues.hard_wall,
+        depth_mm=depth_mm,
+        entry_mm=start[0],
+        entry_direction=clues.clamp.direction,
+        start_mm=start,
+    )
+    return np.asarray(solution.joints_mm) if solution.converged else None
+
+
+NULLS: dict[str, Guess] = {
+    "centreline": lambda clues, depth, _: of_path(clues.centreline, depth),
+    "shortest": lambda clues, depth, _: of_path(clues.shortest, depth),
+    "min_bending": min_bending,
+    "previous": lambda _, depth, previous: of_path(previous, depth),
+}
+
+
+def register(name: str, label: str, meaning: str, guess: Guess) -> None:
+    """Add a predictor; its column ``null_<name>_rms_mm`` is in errors.csv, summary.csv and the pages from then on.
+
+    label : what legends call it.     meaning : one line for the list of columns.
+    """
+    ERRORS.add(predictor(name, label, meaning))
+    NULLS[name] = guess
+
+
+def score(
+    clues: Clues, depth_mm: float, previous_mm: Array | None, curve_mm: Array, step_mm: float
+) -> dict[str, float]:
+    """Root mean square distance (mm) of every predictor's wire from the traced curve, by the predictor's name.
+
+    Wires are sampled every ``step_mm``; a predictor that has no guess has no entry.
+    """
+    guesses = {name: guess(clues, depth_mm, previous_mm) for name, guess in NULLS.items()}
+    return {
+        name: rms(point_to_curve(to_length(wire, depth_mm, step_mm), curve_mm)[0])
+        for name, wire in guesses.items()
+        if wire is not None
+    }
 
 
 def voxel_path(clearance: Grid, cost: Array, entry_mm: Array, target_mm: Array) -> Array | None:
@@ -88,23 +151,3 @@ def _room(lumen: Lumen, points_mm: Array) -> Grid:
     low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
     high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
     return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
-
-
-def build(lumen: Lumen, entry_mm: Array, entry_direction: Array, traced_mm: Array, radius_mm: float) -> Nulls:
-    """The predictors for a wire of ``radius_mm`` from the entry to the tip of the deepest trace (n, 3)."""
-    room = _room(lumen, np.vstack([entry_mm, traced_mm]))
-    clearance = -np.asarray(room.values, dtype=np.float64)
-    voxel = float(room.spacing_mm.mean())
-    centre_cost = np.where(clearance > 0, (np.maximum(clearance, 0) + voxel) ** -CENTRE_POWER, np.inf)
-    short_cost = np.where(clearance > min(radius_mm, 0.5 * float(clearance.max())), 1.0, np.inf)
-    paths = [voxel_path(room, cost, entry_mm, traced_mm[-1]) for cost in (centre_cost, short_cost)]
-    smoothed = [None if path is None else smooth(path, 0.5 * voxel) for path in paths]
-    return Nulls(lumen, entry_direction, radius_mm, *smoothed)
-
-
-def previous(curves: Sequence[Curve | None], frame: int, depth_mm: float) -> Array | None:
-    """The last traced wire before ``frame``, pushed on along its own curve and then straight to the new depth."""
-    for curve in reversed(curves[:frame]):
-        if curve is not None and len(curve.points_mm) > 1:
-            return to_length(curve.points_mm, depth_mm)
-    return None

@@ -7,17 +7,29 @@ resamples blocks: cases (groups) where there are several, runs of consecutive fr
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.run.frame import Frame
+from pipeline.compare.metrics import OF_POINTS
+from pipeline.model import Array
+from pipeline.status import FrameStatus
+from reports.schema import ERRORS
 
-NULLS = ("centreline", "shortest", "min_bending", "previous")
 SEED = 20021  # of the bootstrap: the same result files give the same intervals
-Array = NDArray[np.float64]
+Row = Mapping[str, Any]
+"""A row of errors.csv: values by the names of its columns; what does not apply is NaN, None or absent."""
+
+
+def counts(row: Row, error_mm: Array | None) -> bool:
+    """Whether a frame counts: it is ok and compared.
+
+    This is the one population: summary.csv, the last line, ``overall`` in run.json and every figure of a case pool over
+    these frames and no others.
+    """
+    return row["status"] == FrameStatus.OK.identifier and error_mm is not None and len(error_mm) > 0
 
 
 def skill_of(rms_mm: float, null_mm: float) -> float:
@@ -25,15 +37,69 @@ def skill_of(rms_mm: float, null_mm: float) -> float:
     return 1.0 - (rms_mm / null_mm) ** 2 if null_mm > 0 else float("nan")
 
 
-def _squares(frames: Sequence[Frame]) -> Array:
-    """Per frame: number of points, sum of squares of errors, the same of the centreline null; (n, 3)."""
-    rows = []
-    for frame in frames:
-        assert frame.comparison is not None
-        count = len(frame.comparison.error_mm)
-        null = frame.nulls_rms_mm.get("centreline", float("nan"))
-        rows.append((count, float(np.sum(frame.comparison.error_mm**2)), count * null**2))
-    return np.array(rows).reshape(-1, 3)
+def pooled_rms(rows: Array) -> float:
+    """Root mean square over rows of (number of points, sum of squares, ...)."""
+    return float(np.sqrt(rows[:, 1].sum() / rows[:, 0].sum()))
+
+
+def pooled(frames: Sequence[tuple[Row, Array]], draws: int) -> dict[str, float]:
+    """Values of summary.csv over frames that count, each its row and its point errors (n,); empty where there are none.
+
+    draws : resamples behind the 95 % intervals.
+    """
+    if not frames:
+        return {}
+    points = np.array([len(errors) for _, errors in frames], dtype=float)
+    everything = np.concatenate([errors for _, errors in frames])
+    result = {}
+    for column in ERRORS:
+        if column.name in OF_POINTS:
+            result[column.pooled_name] = OF_POINTS[column.name](everything)
+        elif column.pooled in POOLING:
+            values = np.array([_number(row.get(column.name)) for row, _ in frames])
+            result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
+    return result | _with_intervals(frames, points, draws)
+
+
+def _with_intervals(frames: Sequence[tuple[Row, Array]], points: Array, draws: int) -> dict[str, float]:
+    """The statistics that have intervals: rms, median tip and skill."""
+    squares = [float(np.sum(errors**2)) for _, errors in frames]
+    null = np.array([_number(row.get("null_centreline_rms_mm")) for row, _ in frames])
+    tips = [_number(row.get("tip_mm")) for row, _ in frames]
+    rows = np.column_stack([points, squares, points * null**2, tips])
+    units = blocks(len(frames), max(round(np.sqrt(len(frames))), 1))
+    rms_ci, tip_ci, skill_ci = intervals(rows, units, (pooled_rms, _median_tip, _pooled_skill), draws)
+    return {
+        "rms_mm": pooled_rms(rows),
+        "rms_low_mm": rms_ci[0],
+        "rms_high_mm": rms_ci[1],
+        "tip_low_mm": tip_ci[0],
+        "tip_high_mm": tip_ci[1],
+        "skill": _pooled_skill(rows),
+        "skill_low": skill_ci[0],
+        "skill_high": skill_ci[1],
+    }
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _over_frames(rule: Callable[[Array, Array], float], values: Array, points: Array) -> float:
+    """A rule over the frames that have a value; NaN where none has."""
+    known = np.isfinite(values)
+    return rule(values[known], points[known]) if known.any() else float("nan")
+
+
+POOLING: dict[str, Callable[[Array, Array], float]] = {
+    # a frame's mean square times its number of points is a sum of squares
+    "rms": lambda values, points: float(np.sqrt(np.sum(points * values**2) / points.sum())),
+    "mean": lambda values, _: float(np.mean(values)),
+    "share": lambda values, _: float(np.mean(values)),
+    "median": lambda values, _: float(np.median(values)),
+    "max": lambda values, _: float(np.max(values)),
+}
+"""Rules of ``Column.pooled`` from values of frames (n,) and their numbers of points (n,)."""
 
 
 def blocks(count: int, length: int) -> list[NDArray[np.intp]]:
@@ -58,104 +124,9 @@ def intervals(
     return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
-def pooled_rms(rows: Array) -> float:
-    """Root mean square over rows of (number of points, sum of squares, ...)."""
-    return float(np.sqrt(rows[:, 1].sum() / rows[:, 0].sum()))
-
-
 def _pooled_skill(rows: Array) -> float:
     return 1.0 - float(rows[:, 1].sum() / rows[:, 2].sum()) if rows[:, 2].sum() > 0 else float("nan")
 
 
 def _median_tip(rows: Array) -> float:
     return float(np.median(rows[:, 3]))
-
-
-def pooled(frames: Sequence[Frame], draws: int) -> dict[str, float]:
-    """Statistics over all points of the frames that are ok and compared; empty where there are none."""
-    used = [f for f in frames if f.ok and f.comparison is not None]
-    if not used:
-        return {}
-    errors = np.concatenate([f.comparison.error_mm for f in used if f.comparison])
-    tips = np.array([f.comparison.tip_mm for f in used if f.comparison])
-    rows = np.column_stack([_squares(used), tips])
-    units = blocks(len(used), max(round(np.sqrt(len(used))), 1))
-    rms_ci, tip_ci, skill_ci = intervals(rows, units, (pooled_rms, _median_tip, _pooled_skill), draws)
-    return {
-        "rms_mm": pooled_rms(rows),
-        "rms_low_mm": rms_ci[0],
-        "rms_high_mm": rms_ci[1],
-        "mean_mm": float(errors.mean()),
-        "p95_mm": float(np.percentile(errors, 95)),
-        "max_mm": float(errors.max()),
-        "tip_median_mm": float(np.median(tips)),
-        "tip_low_mm": tip_ci[0],
-        "tip_high_mm": tip_ci[1],
-        "skill": _pooled_skill(rows),
-        "skill_low": skill_ci[0],
-        "skill_high": skill_ci[1],
-        **_frame_statistics(used, rows[:, 0]),
-    }
-
-
-def _weighted_rms(values: Sequence[float], weights: Array) -> float:
-    array = np.array(values)
-    known = np.isfinite(array)
-    if not known.any():
-        return float("nan")
-    return float(np.sqrt(np.sum(weights[known] * array[known] ** 2) / weights[known].sum()))
-
-
-def _median(values: Sequence[float]) -> float:
-    known = np.array(values)[np.isfinite(values)]
-    return float(np.median(known)) if known.size else float("nan")
-
-
-def _frame_statistics(used: Sequence[Frame], points: Array) -> dict[str, float]:
-    """What is pooled from per-frame numbers: a per-frame mean square times its number of points is a sum of squares."""
-    compared = [f.comparison for f in used if f.comparison]
-    result = {
-        f"null_{name}_rms_mm": _weighted_rms([f.nulls_rms_mm.get(name, float("nan")) for f in used], points)
-        for name in NULLS
-    }
-    return result | {
-        "arc_rms_mm": _weighted_rms([c.arc_rms_mm for c in compared], points),
-        "branch_ok_fraction": float(np.mean([c.branch_ok for c in compared])),
-        "coverage": float(np.mean([c.coverage for c in compared])),
-        "trace_mean_median_mm": _median([f.truth.trace_mean_mm for f in used]),
-        "trace_tip_median_mm": _median([f.truth.trace_tip_mm for f in used]),
-        "truth_rms_mm": _weighted_rms([f.truth.truth_rms_mm for f in used], points),
-    }
-
-
-def forces(frames: Sequence[Frame]) -> dict[str, float]:
-    """Largest penetration and push force over all simulated frames."""
-    done = [f.simulated for f in frames if f.simulated is not None]
-    if not done:
-        return {}
-    return {
-        "max_penetration_mm": max(s.max_penetration_mm for s in done),
-        "push_force_max_N": max(s.push_force_N for s in done),
-    }
-
-
-def case_row(run: Any, total_s: float, peak_mib: float) -> dict[str, Any]:
-    """One row of summary.csv for a finished CaseRun."""
-    frames: list[Frame] = run.frames
-    good = sum(f.ok for f in frames)
-    failed = next((f for f in frames if not f.ok), None)
-    status = run.failure.status.identifier if run.failure else "ok" if failed is None else failed.status
-    return {
-        "case": run.case.id,
-        "group": run.case.group,
-        "role": run.case.role,
-        "status": status,
-        "frames": len(frames),
-        "frames_ok": good,
-        "frames_failed": len(frames) - good,
-        **pooled(frames, run.config.compare.bootstrap),
-        **forces(frames),
-        **{f"{stage}_s": run.seconds[stage] for stage in ("load", "segment", "trace", "simulate", "compare")},
-        "total_s": total_s,
-        "peak_memory_MiB": peak_mib,
-    }

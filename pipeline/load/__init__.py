@@ -1,33 +1,40 @@
-"""Stage 1: scans in. ``read_header`` reads geometry alone, ``load`` reads the voxels of a box alone."""
+"""load: scans in. ``read_header`` reads geometry alone, ``Crop.load`` the voxels of a box alone.
+
+A format is a module with three functions: ``recognises`` a path, ``read_header`` of a source, ``read`` voxels of a box.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
-from pipeline.load.dicom import read_dicom, read_dicom_header
-from pipeline.load.files import read_file, read_file_header
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry
-from pipeline.load.hdf5 import read_hdf5, read_hdf5_header
-from pipeline.load.multiframe import frames_of
-from pipeline.model import Volume
+from pipeline.model import Counters, Volume
 
-__all__ = ["Box", "Header", "LoadError", "Source", "load", "read_header", "require_same_geometry"]
+__all__ = ["Box", "Crop", "Header", "LoadError", "Source", "load", "read_header", "require_same_geometry"]
 
 
-def _is_hdf5(path: Path) -> bool:
-    return path.suffix.lower() in {".h5", ".hdf5"}
+class Format(Protocol):
+    """What a module must offer to read a format."""
+
+    def recognises(self, path: Path, /) -> bool:
+        """Whether the file or folder is of this format."""
+
+    def read_header(self, source: Source, config: LoadConfig, /) -> Header:
+        """Its geometry; raises LoadError where it cannot be used."""
+
+    def read(self, header: Header, box: Box, config: LoadConfig, /) -> NDArray[Any]:
+        """Voxels of a box, indexed x, y, z."""
 
 
-def _is_dicom_stack(path: Path) -> bool:
-    """A folder of slices, or one enhanced multi-frame file."""
-    if path.is_dir():
-        return True
-    return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
+FORMATS: tuple[Format, ...] = (dicom, hdf5, files)
+"""The first that recognises a path reads it; ``files`` leaves the rest to SimpleITK."""
 
 
 def read_header(
@@ -44,34 +51,47 @@ def read_header(
     if not source.path.exists():
         msg = f"{source.path}: no such file or folder; check the path in the manifest (relative to the manifest itself)"
         raise LoadError(msg)
-    if _is_dicom_stack(source.path):
-        header, _ = read_dicom_header(source, config.resample)
-    elif _is_hdf5(source.path):
-        header = read_hdf5_header(source)
-    else:
-        header = read_file_header(source)
+    header = _format_of(source.path).read_header(source, config)
     if spacing_mm is None:
         return header
-    note = (
-        f"{source.path.name}: spacing {list(map(float, np.asarray(spacing_mm)))} mm taken from the manifest"
-    )
-    return replace(header, spacing_mm=np.asarray(spacing_mm, float), assumed=(*header.assumed, note))
+    spacing = np.asarray(spacing_mm, float)
+    note = f"{source.path.name}: spacing {spacing.tolist()} mm taken from the manifest"
+    return replace(header, spacing_mm=spacing, assumed=(*header.assumed, note))
 
 
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
-    if _is_dicom_stack(header.source.path):
-        _, stack = read_dicom_header(header.source, config.resample)
-        values = read_dicom(header, stack, (start, stop))
-    elif _is_hdf5(header.source.path):
-        values = read_hdf5(header, (start, stop))
-    else:
-        values = read_file(header, (start, stop))
+    values = _format_of(header.source.path).read(header, (start, stop), config)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
         msg = f"{header.source}: {bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
         raise LoadError(msg)
-    return Volume(
-        values, header.spacing_mm, header.grid.to_mm(start), header.direction, assumed=header.assumed
-    )
+    made_of = Crop(header, (start, stop), config)
+    origin = header.grid.to_mm(start)
+    return Volume(values, header.spacing_mm, origin, header.direction, header.assumed, made_of)
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A box of a scan that can be loaded: all that its voxels depend on, so that it stands for them in keys."""
+
+    header: Header
+    box: Box
+    config: LoadConfig = LoadConfig()
+
+    def load(self) -> Volume:
+        """Read it."""
+        return load(self.header, self.box, self.config)
+
+    @property
+    def counters(self) -> Counters:
+        """What reading it counts: voxels of the scan, read, and left alone."""
+        total = float(np.prod(self.header.shape))
+        read = float(np.prod(np.subtract(self.box[1], self.box[0])))
+        return {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
+
+
+def _format_of(path: Path) -> Format:
+    """The module that reads a path."""
+    return next(kind for kind in FORMATS if kind.recognises(path))

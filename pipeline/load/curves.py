@@ -1,106 +1,44 @@
-"""Points in order from .csv, .vtp, .mrk.json, and branches with radius from .swc and .mrk.json. Out: LPS mm."""
+"""A wire's curve that the user brings, as points in order: .csv, .vtp, .mrk.json. Out: LPS mm."""
 
 from __future__ import annotations
 
 import csv
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load import LoadError
-from pipeline.load.surfaces import read_vtp
+from pipeline.load.geometry import LoadError, refused
+from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
+from pipeline.model import Curve
 
-RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"))
 
 
-@dataclass(frozen=True, eq=False)
-class Branches:
-    """Cones: start (n, 3), end (n, 3), and their radii (n,), mm, LPS."""
-
-    start_mm: NDArray[np.float64]
-    end_mm: NDArray[np.float64]
-    start_radius_mm: NDArray[np.float64]
-    end_radius_mm: NDArray[np.float64]
-
-
-def _bad(path: Path, got: str, allowed: str, do: str) -> LoadError:
-    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
-
-
-def read_swc(path: Path) -> Branches:
-    """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
-    rows = [
-        r.split()
-        for r in path.read_text(encoding="utf-8").splitlines()
-        if r.strip() and not r.lstrip().startswith("#")
-    ]
-    try:
-        table = np.array(rows, dtype=float)
-    except ValueError as error:
-        raise _bad(path, str(error), "seven numbers a line", "export it again as .swc") from error
-    if table.ndim != 2 or table.shape[1] < 7:
-        raise _bad(path, f"a table of shape {table.shape}", "seven numbers a line", "export it again as .swc")
-    row_of = {int(n): i for i, n in enumerate(table[:, 0])}
-    child = np.array([i for i in range(len(table)) if int(table[i, 6]) in row_of], dtype=np.int64)
-    parent = np.array([row_of[int(table[i, 6])] for i in child], dtype=np.int64)
-    points, radius = table[:, 2:5], table[:, 5]
-    if len(child) == 0 or not np.all(radius > 0):
-        raise _bad(
-            path, "no branch of positive radius", "nodes with parents and radii", "check columns 6 and 7"
-        )
-    return Branches(points[parent], points[child], radius[parent], radius[child])
-
-
-def _markups(path: Path) -> list[dict[str, Any]]:
+def markups_in(path: Path) -> list[dict[str, Any]]:
+    """The markups of a 3D Slicer file that have control points."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))["markups"]
         return [m for m in found if m.get("controlPoints")]
     except (ValueError, KeyError, TypeError) as error:
-        raise _bad(path, repr(error), "a 3D Slicer markups file", "save the curve as .mrk.json") from error
+        raise refused(path, repr(error), "a 3D Slicer markups file", "save the curve as .mrk.json") from error
 
 
-def _positions(markup: dict[str, Any]) -> NDArray[np.float64]:
+def positions_of(markup: dict[str, Any]) -> NDArray[np.float64]:
+    """Control points (n, 3) of a markup, LPS mm. Where a file does not say it is LPS, as for 3D Slicer; 0 is RAS."""
     points = np.array([p["position"] for p in markup["controlPoints"]], dtype=float).reshape(-1, 3)
-    # 0 in old files means RAS, and so does a missing name
-    lps = str(markup.get("coordinateSystem", "RAS")).upper() in {"LPS", "1"}
+    lps = str(markup.get("coordinateSystem", "LPS")).upper() in {"LPS", "1"}
     return points if lps else points * RAS_TO_LPS
 
 
 def read_markups_curve(path: Path) -> NDArray[np.float64]:
     """Control points (n, 3) of the first markup, LPS mm."""
-    found = _markups(path)
+    found = markups_in(path)
     if not found:
-        raise _bad(path, "no control points", "one curve", "save the curve as .mrk.json")
-    return _positions(found[0])
-
-
-def read_markups_branches(path: Path) -> Branches:
-    """Curves with a ``Radius`` measurement per control point (as VMTK writes), every markup one branch."""
-    start, end, first, last = [], [], [], []
-    for markup in _markups(path):
-        points = _positions(markup)
-        values = [
-            m.get("controlPointValues")
-            for m in markup.get("measurements", [])
-            if str(m.get("name", "")).lower() == "radius"
-        ]
-        if not values or values[0] is None or len(values[0]) != len(points):
-            allowed = "a measurement named Radius with one of controlPointValues for every point"
-            raise _bad(path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc")
-        radius = np.array(values[0], dtype=float)
-        start.append(points[:-1])
-        end.append(points[1:])
-        first.append(radius[:-1])
-        last.append(radius[1:])
-    if not start:
-        raise _bad(path, "no control points", "at least one curve with radii", "or give an .swc")
-    a, b = np.concatenate(start), np.concatenate(end)
-    return Branches(a, b, np.concatenate(first), np.concatenate(last))
+        raise refused(path, "no control points", "one curve", "save the curve as .mrk.json")
+    return positions_of(found[0])
 
 
 def read_csv_points(path: Path) -> NDArray[np.float64]:
@@ -108,7 +46,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     with path.open(newline="") as file:
         rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
     if not rows:
-        raise _bad(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
+        raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
     columns = next(([head.index(c) for c in names] for names in _NAMES if set(names) <= set(head)), None)
     try:
@@ -117,7 +55,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         return np.array([[float(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
     except (ValueError, IndexError) as error:
         allowed = "columns x_mm, y_mm, z_mm of numbers"
-        raise _bad(path, f"{error} (header {head})", allowed, "name the columns") from error
+        raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
 
 
 def read_vtp_points(path: Path) -> NDArray[np.float64]:
@@ -125,3 +63,28 @@ def read_vtp_points(path: Path) -> NDArray[np.float64]:
     shapes = read_vtp(path)
     points = shapes.points_mm[shapes.lines[0]] if shapes.lines else shapes.points_mm
     return points * RAS_TO_LPS if shapes.ras else points
+
+
+READERS = {".csv": read_csv_points, ".vtp": read_vtp_points, ".mrk.json": read_markups_curve}
+
+
+def read_curve(path: Path) -> Curve:
+    """One curve, LPS mm, ordered from entry to tip; its uncertainty is unknown (NaN).
+
+    Repeated points are dropped. Raises LoadError for another kind of file, fewer than two points or a NaN.
+    """
+    kind = next((k for k in READERS if path.name.lower().endswith(k)), None)
+    if kind is None:
+        msg = f"{path}: got {path.suffix!r}; expected {', '.join(READERS)}; export the curve in one of these"
+        raise LoadError(msg)
+    if not path.exists():
+        msg = f"{path}: no such file; check traces in the manifest (relative to the manifest itself)"
+        raise LoadError(msg)
+    points = READERS[kind](path)
+    if len(points):
+        keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
+        points = points[keep]
+    if len(points) < 2 or not np.all(np.isfinite(points)):
+        msg = f"{path}: got {len(points)} points; expected two or more, all finite; correct the file"
+        raise LoadError(msg)
+    return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")

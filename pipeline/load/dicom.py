@@ -16,6 +16,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 from scipy.ndimage import shift as shift_slice
 
+from pipeline.load.config import LoadConfig
 from pipeline.load.files import to_xyz
 from pipeline.load.geometry import Box, Header, LoadError, Source
 from pipeline.load.multiframe import Frames, frames_of
@@ -193,9 +194,19 @@ def irregularities(stack: Stack) -> list[str]:
     return problems
 
 
-def read_dicom_header(source: Source, resample: bool) -> tuple[Header, Stack]:
-    """Geometry of a series; tilt, gaps and repeats are refused, or resampled where ``resample`` asks for it."""
-    stack = read_stack(source)
+def recognises(path: Path) -> bool:
+    """A folder of slices, or one enhanced multi-frame file."""
+    if path.is_dir():
+        return True
+    return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
+
+
+def read_header(source: Source, config: LoadConfig) -> Header:
+    """Geometry of a series; tilt, gaps and repeats are refused, or resampled where the setting asks for it."""
+    return _header(source, read_stack(source), config.resample)
+
+
+def _header(source: Source, stack: Stack, resample: bool) -> Header:
     problems = irregularities(stack)
     fatal = [p for p in problems if p.startswith(("repeated", "single"))]
     if fatal or (problems and not resample):
@@ -210,21 +221,21 @@ def read_dicom_header(source: Source, resample: bool) -> tuple[Header, Stack]:
         if not problems
         else int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
     )
-    header = Header(
+    return Header(
         source,
         (stack.size[0], stack.size[1], count),
         np.array([*stack.pixel_mm, stack.spacing_mm]),
         stack.positions[0],
         np.column_stack([stack.axes, stack.normal]),
         stack.pixel_type,
-        stack.files,
+        (source.path,),
         assumed=tuple(f"resampled onto a regular grid: {p}" for p in problems),
     )
-    return header, stack
 
 
-def read_dicom(header: Header, stack: Stack, box: Box) -> NDArray[Any]:
+def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     """Voxels of ``box``: of a regular stack the needed slices alone, of an irregular one the resampled grid."""
+    stack = read_stack(header.source)
     (x0, y0, z0), (x1, y1, z1) = box
     if any("resampled" in text for text in header.assumed):
         return _resampled(header, stack)[x0:x1, y0:y1, z0:z1]

@@ -5,12 +5,15 @@ The one place where SimpleITK's x, y, z meets numpy's z, y, x.
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import SimpleITK as sitk
 from numpy.typing import NDArray
 
+from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source
 from pipeline.load.raw import read_mha_box
 
@@ -63,7 +66,28 @@ def _geometry(reader: sitk.ImageFileReader, source: Source) -> tuple[Any, Any, A
     return spacing, origin, direction
 
 
-def read_file_header(source: Source) -> Header:
+def recognises(_path: Path) -> bool:
+    """Any file: SimpleITK finds out."""
+    return True
+
+
+def detached(path: Path) -> tuple[Path, ...]:
+    """The files that hold the voxels of a header that stands alone (.mhd, .nhdr); none for other files."""
+    if path.suffix.lower() not in {".mhd", ".nhdr"}:
+        return ()
+    text = path.read_text(encoding="latin-1")
+    found = re.search(r"^(?:ElementDataFile\s*=|data ?file:)[ \t]*(.*)$", text, re.IGNORECASE | re.MULTILINE)
+    if found is None:
+        return ()
+    name = found.group(1).strip()
+    # a list stands below; a pattern as slice_%03d.raw takes numbers
+    names = text[found.end() :].split() if name.upper().startswith("LIST") else [name]
+    pattern = re.sub(r"%\d*d.*", "*", name)
+    matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()
+    return tuple(sorted({p for p in (*(path.parent / n for n in names), *matches) if p.is_file()}))
+
+
+def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of one file; a 4-D file is a sequence of volumes along its last axis."""
     reader = _reader(source)
     size = reader.GetSize()
@@ -81,12 +105,12 @@ def read_file_header(source: Source) -> Header:
         origin,
         direction,
         sitk.GetPixelIDValueAsString(reader.GetPixelID()),
-        (source.path,),
+        (source.path, *detached(source.path)),
         item_count=size[3] if len(size) == 4 else 1,
     )
 
 
-def read_file(header: Header, box: Box) -> NDArray[Any]:
+def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z; only that region is read where the format can stream."""
     part = None if box == header.box else read_mha_box(header.source.path, box)
     if part is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
@@ -20,6 +20,11 @@ class LoadError(StageError):
 
     def __init__(self, message: str) -> None:
         super().__init__(FrameStatus.LOAD_FAILED, message)
+
+
+def refused(path: Path, got: str, allowed: str, do: str) -> LoadError:
+    """The error for a file that holds something else than it should."""
+    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class Header:
     """Geometry and type of a scan, read without its voxels.
 
     shape : voxels along x, y, z.     spacing_mm, origin_mm : (3,).     direction : (3, 3), columns are the axes.
-    files : what has to be read, in order.     item_count : volumes in the file (> 1 for a sequence).
+    files : files and folders that it is read from.     item_count : volumes in the file (> 1 for a sequence).
     """
 
     source: Source
@@ -64,6 +69,13 @@ class Header:
     def box(self) -> Box:
         """All of the scan."""
         return (0, 0, 0), self.shape
+
+    def box_of(self, points_mm: ArrayLike) -> Box:
+        """The voxels of the scan around points (n, 3), clipped to it."""
+        index = self.grid.to_index(points_mm)
+        low = np.clip(np.floor(index.min(axis=0) + 1e-6), 0, np.array(self.shape) - 1).astype(int)
+        high = np.clip(np.ceil(index.max(axis=0) - 1e-6) + 1, low + 1, self.shape).astype(int)
+        return (int(low[0]), int(low[1]), int(low[2])), (int(high[0]), int(high[1]), int(high[2]))
 
 
 def describe(header: Header) -> str:

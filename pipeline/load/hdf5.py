@@ -6,12 +6,14 @@ A dataset's attributes give spacing_mm (needed), origin_mm (default 0), directio
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source
 
 AXES = ("z,y,x", "x,y,z")
@@ -46,7 +48,12 @@ def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
     return axes == AXES[1]
 
 
-def read_hdf5_header(source: Source) -> Header:
+def recognises(path: Path) -> bool:
+    """By the suffix."""
+    return path.suffix.lower() in {".h5", ".hdf5"}
+
+
+def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
     with h5py.File(source.path, "r") as file:
         volumes = _volumes(file, source)
@@ -70,7 +77,7 @@ def read_hdf5_header(source: Source) -> Header:
         )
 
 
-def read_hdf5(header: Header, box: Box) -> NDArray[Any]:
+def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     """Voxels of ``box`` alone, indexed x, y, z."""
     window = tuple(slice(a, b) for a, b in zip(*box, strict=True))
     item = header.source.item or 0

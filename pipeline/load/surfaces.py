@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load import LoadError
+from pipeline.load.geometry import refused
 
+RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 _TYPES = {
     "Float32": "f4", "Float64": "f8", "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2",
     "Int32": "i4", "UInt32": "u4", "Int64": "i8", "UInt64": "u8",
@@ -30,10 +31,6 @@ class Shapes:
     triangles: NDArray[np.int64]
     lines: tuple[NDArray[np.int64], ...] = ()
     ras: bool = False
-
-
-def _bad(path: Path, got: str, allowed: str, do: str) -> LoadError:
-    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
 
 
 def _is_ras(text: bytes) -> bool:
@@ -83,13 +80,13 @@ class _Vtp:
         try:
             self.root = ET.fromstring(raw)
         except ET.ParseError as error:
-            raise _bad(path, f"broken XML ({error})", "a VTK PolyData file", "write it again") from error
+            raise refused(path, f"broken XML ({error})", "a VTK PolyData file", "write it again") from error
         order = "<" if self.root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
         self.header = order + ("Q" if self.root.get("header_type") == "UInt64" else "I")
         self.compressed = bool(self.root.get("compressor"))
         if self.compressed and "ZLib" not in str(self.root.get("compressor")):
             got = f"compressor {self.root.get('compressor')}"
-            raise _bad(path, got, "vtkZLibDataCompressor or none", "save it uncompressed")
+            raise refused(path, got, "vtkZLibDataCompressor or none", "save it uncompressed")
 
     def array(self, node: ET.Element) -> NDArray[Any]:
         """One DataArray, flat."""
@@ -123,7 +120,9 @@ def read_vtp(path: Path) -> Shapes:
     piece = file.root.find("./PolyData/Piece")
     node = None if piece is None else piece.find("./Points/DataArray")
     if piece is None or node is None:
-        raise _bad(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
+        raise refused(
+            path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData"
+        )
     points = file.array(node).astype(np.float64).reshape(-1, 3)
     fans = [
         np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
@@ -145,6 +144,6 @@ def read_stl(path: Path) -> Shapes:
         found = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", raw)
         corners = np.array(found, dtype=float).reshape(-1, 3)
     if len(corners) == 0 or len(corners) % 3:
-        raise _bad(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
+        raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
     points, index = np.unique(corners, axis=0, return_inverse=True)
     return Shapes(points, index.reshape(-1, 3).astype(np.int64), (), _is_ras(raw))

@@ -2,65 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.arrays.motion import Motion
 from pipeline.arrays.resample import sampled
-from pipeline.load import Box, Header, scans
-from pipeline.load.config import LoadConfig
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
-from pipeline.run.frame import Frame
-from pipeline.trace.config import TraceConfig
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where frames belong: ``anchor`` None where there is nothing to register to, and ``reason`` says why."""
+    """Where frames belong: ``anchor`` None where there is nothing to register to, and ``reason`` says why.
 
-    lumen: Lumen
-    box: Box
-    load: LoadConfig
-    trace: TraceConfig
+    skip_voxels : a phantom that moved by less than this everywhere is taken not to have moved.
+    """
+
     anchor: Anchor | None
+    skip_voxels: float
     reason: str = ""
 
 
 def place_of(
-    lumen: Lumen, box: Box, reference: Volume | None, load: LoadConfig, trace: TraceConfig, own_curves: bool
+    lumen: Lumen, reference: Volume | None, skip_voxels: float, *, switched_on: bool, own_curves: bool
 ) -> Place:
-    """The place of a case's frames; reference : the wire-free scan's crop of ``box``."""
-    reason = ""
+    """The place of a case's frames. reference : the wire-free scan, at least the box that holds the lumen."""
     if own_curves:
-        reason = "no registration applied: the curves are the manifest's own, taken to lie where the reference does"
-    elif trace.register == "off":
-        reason = "no registration applied: switched off (trace.register)"
+        reason = "the curves are the manifest's own, taken to lie where the reference does"
+    elif not switched_on:
+        reason = "switched off (trace.register)"
     elif reference is None:
-        reason = "no registration applied: no reference scan; frames are taken to lie where frame 0 does"
-    to = anchor(reference, lumen) if reference is not None and not reason else None
-    return Place(lumen, box, load, trace, to, reason)
+        reason = "no reference scan; frames are taken to lie where frame 0 does"
+    else:
+        return Place(anchor(reference, lumen), skip_voxels)
+    return Place(None, skip_voxels, f"no registration applied: {reason}")
 
 
-def put_in_place(frame: Volume, header: Header, place: Place) -> tuple[Volume, Volume, Registration | None]:
+def put_in_place(
+    frame: Volume, place: Place, read_moved: Callable[[Motion], Volume]
+) -> tuple[Volume, Volume, Registration | None]:
     """The frame to trace, the frame to look at, and how it lay.
 
-    The first keeps its grey values and has the geometry that it would have had the phantom not moved; it is read anew
-    where the moved lumen asks for other voxels. The second is interpolated onto the reference's lattice.
+    The first keeps its grey values and has the geometry that it would have had the phantom not moved; ``read_moved``
+    reads the voxels that the moved lumen asks for. The second is interpolated onto the reference's lattice.
     """
-    if place.anchor is None:
-        return frame, frame, None
-    found = register(frame, place.anchor, place.trace.register_skip_voxels)
-    if not found.applied:
+    found = None if place.anchor is None else register(frame, place.anchor, place.skip_voxels)
+    if found is None or not found.applied:
         return frame, frame, found
-    box = scans.lumen_box(header, place.lumen, found.motion)
-    moved = frame if box == place.box else scans.load_crop(header, box, place.load)
-    here = found.motion.undone(moved)
-    shown = sampled(here, frame, float(frame.values.min()))
-    return (
-        here,
-        Volume(shown.values, shown.spacing_mm, shown.origin_mm, shown.direction, frame.assumed),
-        found,
-    )
+    here = found.motion.undone(read_moved(found.motion))
+    grid = sampled(here, frame, float(frame.values.min()))
+    shown = Volume(grid.values, grid.spacing_mm, grid.origin_mm, grid.direction, frame.assumed)
+    return here, shown, found
 
 
 def counters_of(found: Registration | None) -> dict[str, float]:
@@ -70,19 +63,22 @@ def counters_of(found: Registration | None) -> dict[str, float]:
     return {"registration_applied": found.applied, "registration_skipped": not found.applied}
 
 
-def said(place: Place, frames: list[Frame]) -> tuple[list[str], list[str]]:
-    """Assumptions and warnings of the report: skipped frames in one sentence, registered ones one by one."""
+def said(place: Place, found: Mapping[int, Registration | None]) -> tuple[list[str], list[str]]:
+    """Assumptions and warnings of the report: skipped frames in one sentence, registered ones one by one.
+
+    found : of each frame, by its number.
+    """
     if place.anchor is None:
         return [place.reason], []
-    known = [(f.index, f.registration) for f in frames if f.registration is not None]
+    known = [(n, r) for n, r in found.items() if r is not None]
     still = [(r.moved_voxels, n) for n, r in known if not r.applied and r.trusted]
     texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied]
     if still:
         most, where = max(still)
         texts.insert(
             0,
-            f"no registration applied to {len(still)} of {len(frames)} frames: the phantom moved {most:.2f} voxel at "
-            f"most (frame {where}), below trace.register_skip_voxels = {place.trace.register_skip_voxels}",
+            f"no registration applied to {len(still)} of {len(found)} frames: the phantom moved {most:.2f} voxel at "
+            f"most (frame {where}), below trace.register_skip_voxels = {place.skip_voxels}",
         )
     return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted]
 
@@ -91,12 +87,6 @@ def record(found: Registration | None) -> dict[str, Any] | None:
     """The transform of one frame for result.json: reference -> frame, p -> rotation @ p + shift (LPS mm)."""
     if found is None:
         return None
-    return {
-        "applied": found.applied,
-        "moved_voxels": found.moved_voxels,
-        "left_voxels": found.left_voxels,
-        "centre_shift_mm": found.centre_shift_mm,
-        "angle_deg": found.motion.angle_deg,
-        "rotation": found.motion.rotation,
-        "shift_mm": found.motion.shift_mm,
-    }
+    names = ("applied", "moved_voxels", "left_voxels", "centre_shift_mm")
+    motion = {name: getattr(found.motion, name) for name in ("angle_deg", "rotation", "shift_mm")}
+    return {name: getattr(found, name) for name in names} | motion

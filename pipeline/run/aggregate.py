@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline.compare.pooled import intervals, pooled_rms
-from pipeline.run import results
+from pipeline.compare.pooled import counts, intervals, pooled_rms
+from pipeline.model import Array
+from pipeline.run.results import Result, found_results, write_json
 from reports import tables
-from reports.schema import FAILURES_COLUMNS, SUMMARY_COLUMNS, names
+from reports.schema import FAILURES, POINTS, SUMMARY, Table
+
+DRAWS = 2000
+"""Resamples behind the interval over groups."""
 
 
 @dataclass(frozen=True)
 class Totals:
-    """The numbers of the last line."""
+    """The numbers of the last line. Errors are those of all points of the frames that count."""
 
     cases: int
     cases_ok: int
@@ -33,34 +37,39 @@ class Totals:
         return self.cases > 0 and self.cases_ok == self.cases
 
 
-def found_results(out: Path) -> list[dict[str, Any]]:
-    """result.json of every case below OUT, by id."""
-    paths = sorted((out / "cases").glob("*/result.json"))
-    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
+    """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
+    found = found_results(out)
+    rows = [result.summary for result in found]
+    tables.write(out / "summary.csv", SUMMARY, [_only(row, SUMMARY) for row in rows])
+    failures = [row for result in found for row in result.failures]
+    tables.write(out / "failures.csv", FAILURES, [_only(row, FAILURES) for row in failures])
+    errors = [_point_errors(out, result) for result in found]
+    if run_info is not None:
+        info = {"cases": [result.case for result in found], "overall": overall(found, errors)}
+        write_json(out / name, run_info | info)
+    points = np.concatenate(errors) if errors else np.zeros(0)
+    return Totals(
+        len(rows),
+        sum(result.ok for result in found),
+        sum(row["frames"] for row in rows),
+        sum(row["frames_ok"] for row in rows),
+        float(np.median(points)) if points.size else float("nan"),
+        float(np.percentile(points, 95)) if points.size else float("nan"),
+        sum(row.get("simulate_s") or 0.0 for row in rows),
+    )
 
 
-def _only(row: dict[str, Any], columns: Any) -> dict[str, Any]:
-    allowed = set(names(columns))
-    return {k: v for k, v in row.items() if k in allowed}
+def overall(found: Sequence[Result], errors: Sequence[Array], draws: int = DRAWS) -> dict[str, Any]:
+    """Pooled error of the validation cases, with an interval from resampling whole groups (three or more of them).
 
-
-def _point_errors(out: Path, case: str) -> Any:
-    path = out / "cases" / case / "points.csv.gz"
-    return tables.read_points(path)["error_mm"].to_numpy() if path.exists() else np.zeros(0)
-
-
-def overall(out: Path, found: list[dict[str, Any]], draws: int = 2000) -> dict[str, Any]:
-    """Pooled error of the validation cases, with an interval from resampling whole groups (three or more of them)."""
-    rows, groups = [], []
-    for result in found:
-        row = result["summary"]
-        errors = _point_errors(out, result["case"])
-        if row.get("role", "validation") == "validation" and errors.size:
-            rows.append((errors.size, float(np.sum(errors**2))))
-            groups.append(row.get("group") or result["case"])
-    if not rows:
+    errors : of each result, its point errors (n,) of frames that count.
+    """
+    used = [(r, mm) for r, mm in zip(found, errors, strict=True) if r.role == "validation" and mm.size]
+    if not used:
         return {}
-    table = np.array(rows)
+    table = np.array([(mm.size, float(np.sum(mm**2))) for _, mm in used])
+    groups = [result.group or result.case for result, _ in used]
     units = [np.flatnonzero([g == name for g in groups]) for name in dict.fromkeys(groups)]
     (low, high), *_ = intervals(table, units, (pooled_rms,), draws)
     return {
@@ -68,28 +77,21 @@ def overall(out: Path, found: list[dict[str, Any]], draws: int = 2000) -> dict[s
         "rms_low_mm": low,
         "rms_high_mm": high,
         "groups": len(units),
-        "cases": len(rows),
+        "cases": len(used),
     }
 
 
-def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
-    """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
-    found = found_results(out)
-    rows = [result["summary"] for result in found]
-    tables.write_summary(out / "summary.csv", [_only(row, SUMMARY_COLUMNS) for row in rows])
-    failures = [row for result in found for row in result["failures"]]
-    tables.write_failures(out / "failures.csv", [_only(row, FAILURES_COLUMNS) for row in failures])
-    if run_info is not None:
-        info = run_info | {"cases": [row["case"] for row in rows], "overall": overall(out, found)}
-        results.write_json(out / name, info)
-    errors = [_point_errors(out, row["case"]) for row in rows]
-    points = np.concatenate(errors) if errors else np.zeros(0)
-    return Totals(
-        len(rows),
-        sum(row["status"] == "ok" for row in rows),
-        sum(row["frames"] for row in rows),
-        sum(row["frames_ok"] for row in rows),
-        float(np.median(points)) if points.size else float("nan"),
-        float(np.percentile(points, 95)) if points.size else float("nan"),
-        sum(row.get("simulate_s") or 0.0 for row in rows),
-    )
+def _point_errors(out: Path, result: Result) -> Array:
+    """Point errors (n,) of the frames of a case that count, mm."""
+    path = out / "cases" / result.case / "points.csv.gz"
+    if not path.exists():
+        return np.zeros(0)
+    points = tables.read(path, POINTS)
+    frame, error = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
+    good = [entry["frame"] for entry in result.frames if counts(entry, error[frame == entry["frame"]])]
+    return np.asarray(error[np.isin(frame, good)])
+
+
+def _only(row: dict[str, Any], table: Table) -> dict[str, Any]:
+    """The values of a row that a table has a column for: result files may come from another version."""
+    return {name: value for name, value in row.items() if name in table.names}

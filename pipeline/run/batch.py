@@ -1,81 +1,120 @@
-"""Many cases: sharding, an executor seam, and a worker's death costing one case.
+"""Many jobs on one machine or on a cluster; whatever becomes of one of them, the others go on.
 
-Any ``concurrent.futures.Executor`` will do; locally a process pool, elsewhere ``dask.distributed``'s. A case writes
-its own folder and nobody writes to a shared file, so shards on different machines merge with ``cp -r``.
+Every executor gives the same outcomes. A job that took its worker with it is run once more after all the others, alone;
+a second death names it.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+import threading
+import traceback
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
-from pipeline.run import results
-from pipeline.run.case import Job, run_case
-
+J = TypeVar("J")
 THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
     "NUMBA_NUM_THREADS",
     "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS",
 )
+LOST = "the worker process was killed (out of memory?); run this case alone with -j 1"
 
 
-def shard_of(ids: Sequence[str], index: int, count: int) -> list[str]:
-    """Cases of shard ``index`` (1-based) of ``count``: every count-th of the sorted ids."""
-    return sorted(ids)[index - 1 :: count]
+@dataclass(frozen=True)
+class Outcome(Generic[J]):
+    """What became of a job: done, or crashed with an error (its traceback in ``log``), or lost with its worker."""
+
+    job: J
+    error: str = ""
+    log: str = ""
+
+    @property
+    def done(self) -> bool:
+        """It ended as it should."""
+        return not self.error
 
 
-def run_jobs(jobs: Sequence[Job], workers: int, address: str = "") -> None:
-    """Run all jobs; with one worker in this process, else in a pool, or on a dask cluster at ``address``."""
-    if address:
-        _run_on_cluster(jobs, address)
-    elif workers == 1 or len(jobs) < 2:
-        for job in jobs:
-            _guarded(job)
-    else:
-        _run_in_pool(jobs, workers)
+def run_all(
+    jobs: Sequence[J], work: Callable[[J], Any], workers: int = 1, address: str = ""
+) -> Iterator[Outcome[J]]:
+    """Run ``work`` on every job, yielding outcomes as they come.
+
+    With one worker in this process, else in as many processes, or on the dask cluster at ``address``.
+    """
+    if not address and (workers == 1 or len(jobs) < 2):
+        yield from (guarded(work, job) for job in jobs)
+        return
+    with _cluster(address) if address else OneEach(min(workers, len(jobs))) as executor:
+        lost = yield from _collected(executor, jobs, work)
+        for job in lost:
+            again = yield from _collected(executor, [job], work)
+            yield from (Outcome(each, LOST, LOST) for each in again)
 
 
-def _guarded(job: Job) -> None:
-    """A bug in one case must not take the batch along: it becomes that case's failure, with the traceback logged."""
+def guarded(work: Callable[[J], Any], job: J) -> Outcome[J]:
+    """Run one job; an error becomes its outcome, since it must not take the batch along."""
     try:
-        run_case(job)
+        work(job)
     except Exception as error:
-        record_crash(job, f"{type(error).__name__}: {error}", error)
+        return Outcome(job, f"{type(error).__name__}: {error}", traceback.format_exc())
+    return Outcome(job)
 
 
-def record_crash(job: Job, reason: str, error: BaseException | None = None) -> None:
-    """Write the result of a case that could not be finished."""
-    import traceback
+def _collected(
+    executor: Executor, jobs: Sequence[J], work: Callable[[J], Any]
+) -> Generator[Outcome[J], None, list[J]]:
+    """Yield the outcomes of jobs and return those whose worker died."""
+    futures: dict[Future[Outcome[J]], J] = {executor.submit(guarded, work, job): job for job in jobs}
+    lost: list[J] = []
+    for future in as_completed(futures):
+        # ``guarded`` raises nothing: what comes here is the end of a worker, under the name that its executor gives it
+        if future.exception() is None:
+            yield future.result()
+        else:
+            lost.append(futures[future])
+    return lost
 
-    job.folder.mkdir(parents=True, exist_ok=True)
-    with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
-        handle.write("".join(traceback.format_exception(error)) if error else reason + "\n")
-    status = "crashed"
-    sentence = "the case ended in an unexpected error; its log has the traceback"
-    row: dict[str, Any] = {
-        "case": job.case.id,
-        "group": job.case.group,
-        "role": job.case.role,
-        "status": status,
-    }
-    count = job.case.frame_count
-    row |= {"frames": count, "frames_ok": 0, "frames_failed": count}
-    failure = {"case": job.case.id, "status": status, "sentence": sentence, "message": reason}
-    failure["log"] = f"cases/{job.case.id}/log.txt"
-    result = {
-        "schema": 1,
-        "case": job.case.id,
-        "status": status,
-        "sentence": sentence,
-        "frames": [],
-        "summary": row,
-    }
-    results.write_json(job.folder / "result.json", result | {"failures": [failure], "key": ""})
+
+class OneEach(Executor):
+    """Worker processes that die alone: each is a pool of one, which is replaced when its process has died."""
+
+    def __init__(self, workers: int) -> None:
+        self._lanes = ThreadPoolExecutor(workers)
+        self._own = threading.local()
+        self._pools: list[ProcessPoolExecutor] = []
+
+    def submit(self, work: Callable[..., Any], /, *args: Any, **named: Any) -> Future[Any]:
+        """As of any executor; a future raises BrokenProcessPool where its worker has died."""
+        return self._lanes.submit(self._in_process, work, *args, **named)
+
+    def _in_process(self, work: Callable[..., Any], *args: Any, **named: Any) -> Any:
+        pool: ProcessPoolExecutor | None = getattr(self._own, "pool", None)
+        if pool is None:
+            context = multiprocessing.get_context("forkserver")
+            pool = self._own.pool = ProcessPoolExecutor(1, context, initializer=_single_thread)
+            self._pools.append(pool)
+        try:
+            return pool.submit(work, *args, **named).result()
+        except BrokenProcessPool:
+            self._own.pool = None
+            raise
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the workers; jobs that have not begun are dropped where asked."""
+        self._lanes.shutdown(wait, cancel_futures=cancel_futures)
+        for pool in self._pools:
+            pool.shutdown(wait, cancel_futures=cancel_futures)
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """After an error or an interruption what has not begun is dropped."""
+        self.shutdown(cancel_futures=kind is not None)
 
 
 def _single_thread() -> None:
@@ -84,42 +123,10 @@ def _single_thread() -> None:
         os.environ[name] = "1"
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    context = multiprocessing.get_context("forkserver")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_single_thread)
-
-
-def _run_in_pool(jobs: Sequence[Job], workers: int) -> None:
-    """All jobs in one pool; when a worker dies the pool breaks, and what was left runs again, each job alone."""
-    left = {job.case.id: job for job in jobs}
-    with _pool(min(workers, len(jobs))) as pool:
-        _collect(pool, _by_size(jobs), left)
-    for job in list(left.values()):
-        with _pool(1) as alone:
-            _collect(alone, [job], left)
-        if job.case.id in left:
-            record_crash(job, "the worker process was killed (out of memory?); run this case alone with -j 1")
-
-
-def _by_size(jobs: Sequence[Job]) -> list[Job]:
-    """Longest first, so that no long case is left for the end."""
-    return sorted(jobs, key=lambda job: -job.case.frame_count)
-
-
-def _collect(pool: Executor, jobs: Sequence[Job], left: dict[str, Job]) -> None:
-    futures: dict[Any, Job] = {}
-    try:
-        futures = {pool.submit(_guarded, job): job for job in jobs}
-        for future in as_completed(futures):
-            future.result()
-            left.pop(futures[future].case.id, None)
-    except BrokenProcessPool:
-        return
-
-
-def _run_on_cluster(jobs: Sequence[Job], address: str) -> None:
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    """The executor of the dask scheduler at an address."""
     from distributed import Client
 
     with Client(address) as client:
-        left = {job.case.id: job for job in jobs}
-        _collect(client.get_executor(), _by_size(jobs), left)
+        yield client.get_executor()

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
 import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import solver
-from pipeline.compare.pooled import case_row
-from pipeline.run import results
-from pipeline.run.cache import WHOLE, Store, code_of, file_hash
+from pipeline.run import results, rows, views
+from pipeline.run.keys import digest
+from pipeline.run.log import Log, Stage
 from pipeline.run.progress import CaseProgress
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
-from pipeline.run.stages import CaseRun, Stage, run_stages
-from pipeline.study.manifest import Case
+from pipeline.run.stages import Context, Known, run_stages
+from pipeline.run.store import Store
+from pipeline.study.schema import Case
 from pipeline.study.settings import Resolved
+from reports import tables
 from reports.html import render_case
+from reports.schema import ERRORS, POINTS
 from solver import warm_up
-
-PATHS = ("reference", "frames", "lumen", "traces", "parameters", "truth")
+from solver._compile import hash_of
 
 
 @dataclass(frozen=True)
@@ -45,35 +45,62 @@ class Job:
         """Where the case's files go."""
         return self.out / "cases" / self.case.id
 
-
-def inputs_of(case: Case) -> list[Path]:
-    """Every file or folder that a case reads."""
-    sources = [s for s in (case.reference, *case.frames, case.lumen) if s is not None]
-    paths = [s.path for s in sources] + [p for p in (*case.traces, case.parameters, case.truth) if p]
-    return list(dict.fromkeys(paths))
-
-
-def job_key(job: Job) -> str:
-    """What the result depends on: the case without its paths, the settings, the inputs' contents, the version."""
-    described = {f.name: str(getattr(job.case, f.name)) for f in fields(job.case) if f.name not in PATHS}
-    contents = [file_hash(p) for p in inputs_of(job.case) if p.exists()]
-    text = json.dumps(
-        [described, repr(job.settings.config), contents, job.until, package_version(), code_of(WHOLE)],
-        sort_keys=True,
-    )
-    return hashlib.sha256(text.encode()).hexdigest()
+    @property
+    def key(self) -> str:
+        """What the result depends on: the case, its files' contents, the settings, the code."""
+        inputs = (self.case, self.settings.config, self.until, package_version(), hash_of(Path(__file__)))
+        return hashlib.sha256(digest(inputs).encode()).hexdigest()
 
 
-def finished(job: Job, key: str) -> dict[str, Any] | None:
-    """The result on disk where it is complete and its key is the same; else None."""
+def finished(job: Job, key: str) -> bool:
+    """Whether the result on disk is complete, ok and made from the same."""
     path = job.folder / "result.json"
     if job.fresh or not path.exists():
-        return None
+        return False
     try:
-        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        return None
-    return result if result.get("key") == key and result.get("status") == "ok" else None
+        result = results.read_result(path)
+    except (ValueError, KeyError):
+        return False
+    return result.key == key and result.ok
+
+
+def run_case(job: Job) -> None:
+    """Run one case. Whatever happens to it is in its folder, never an exception (but bugs)."""
+    key = job.key
+    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
+    if finished(job, key):
+        progress("compare", 1, 1, "unchanged since the last run, kept")
+        if job.embed and job.pictures:
+            render_case(job.folder, embed=True)
+        return
+    (job.folder / "result.json").unlink(missing_ok=True)
+    if job.until in ("simulate", "compare", "report"):
+        load_kernels(progress)
+    clock = perf_counter()
+    log = Log(progress)
+    known = run_stages(Context(job.case, job.settings.config, Store(job.cache), log), job.until)
+    progress.close()
+    _write(job, known, log, key, clock)
+    if job.pictures and job.until == "report":
+        render_case(job.folder, embed=job.embed)
+    progress.write(f"done in {perf_counter() - clock:.2f} s")
+
+
+def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
+    """Every file of the case; result.json last, since it says that the case is complete."""
+    case = rows.rows_of(job.case, known, log, job.settings.config.compare.bootstrap)
+    tables.write(job.folder / ERRORS.file, ERRORS, case.errors)
+    points = rows.point_columns(known.frames)
+    if points:
+        tables.write(job.folder / POINTS.file, POINTS, points)
+    views.write_frames(job.folder / "frames.h5", known)
+    if job.pictures:
+        views.write_view(job.folder / "view", known)
+    details = results.details_of(job.case, known, log)
+    details |= {"config": job.settings.as_dict(), "provenance": collect()}
+    result = results.result_of(job.case, known, case, key, details)
+    result.summary["total_s"], result.summary["peak_memory_MiB"] = perf_counter() - clock, peak_memory_mib()
+    result.write(job.folder)
 
 
 @functools.cache
@@ -89,27 +116,3 @@ def load_kernels(progress: CaseProgress) -> None:
     if not cached:
         progress.say("compiling the solver, once per installation: about half a minute")
     progress.write(f"kernels ready in {_kernels_loaded():.2f} s")
-
-
-def run_case(job: Job) -> str:
-    """Run one case; returns its id. Whatever happens to it is in its folder, never an exception (but bugs)."""
-    key = job_key(job)
-    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
-    if finished(job, key) is not None:
-        progress("compare", 1, 1, "unchanged since the last run, kept")
-        return job.case.id
-    (job.folder / "result.json").unlink(missing_ok=True)
-    run = CaseRun(job.case, job.settings.config, Store(job.cache), progress, job.until)
-    if run.wants("simulate"):
-        load_kernels(progress)
-    clock = perf_counter()
-    run_stages(run)
-    progress.close()
-    row = case_row(run, perf_counter() - clock, peak_memory_mib())
-    results.write_tables(job.folder, run, view=job.pictures)
-    extra = {"key": key, "failures": results.failure_rows(run), "summary": row, "provenance": collect()}
-    results.write_json(job.folder / "result.json", results.result_of(run, row, job.settings.as_dict(), extra))
-    if job.pictures and run.wants("report"):
-        render_case(job.folder, embed=job.embed)
-    progress.write(f"done in {perf_counter() - clock:.2f} s")
-    return job.case.id

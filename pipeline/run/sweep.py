@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.run.aggregate import found_results
 from pipeline.run.case import Job
+from pipeline.run.results import Result, found_results
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
-
-COPIED = ("rms_mm", "tip_median_mm", "truth_rms_mm", "skill", "frames_ok")
+from reports.schema import SWEEP
 
 
 @dataclass(frozen=True)
@@ -57,10 +56,9 @@ def write_sweep(out: Path, points: Sequence[Point]) -> None:
     rows = [_row("(plain)", "", result) for result in found_results(out)]
     for point in points:
         rows += [_row(point.parameter, point.value, r) for r in found_results(out / "sweep" / point.folder)]
-    tables.write_sweep(out / "sweep.csv", rows)
+    tables.write(out / "sweep.csv", SWEEP, rows)
 
 
-def _row(parameter: str, value: str, result: dict[str, Any]) -> dict[str, Any]:
-    summary = result["summary"]
-    kept = {name: summary.get(name) for name in COPIED}
-    return {"parameter": parameter, "value": value, "case": result["case"], **kept}
+def _row(parameter: str, value: str, result: Result) -> dict[str, Any]:
+    own = {"parameter": parameter, "value": value, "case": result.case}
+    return {name: result.summary.get(name) for name in SWEEP.names} | own

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.ranges import Count, NonNegative, Positive, Share, Vector
 
 
 @dataclass(frozen=True)
 class SegmentConfig:
     """Fuzzy connectedness and the lumen surface."""
 
-    threshold: float = 0.6
+    threshold: Share = 0.6
     """Strength of connectedness, 0 to 1, from which a voxel belongs to the lumen."""
-    homogeneity_sigma: float | None = None
+    homogeneity_sigma: Positive | None = None
     """Spread of the homogeneity affinity, grey values; estimated at the seeds when not given."""
-    feature_sigma: float | None = None
+    feature_sigma: Positive | None = None
     """Spread of the object-feature affinity, grey values; estimated at the seeds when not given."""
-    adjacency: int = 6
+    adjacency: Literal[6, 26] = 6
     """Neighbours of a voxel: 6 (faces) or 26."""
-    scale: int | None = None
+    scale: Count | None = None
     """Voxels on either side over which grey is averaged before affinities are taken; from the noise when not given."""
-    other_seeds_mm: tuple[tuple[float, float, float], ...] = ()
+    other_seeds_mm: tuple[Vector, ...] = ()
     """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: cut off at the weakest link."""
-    margin_mm: float = 5.0
+    margin_mm: NonNegative = 5.0
     """Room around the vessel in the box that holds its signed distance."""
-    outer_mm: float = 3.0
+    outer_mm: Positive = 3.0
     """How far outside the wall the distance is exact."""
-    least_voxels: int = 200
+    least_voxels: Count = 200
     """A smaller connected region is no lumen."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
 from pipeline.load import LoadError, load, read_header
-from pipeline.load.curves import RAS_TO_LPS, Branches, read_markups_branches, read_swc
-from pipeline.load.surfaces import Shapes, read_stl, read_vtp
+from pipeline.load.centrelines import Branches, read_markups_branches, read_swc
+from pipeline.load.surfaces import RAS_TO_LPS, Shapes, read_stl, read_vtp
 from pipeline.model import Lumen
 from pipeline.segment._kernels.distance import propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.simulate.clamp import Entry, measured_entry
-from pipeline.simulate.replay import guide_wire, rolls, simulate, vessel_wall
+from pipeline.simulate.clamp import measured_clamp
+from pipeline.simulate.replay import insertion_of, simulate
 
-__all__ = ["Entry", "guide_wire", "measured_entry", "rolls", "simulate", "vessel_wall"]
+__all__ = ["insertion_of", "measured_clamp", "simulate"]

@@ -8,27 +8,17 @@ This is a boundary condition, not a fit of the model: nothing beyond ``REACH_MM`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc
-from pipeline.model import Array, Curve
+from pipeline.model import Array, Clamp, Curve
 
 REACH_MM = 8.0
 """Length of wire behind the entry that is used: long against the trace's error, short against a vessel's bend."""
 SKIPPED_MM = 0.5  # the trace's own end lies here
 FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
-
-
-@dataclass(frozen=True, eq=False)
-class Entry:
-    """The clamp: entry_mm (3,), direction (3,) unit, and the sentence for the report."""
-
-    entry_mm: Array
-    direction: Array
-    note: str = ""
-    warning: str = ""
 
 
 def _start(curve: Curve) -> tuple[Array, Array]:
@@ -39,12 +29,11 @@ def _start(curve: Curve) -> tuple[Array, Array]:
     return coefficients[0], coefficients[1] / np.linalg.norm(coefficients[1])
 
 
-def measured_entry(curves: Sequence[Curve], entry_mm: Array, direction: Array) -> Entry:
-    """The clamp from the traced wires: medians over frames; the manifest's where they are too short or too far off.
+def measured_clamp(curves: Sequence[Curve], given: Clamp) -> Clamp:
+    """The clamp from the traced wires: medians over frames; the given one where they are too short or too far off.
 
-    curves : traced wires whose status is ok.     entry_mm, direction : (3,), as the manifest has them.
+    curves : traced wires that are to be trusted.     given : the clamp as the manifest has it.
     """
-    given = Entry(np.asarray(entry_mm, float), np.asarray(direction, float))
     starts = [_start(curve) for curve in curves if curve.length_mm > REACH_MM + 1.0]
     if not starts:
         return given
@@ -52,18 +41,17 @@ def measured_entry(curves: Sequence[Curve], entry_mm: Array, direction: Array) -
     tangent = np.median([t for _, t in starts], axis=0)
     tangent /= np.linalg.norm(tangent)
     moved = float(np.linalg.norm(point - given.entry_mm))
-    turned = float(
-        np.degrees(np.arctan2(np.linalg.norm(np.cross(tangent, given.direction)), tangent @ given.direction))
-    )
+    sine = float(np.linalg.norm(np.cross(tangent, given.direction)))
+    turned = float(np.degrees(np.arctan2(sine, tangent @ given.direction)))
     offset = f"{moved:.2f} mm and {turned:.1f} degrees from the manifest's"
     if moved > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
             f"the traced wires start {offset} (accepted: {FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the "
             "manifest's entry was kept: check entry_mm and entry_direction"
         )
-        return Entry(given.entry_mm, given.direction, warning=warning)
+        return replace(given, warning=warning)
     note = (
         f"the clamp was measured in the scans: median over {len(starts)} frames of the first {REACH_MM:g} mm of the "
         f"traced wire, {offset} entry (simulate.entry = manifest switches this off)"
     )
-    return Entry(point, tangent, note)
+    return replace(given, entry_mm=point, direction=tangent, note=note)

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.ranges import Finite, Positive, PositiveCount
 
 
 @dataclass(frozen=True)
 class SolverConfig:
     """The energy minimisation."""
 
-    method: str = "newton"
-    """newton or closed_form."""
-    segment_mm: float = 1.0
+    method: Literal["newton", "closed_form"] = "newton"
+    """newton, or the seed's closed_form."""
+    segment_mm: Positive = 1.0
     """Length of the wire's rigid segments."""
-    hull: str = "offset"
+    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d*)$")] = "offset"
     """offset (the smooth limit) or samples:N."""
-    tolerance: float = 1e-9
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
-    max_iterations: int = 200
+    max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""
-    step_mm: float = 1.0
+    step_mm: Positive = 1.0
     """Longest insertion step; shortened where the scene asks for it."""
-    initial: str = "slide"
+    initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
 
 
@@ -29,13 +34,13 @@ class SolverConfig:
 class SimulateConfig:
     """What is simulated."""
 
-    depth: str = "traced"
+    depth: Literal["traced", "manifest"] = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
-    entry: str = "traced"
+    entry: Literal["traced", "manifest"] = "traced"
     """traced (the clamp is measured in the first 8 mm of the traced wires) or manifest (taken as written)."""
-    bending_scale: float = 1.0
+    bending_scale: Positive = 1.0
     """Factor on the wire's bending stiffness, for sensitivity runs."""
-    wall_scale: float = 1.0
+    wall_scale: Positive = 1.0
     """Factor on the wall stiffness, for sensitivity runs."""
-    roll_offset_deg: float = 0.0
+    roll_offset_deg: Finite = 0.0
     """Added to the roll of every frame, for sensitivity runs."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import LoadError
+from pipeline.load import LoadError, Source
 from pipeline.load.scans import Scans, read_headers
 from pipeline.load.truth import read_truth
-from pipeline.run.case import inputs_of
 from pipeline.study.config import Config
-from pipeline.study.manifest import Case, Manifest
+from pipeline.study.schema import Case, not_one_per_frame
+
+
+def check(cases: Sequence[Case], config: Config) -> list[str]:
+    """Problems of all cases, each with its case's id."""
+    return [f"case {case.id!r}: {text}" for case in cases for text in check_case(case, config)]
 
 
 def check_case(case: Case, config: Config) -> list[str]:
@@ -20,21 +25,33 @@ def check_case(case: Case, config: Config) -> list[str]:
     if problems:
         return problems
     try:
-        scans = read_headers(case, config.load)
+        scans = read_headers(case.reference, case.frames, config.load, case.spacing_mm)
     except LoadError as error:
         return [str(error)]
-    problems += _entry_problems(case, scans)
     count = len(scans.frames) or case.frame_count
-    for name in ("insertion_mm", "roll_deg"):
-        values = getattr(case, name)
-        if isinstance(values, tuple) and len(values) != count:
-            problems.append(f"{name} has {len(values)} entries for {count} frames; give one per frame")
+    problems += _entry_problems(case, scans)
+    problems += not_one_per_frame({"insertion_mm": case.insertion_mm, "roll_deg": case.roll_deg}, count)
     if case.truth:
         try:
             read_truth(case.truth, count)
         except LoadError as error:
             problems.append(str(error))
     return problems
+
+
+def inputs_of(case: Case) -> list[Path]:
+    """Every file or folder that a case names, once."""
+    return list(dict.fromkeys(path for _, value in case for path in _paths_in(value)))
+
+
+def _paths_in(value: object) -> Iterator[Path]:
+    if isinstance(value, Source):
+        yield value.path
+    elif isinstance(value, Path):
+        yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _paths_in(item)
 
 
 def _entry_problems(case: Case, scans: Scans) -> list[str]:
@@ -56,9 +73,3 @@ def _entry_problems(case: Case, scans: Scans) -> list[str]:
                     "is the point in RAS, or in voxels?"
                 )
     return list(dict.fromkeys(problems))
-
-
-def check(manifest: Manifest, config: Config, only: Sequence[str] = ()) -> list[str]:
-    """Problems of all cases, each with its case's id."""
-    chosen = [case for case in manifest.cases if not only or case.id in only]
-    return [f"case {case.id!r}: {text}" for case in chosen for text in check_case(case, config)]

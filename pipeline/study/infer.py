@@ -11,7 +11,7 @@ from scipy import ndimage
 from pipeline.load import LoadError, load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.model import Array, Volume
-from pipeline.study.manifest import natural_key
+from pipeline.study.schema import natural_key
 
 SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")

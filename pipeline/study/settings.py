@@ -102,7 +102,7 @@ def _applied(config: Config, setting: Setting) -> Config:
     if table not in tables:
         raise SettingsError([f"{setting.source}: no table {table!r}; {did_you_mean(table, tables)}"])
     current = getattr(config, table)
-    kinds = get_type_hints(type(current))
+    kinds = get_type_hints(type(current), include_extras=True)
     if key not in kinds:
         raise SettingsError([f"{setting.source}: no setting {setting.name!r}; {did_you_mean(key, kinds)}"])
     try:

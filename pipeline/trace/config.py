@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.ranges import Axis, NonNegative, Positive
 
 
 @dataclass(frozen=True)
 class TraceConfig:
     """The wire's centreline."""
 
-    length_tolerance_mm: float = 2.0
+    length_tolerance_mm: NonNegative = 2.0
     """Largest accepted disagreement between the traced length and the manifest's insertion_mm."""
-    ridge_voxels: float = 0.7
+    ridge_voxels: Positive = 0.7
     """Blur (voxels) in which crests are looked for; widened by itself where contrast is low."""
-    longest_gap_mm: float = 5.0
+    longest_gap_mm: NonNegative = 5.0
     """Longest gap between two pieces of wire that is bridged."""
-    rotation_axis: tuple[float, ...] = ()
+    rotation_axis: Axis | tuple[()] = ()
     """Axis (LPS) about which the scanner turned; empty: the scan's third axis, as rotational scans are stored."""
-    in_plane_deg: float = 10.0
+    in_plane_deg: Annotated[float, Field(ge=0, le=90)] = 10.0
     """Points whose tangent is nearer than this to the plane of rotation are flagged: the cone's half angle."""
     register: Literal["auto", "off"] = "auto"
     """auto (frames are registered to the reference scan where the phantom moved) or off."""
-    register_skip_voxels: float = 0.1
+    register_skip_voxels: NonNegative = 0.1
     """A phantom that moved by less than this everywhere on the lumen's wall is taken not to have moved."""

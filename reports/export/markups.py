@@ -41,11 +41,7 @@ def write_markups_curve(
         "labelFormat": "%N-%d",
         "controlPoints": [_control_point(name, i, p) for i, p in enumerate(points, start=1)],
         "measurements": [_measurement(key, values, path) for key, values in (measurements or {}).items()],
-        "display": {
-            "visibility": True,
-            "color": list(colour),
-            "selectedColor": list(colour),
-        },
+        "display": {"visibility": True, "color": list(colour), "selectedColor": list(colour)},
     }
     write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
 

@@ -21,7 +21,6 @@ from reports.export.markups import checked_points
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Cells = Mapping[str, tuple[Index, Index]]
 _TYPES = {"Float64": "<f8", "Int64": "<i8"}
 _LENGTH_BYTES = 8  # header_type UInt64
 
@@ -45,9 +44,8 @@ def write_polyline_vtp(
 ) -> None:
     """Write one polyline through points (n, 3), LPS mm, with arrays (n,) or (n, 3) such as ``error_mm``."""
     points = checked_points(points_mm, path)
-    connectivity = np.arange(len(points))
     offsets = np.array([len(points)] if len(points) else [], dtype=np.int64)
-    _write(path, points, {"Lines": (connectivity, offsets)}, point_arrays or {})
+    _write(path, points, "Lines", (np.arange(len(points)), offsets), point_arrays or {})
 
 
 def write_surface_vtp(
@@ -63,8 +61,7 @@ def write_surface_vtp(
     if faces.ndim != 2 or faces.shape[1] != 3 or not inside:
         msg = f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices"
         raise ValueError(msg)
-    offsets = 3 * np.arange(1, len(faces) + 1)
-    _write(path, vertices, {"Polys": (faces.ravel(), offsets)}, point_arrays or {})
+    _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), point_arrays or {})
 
 
 def read_vtp(path: Path) -> PolyData:
@@ -81,23 +78,22 @@ def read_vtp(path: Path) -> PolyData:
     return PolyData(points, lines, triangles, _arrays(piece, "PointData"))
 
 
-def _write(path: Path, points: Array, cells: Cells, point_arrays: Mapping[str, ArrayLike]) -> None:
-    root = ET.Element(
-        "VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64"
-    )
+def _write(
+    path: Path, points: Array, kind: str, cells: tuple[Index, Index], point_arrays: Mapping[str, ArrayLike]
+) -> None:
+    """Write points and their cells: kind Lines or Polys; cells: vertices of all cells, and where each cell ends."""
+    attributes = {"type": "PolyData", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    root = ET.Element("VTKFile", attributes)
     root.append(ET.Comment(" SPACE=LPS; lengths in mm "))
-    counts = {f"NumberOf{kind}": str(len(offsets)) for kind, (_, offsets) in cells.items()}
-    piece = ET.SubElement(
-        ET.SubElement(root, "PolyData"), "Piece", {"NumberOfPoints": str(len(points)), **counts}
-    )
+    counts = {"NumberOfPoints": str(len(points)), f"NumberOf{kind}": str(len(cells[1]))}
+    piece = ET.SubElement(ET.SubElement(root, "PolyData"), "Piece", counts)
     data = ET.SubElement(piece, "PointData")
     for name, values in point_arrays.items():
         _append(data, name, _checked_array(values, name, len(points), path), "Float64")
     _append(ET.SubElement(piece, "Points"), "Points", points, "Float64")
-    for kind, (connectivity, offsets) in cells.items():
-        block = ET.SubElement(piece, kind)
-        _append(block, "connectivity", connectivity, "Int64")
-        _append(block, "offsets", offsets, "Int64")
+    block = ET.SubElement(piece, kind)
+    for name, indices in zip(("connectivity", "offsets"), cells, strict=True):
+        _append(block, name, indices, "Int64")
     write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
 
 

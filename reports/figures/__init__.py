@@ -1,42 +1,31 @@
-"""Every figure by the name that sections.toml uses; each returns None where its data is absent."""
+"""The figures of every page by name, as sections.toml declares them; each gives None where its data is absent."""
 
+import importlib
+import tomllib
 from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
 
-from reports.case_files import CaseFiles
-from reports.figures._style import Drawing
-from reports.figures.along_wire import contact_along_wire, error_along_wire
-from reports.figures.by_depth import (
-    error_by_depth,
-    forces_by_depth,
-    skill_by_depth,
-    tip_by_depth,
-    truth_by_depth,
-)
-from reports.figures.every_frame import every_frame
-from reports.figures.overview import RunFiles, case_frame_map, cases_by_error
-from reports.figures.projections import failed_projections, projections
-from reports.figures.run_time import run_time
-from reports.figures.simulated import simulated_wires
-from reports.figures.sweep import sensitivity
+from reports.figures._drawing import Drawing
+from reports.figures.run import RunFiles
 
-CASE_FIGURES: Mapping[str, Callable[[CaseFiles], Drawing | None]] = {
-    "error_by_depth": error_by_depth,
-    "projections": projections,
-    "every_frame": every_frame,
-    "failed_projections": failed_projections,
-    "simulated_wires": simulated_wires,
-    "error_along_wire": error_along_wire,
-    "tip_by_depth": tip_by_depth,
-    "skill_by_depth": skill_by_depth,
-    "truth_by_depth": truth_by_depth,
-    "forces_by_depth": forces_by_depth,
-    "contact_along_wire": contact_along_wire,
-    "run_time": run_time,
-}
-RUN_FIGURES: Mapping[str, Callable[[RunFiles], Drawing | None]] = {
-    "case_frame_map": case_frame_map,
-    "cases_by_error": cases_by_error,
-    "sensitivity": sensitivity,
-}
+__all__ = ["CASE_FIGURES", "RUN_FIGURES", "Drawing", "RunFiles", "declared", "figures_of"]
 
-__all__ = ["CASE_FIGURES", "RUN_FIGURES", "Drawing", "RunFiles"]
+
+@cache
+def declared(part: str) -> tuple[Mapping[str, str], ...]:
+    """The entries of sections.toml for a page (case, run or bench) or for the cards of a case, in order."""
+    text = (Path(__file__).parents[1] / "sections.toml").read_text(encoding="utf-8")
+    return tuple(tomllib.loads(text)[part])
+
+
+@cache
+def figures_of(page: str) -> Mapping[str, Callable[[Any], Drawing | None]]:
+    """The functions of a page's figures by name, in the order of sections.toml."""
+    modules = {e["figure"]: importlib.import_module(f"{__name__}.{e['module']}") for e in declared(page)}
+    return {figure: getattr(module, figure) for figure, module in modules.items()}
+
+
+CASE_FIGURES = figures_of("case")
+RUN_FIGURES = figures_of("run")

@@ -1,24 +1,35 @@
-"""The three projection planes: which array axes a picture shows, in mm, and the sheet of panels they fill."""
+"""The three projection planes: which array axes a picture shows, in mm, and what is drawn in a panel of one."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from reports.figures._style import new_figure
-from reports.frames_file import Scan
+from reports.figures._drawing import new_figure
+from reports.figures._style import Look
+from reports.frames_file import FrameArrays, ScanCrop
 
 Array = NDArray[np.float64]
-Plane = tuple[int, int]
-# drawn from left to right: projection axis -> (axis across, axis up)
-PLANES: tuple[tuple[int, Plane], ...] = ((1, (0, 2)), (0, (1, 2)), (2, (0, 1)))
+
+
+class Plane(NamedTuple):
+    """Array axes: the one projected along, the one drawn across and the one drawn up."""
+
+    along: int
+    across: int
+    up: int
+
+
+PLANES = (Plane(1, 0, 2), Plane(0, 1, 2), Plane(2, 0, 1))  # from left to right
+WIDTH_INCH = 10.0
 _LPS_NAMES = ("x, towards left", "y, towards back", "z, towards head")
-_WIDTH_INCH = 10.0
 _LABELS_INCH = 0.62  # what an axis title and its ticks take beside a panel
 _ROW_INCH = (1.5, 4.6)
 _MARGIN_MM = 5.0
@@ -27,12 +38,12 @@ _WINDOW_PERCENTILES = (2.0, 99.8)  # keeps the wire's peak from making the vesse
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What of the crop is shown: mm along the array axes, from ``low`` to ``high``.
+    """What of the crop is shown, mm along the array axes from ``low`` to ``high``, and what is drawn of it.
 
     The coordinates are LPS where the array axes are the patient's, else they start at the crop's corner.
     """
 
-    scan: Scan
+    scan: ScanCrop
     low: Array
     high: Array
 
@@ -50,74 +61,80 @@ class View:
         """Coordinates (n, 3) of LPS points along the array axes, mm."""
         return np.asarray(self.scan.to_index(points_mm) * self.scan.spacing_mm + self._start())
 
-    def extent(self, across: int, up: int) -> tuple[float, float, float, float]:
-        """Left, right, bottom, top of a whole picture in mm, at the outer faces of its voxels."""
+    def faces(self) -> tuple[Array, Array]:
+        """The outer faces of the whole crop's voxels, mm along the array axes."""
         low = self._start() - 0.5 * self.scan.spacing_mm
-        high = low + np.array(self.scan.shape) * self.scan.spacing_mm
-        return float(low[across]), float(high[across]), float(low[up]), float(high[up])
+        return low, low + np.array(self.scan.shape) * self.scan.spacing_mm
+
+    def extent(self, plane: Plane) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of a whole picture in mm, at the outer faces of its voxels."""
+        low, high = self.faces()
+        return low[plane.across], high[plane.across], low[plane.up], high[plane.up]
 
     def label(self, axis: int) -> str:
         """Name of an axis with its unit."""
         return f"{_LPS_NAMES[axis]}, mm" if self.aligned else f"array axis {axis}, mm from the corner"
 
+    def sheet(self, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
+        """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""
+        widths = [float(self.size[plane.across]) for plane in PLANES]
+        height = max(float(self.size[plane.up]) for plane in PLANES)
+        widths += [0.75 * height] if square else []
+        room = WIDTH_INCH - _LABELS_INCH * len(widths)
+        row_inch = float(np.clip(room * height / sum(widths), *_ROW_INCH))
+        figure = new_figure(rows * (row_inch + 0.42) + 0.55, WIDTH_INCH)
+        axes = figure.subplots(rows, len(widths), squeeze=False, width_ratios=widths)
+        return figure, [list(row) for row in axes]
+
+    def show(self, axes: Axes, frame: FrameArrays, plane: Plane) -> None:
+        """Draw a frame's projection in grey, where it has one; pictures are indexed (across, up)."""
+        if plane.along in frame.mips:
+            picture = frame.mips[plane.along]
+            low, high = np.percentile(picture, _WINDOW_PERCENTILES)
+            window: Look = {"cmap": "gray", "vmin": low, "vmax": max(high, low + 1)}
+            extent = self.extent(plane)
+            axes.imshow(picture.T, origin="lower", interpolation="nearest", extent=extent, **window)
+
+    def draw(self, axes: Axes, points_mm: Array, plane: Plane, tip: float = 0, **look: Any) -> None:
+        """Draw a curve (n, 3), LPS mm, with a dot of size ``tip`` at its end."""
+        across, up = self.coordinates(points_mm)[:, plane[1:]].T
+        axes.plot(across, up, **look)
+        if tip:
+            axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
+
+    def dress(self, axes: Axes, plane: Plane) -> None:
+        """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
+        axes.set_aspect("equal")
+        axes.set_xlim(self.low[plane.across], self.high[plane.across])
+        limits = self.low[plane.up], self.high[plane.up]
+        axes.set_ylim(limits[::-1] if self.aligned and plane.up == 1 else limits)
+        axes.set_xlabel(self.label(plane.across), fontsize=8)
+        axes.set_ylabel(self.label(plane.up), fontsize=8)
+        axes.tick_params(labelsize=7)
+
     def _start(self) -> Array:
         return self.scan.origin_mm if self.aligned else np.zeros(3)
 
 
-def whole(scan: Scan) -> View:
+def whole(scan: ScanCrop) -> View:
     """The whole crop."""
-    view = View(scan, np.zeros(3), np.zeros(3))
-    low = view.coordinates(scan.origin_mm[None])[0] - 0.5 * scan.spacing_mm
-    return View(scan, low, low + np.array(scan.shape) * scan.spacing_mm)
+    return View(scan, *View(scan, np.zeros(3), np.zeros(3)).faces())
 
 
-def around(scan: Scan, curves: Iterable[Array], margin_mm: float = _MARGIN_MM) -> View:
+def around(scan: ScanCrop, curves: Iterable[Array]) -> View:
     """The box of the curves and a margin, cut at the crop; the whole crop where there is no curve."""
     everything = whole(scan)
     points = [everything.coordinates(c) for c in curves if len(c)]
     if not points:
         return everything
     stacked = np.concatenate(points)
-    low = np.maximum(stacked.min(axis=0) - margin_mm, everything.low)
-    high = np.minimum(stacked.max(axis=0) + margin_mm, everything.high)
+    low = np.maximum(stacked.min(axis=0) - _MARGIN_MM, everything.low)
+    high = np.minimum(stacked.max(axis=0) + _MARGIN_MM, everything.high)
     # a curve outside the crop would give a box inside out
     return View(scan, low, high) if np.all(high > low) else everything
 
 
-def sheet(view: View, rows: int, square: bool = False) -> tuple[Figure, list[list[Axes]]]:
-    """A figure of ``rows`` by three panels at one scale, and a square one at the right if asked."""
-    widths = [float(view.size[across]) for _, (across, _) in PLANES]
-    height = max(float(view.size[up]) for _, (_, up) in PLANES)
-    widths += [0.75 * height] if square else []
-    room = _WIDTH_INCH - _LABELS_INCH * len(widths)
-    row_inch = float(np.clip(room * height / sum(widths), *_ROW_INCH))
-    figure = new_figure(rows * (row_inch + 0.42) + 0.55, _WIDTH_INCH)
-    axes = figure.subplots(rows, len(widths), squeeze=False, width_ratios=widths)
-    return figure, [list(axes[r]) for r in range(rows)]
-
-
-def show(axes: Axes, picture: NDArray[np.uint8], view: View, plane: Plane) -> None:
-    """Draw a projection in grey; the picture is indexed (across, up)."""
-    low, high = np.percentile(picture, _WINDOW_PERCENTILES)
-    axes.imshow(
-        picture.T,
-        cmap="gray",
-        vmin=low,
-        vmax=max(high, low + 1),
-        origin="lower",
-        extent=view.extent(*plane),
-        interpolation="nearest",
-    )
-
-
-def dress(axes: Axes, view: View, plane: Plane, bounds: Sequence[Array] | None = None) -> None:
-    """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
-    across, up = plane
-    low, high = bounds if bounds is not None else (view.low, view.high)
-    axes.set_aspect("equal")
-    axes.set_xlim(low[across], high[across])
-    downward = view.aligned and up == 1
-    axes.set_ylim((high[up], low[up]) if downward else (low[up], high[up]))
-    axes.set_xlabel(view.label(across), fontsize=8)
-    axes.set_ylabel(view.label(up), fontsize=8)
-    axes.tick_params(labelsize=7)
+def points_table(points_mm: Array, **labels: Any) -> pd.DataFrame:
+    """Points (n, 3) as rows of labels and coordinates."""
+    xyz = ["x_mm", "y_mm", "z_mm"]
+    return pd.DataFrame(points_mm, columns=xyz).assign(**labels)[[*labels, *xyz]]

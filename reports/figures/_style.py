@@ -1,34 +1,21 @@
-"""How every figure looks: colours that colour-blind readers tell apart, one size, no display, no pyplot.
+"""Colours and lines, such that colour-blind readers tell them apart: what the schema's columns look like in a figure.
 
 Colours are those of Okabe and Ito (2008). Line styles and markers repeat what colour says, for grey printers.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
-from typing import Any, Literal
+from collections.abc import Iterator
+from itertools import cycle
+from typing import Any
 
-import numpy as np
-import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import NDArray
-from PIL import Image
-from scipy.spatial import cKDTree
+from reports.schema import ERRORS
 
-from reports.atomic import write_bytes
-from reports.tables import write_table
-
+Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
 SIMULATED, TRACED, TRUTH = BLUE, ORANGE, GREEN
+PALETTE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {
     "load": "#BFBFBF",
@@ -38,99 +25,38 @@ STAGE_COLOURS = {
     "compare": PURPLE,
     "report": YELLOW,
 }
-# the trivial predictors: column, what the legend says, colour, line style, marker
-NULLS = (
-    ("null_centreline_rms_mm", "centreline", PURPLE, "--", "s"),
-    ("null_shortest_rms_mm", "shortest path", GREY, ":", "v"),
-    ("null_min_bending_rms_mm", "least bending", GREEN, "-.", "D"),
-    ("null_previous_rms_mm", "previous frame", "black", (0, (1, 3)), "x"),
+# the styles that columns of the schema name, in the order in which they are drawn: the later lie over the earlier
+LINES: dict[str, Look] = {
+    "simulated high": {"color": SIMULATED, "linewidth": 0.9, "marker": "^", "markersize": 3},
+    "truth": {"color": TRUTH, "linewidth": 3.5, "alpha": 0.6},
+    "simulated": {"color": SIMULATED, "marker": "o", "markersize": 4},
+    "floor": {"color": TRACED, "linewidth": 1.0},
+    "traced": {"color": TRACED, "marker": "o", "markersize": 4},
+    "traced high": {"color": TRACED, "linestyle": ":", "marker": "^", "markersize": 4},
+    "traced tip": {"color": VERMILION, "linestyle": "--", "marker": "s", "markersize": 4},
+    "truth tip": {"color": TRUTH, "linestyle": "--", "linewidth": 1.0},
+    "overlap": {"color": VERMILION, "marker": "s", "markersize": 4},
+}
+# colour, line style and marker of the trivial predictors, in the order of their columns
+_PREDICTOR_LINES: tuple[tuple[str, Any, str], ...] = (
+    (PURPLE, "--", "s"),
+    (GREY, ":", "v"),
+    (GREEN, "-.", "D"),
+    ("black", (0, (1, 3)), "x"),
+    (SKY, (0, (5, 1)), "P"),
+    (VERMILION, (0, (3, 1, 1, 1)), "*"),
+    (YELLOW, (0, (6, 3)), "X"),
 )
-DOTS_PER_INCH = 110
-WIDTH_INCH = 8.0
-_GREYS = 52  # finer than the noise of any scan worth a picture
-_LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 
 
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """A figure and the numbers that it shows; ``compact`` stores it in a palette, for noisy grey scans."""
-
-    figure: Figure
-    table: pd.DataFrame
-    compact: bool = False
+def predictors() -> Iterator[tuple[str, str, str, Any, str]]:
+    """Column, label, colour, line style and marker of every trivial predictor of the schema, the centreline first."""
+    for column, line in zip(ERRORS.shown("predictors"), cycle(_PREDICTOR_LINES), strict=False):
+        yield column.name, column.shown["predictors"], *line
 
 
-def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool = True) -> Figure:
-    """Make an empty figure that draws into memory; ``fitted`` finds room for all labels by itself."""
-    layout: Literal["constrained"] | None = "constrained" if fitted else None
-    figure = Figure(figsize=(width_inch, height_inch), dpi=DOTS_PER_INCH, layout=layout)
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def save(drawing: Drawing, path: Path) -> None:
-    """Write the PNG and, beside it, the CSV of what it shows."""
-    canvas: Any = drawing.figure.canvas
-    # drawn once: savefig would draw twice, and most of a page's time is drawing
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    picture = _in_palette(pixels) if drawing.compact else Image.fromarray(np.ascontiguousarray(pixels))
-    buffer = io.BytesIO()
-    picture.save(buffer, format="png")
-    write_bytes(path, buffer.getvalue())
-    write_table(path.with_suffix(".csv"), drawing.table)
-
-
-def _in_palette(pixels: NDArray[np.uint8]) -> Image.Image:
-    """The picture (rows, columns, 3) in the palette: half the size where noise does not compress."""
-    packed = pixels.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
-    codes, places = np.unique(packed, return_inverse=True)
-    colours = np.stack([codes >> 16, codes >> 8 & 255, codes & 255], axis=1)
-    nearest = np.asarray(cKDTree(_palette()).query(colours)[1], dtype=np.uint8)
-    height, width = packed.shape
-    picture = Image.frombytes("P", (width, height), nearest[places].tobytes())
-    picture.putpalette(_palette().ravel().tolist())
-    return picture
-
-
-@cache
-def _palette() -> NDArray[np.uint8]:
-    """Greys of a scan, and the curves' colours mixed with them: a palette taken from the picture loses these."""
-    greys = np.repeat(np.linspace(0.0, 255.0, _GREYS)[:, None], 3, axis=1)
-    backgrounds = np.linspace(0.0, 255.0, 5)
-    colours = [255.0 * np.array(to_rgb(c)) for c in (ORANGE, SKY, GREEN, VERMILION, BLUE)]
-    mixed = [
-        share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)
-    ]
-    return np.concatenate([greys, mixed]).round().astype(np.uint8)
-
-
-def plain(axes: Axes) -> None:
-    """Light grid, no box."""
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(visible=True, color="0.9", linewidth=0.6)
-    axes.set_axisbelow(True)
-
-
-def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
-    """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
-    numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
-    kept = numbers[np.isfinite(numbers) & (numbers > 0)]
-    if len(kept) and kept.max() > _LOG_FROM_RATIO * kept.min():
-        axes.set_yscale("log")
-        axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
-        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-    else:
-        axes.set_ylim(bottom=0.0)
-
-
-def whole_numbers(axis: Any) -> None:
-    """Ticks at integers only: there is no frame 2.5."""
-    axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-
-
-def has(table: pd.DataFrame, *columns: str) -> bool:
-    """Say whether any of the columns has a number to show."""
-    return any(table[column].notna().any() for column in columns if column in table)
+def lines(place: str) -> list[tuple[str, str, Look]]:
+    """Column, label and style of every line that the schema shows at a place, in the order of drawing."""
+    rank, spare = {style: i for i, style in enumerate(LINES)}, cycle(reversed(PALETTE))
+    columns = sorted(ERRORS.shown(place), key=lambda column: rank.get(column.style, len(rank)))
+    return [(c.name, c.shown[place], LINES.get(c.style) or {"color": next(spare)}) for c in columns]

@@ -7,21 +7,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from reports.case_files import CaseFiles
-from reports.figures._style import SEQUENTIAL, Drawing, has, new_figure, plain, whole_numbers
+from reports.figures._drawing import Drawing, heat_map, new_figure, whole_numbers
+from reports.tables import has
 
 Array = NDArray[np.float64]
 _CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
 
 
 def error_along_wire(case: CaseFiles) -> Drawing | None:
-    """Distance to the traced curve along the simulated wire."""
-    return _heat_map(case.points, "error_mm", "distance to the traced curve, mm")
+    """Distance to the traced curve along the simulated wire, of frames that are ok."""
+    failed = set(case.errors["frame"]) - set(case.good["frame"])
+    points = case.points[~case.points["frame"].isin(failed)]
+    return _along_wire(points, "error_mm", "distance to the traced curve, mm")
 
 
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
     """Magnitude of the wall's force along the simulated wire."""
     points = case.points if has(case.points, "contact_force_N") else _joints(case)
-    return _heat_map(points, "contact_force_N", "contact force, N")
+    return _along_wire(points, "contact_force_N", "contact force, N")
 
 
 def _joints(case: CaseFiles) -> pd.DataFrame:
@@ -38,9 +41,9 @@ def _joints(case: CaseFiles) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if len(parts) > 1 else case.points
 
 
-def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
+def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
     kept = points[points[column].notna() & points["arc_mm"].notna()]
-    if not has(kept, column):
+    if kept.empty:
         return None
     frames = np.arange(int(kept["frame"].min()), int(kept["frame"].max()) + 1)
     step = _step(kept)
@@ -50,20 +53,15 @@ def _heat_map(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
         grid[int(str(frame)) - frames[0], : len(row)] = row
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
     axes = figure.subplots()
-    edges = (np.arange(grid.shape[1] + 1) - 0.5) * step
-    top = max(float(np.nanpercentile(grid, _CLIP_PERCENTILE)), 1e-9)
-    rows_edges = np.append(frames, frames[-1] + 1) - 0.5
-    mesh = axes.pcolormesh(edges, rows_edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, rasterized=True)
-    clipped = bool(np.nanmax(grid) > top)
-    figure.colorbar(mesh, ax=axes, label=label, extend="max" if clipped else "neither", pad=0.01)
-    axes.set_facecolor("0.93")
+    edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
+    heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, bar={}, rasterized=True)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("arc length from the entry along the simulated wire, mm")
     axes.set_ylabel("frame")
     whole_numbers(axes.yaxis)
-    plain(axes)
-    axes.grid(visible=False)
-    return Drawing(figure, _tidy(grid, frames, step, column))
+    row_of, place = np.nonzero(np.isfinite(grid))
+    table = {"frame": frames[row_of], "arc_mm": place * step, column: grid[row_of, place]}
+    return Drawing(figure, pd.DataFrame(table))
 
 
 def _nearest(arc_mm: Array, values: Array, step: float) -> Array:
@@ -79,8 +77,3 @@ def _step(points: pd.DataFrame) -> float:
     steps = points.groupby("frame")["arc_mm"].diff()
     positive = steps[steps > 0]
     return float(positive.median()) if len(positive) else 1.0
-
-
-def _tidy(grid: Array, frames: NDArray[np.int_], step: float, column: str) -> pd.DataFrame:
-    row, place = np.nonzero(np.isfinite(grid))
-    return pd.DataFrame({"frame": frames[row], "arc_mm": place * step, column: grid[row, place]})

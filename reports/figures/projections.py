@@ -1,28 +1,39 @@
-"""The scan seen along its three axes with the traced and the simulated wire over it."""
+"""Scan, lumen and wires seen along the array axes: a few frames large, every frame small, a case without scans."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
-from reports.case_files import CaseFiles
-from reports.figures._planes import PLANES, Plane, View, around, dress, sheet, show
-from reports.figures._style import GREEN, ORANGE, SKY, Drawing
-from reports.frames_file import Frame, Scan
+from reports.case_files import GOOD, CaseFiles, thinned
+from reports.figures._drawing import Drawing, new_figure
+from reports.figures._planes import PLANES, WIDTH_INCH, Plane, View, around, points_table, whole
+from reports.figures._style import GREEN, ORANGE, SKY, VERMILION, Look
+from reports.frames_file import FrameArrays, ScanCrop
 
-# drawn in this order: the later lie over the earlier
-_CURVES = (
-    ("traced_mm", "traced", ORANGE, "-", 1.8),
-    ("truth_mm", "true", GREEN, ":", 1.2),
-    ("simulated_mm", "simulated", SKY, (0, (4, 2)), 1.2),
-)
+_LARGE: dict[str, Look] = {
+    "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.8},
+    "true": {"color": GREEN, "linestyle": ":", "linewidth": 1.2},
+    "simulated": {"color": SKY, "linestyle": (0, (4, 2)), "linewidth": 1.2},
+}
+_SMALL: dict[str, Look] = {
+    "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.6},
+    "simulated": {"color": SKY, "linestyle": "--", "linewidth": 1.0},
+}
 _MAX_FAILED = 3
 _TIP_WINDOW_MM = 10.0
+_COLUMNS = 6  # of the sheet of every frame
+_MAX_FRAMES = 36
+_TITLE_INCH = 0.24
+_PANEL_INCH = (0.9, 3.0)
+_MAX_WIRES = 12  # of a case without scans
 
 
 def projections(case: CaseFiles) -> Drawing | None:
@@ -31,15 +42,10 @@ def projections(case: CaseFiles) -> Drawing | None:
     if case.scan is None or good.empty:
         return None
     numbers = good["frame"].astype(int).tolist()
-    named = (
-        (numbers[0], "first"),
-        (numbers[len(numbers) // 2], "middle"),
-        (numbers[-1], "last"),
-        (numbers[int(good["rms_mm"].to_numpy().argmax())], "worst"),
-    )
+    worst = int(good["rms_mm"].to_numpy().argmax())
     titles: dict[int, list[str]] = {}
-    for number, title in named:
-        titles.setdefault(number, []).append(title)
+    for title, place in (("first", 0), ("middle", len(numbers) // 2), ("last", -1), ("worst", worst)):
+        titles.setdefault(numbers[place], []).append(title)
     chosen = [(n, " and ".join(titles[n])) for n in sorted(titles) if n in case.frames]
     return _draw(case, case.scan, chosen)
 
@@ -54,75 +60,130 @@ def failed_projections(case: CaseFiles) -> Drawing | None:
     return _draw(case, case.scan, with_picture[:_MAX_FAILED])
 
 
-def _draw(case: CaseFiles, scan: Scan, chosen: Sequence[tuple[int, str]]) -> Drawing | None:
+def every_frame(case: CaseFiles) -> Drawing | None:
+    """Up to 36 frames, evenly thinned, each with its status or error; the traced and the simulated wire."""
+    table = case.errors[case.errors["frame"].isin(case.frames)]
+    if case.scan is None or len(table) < 2:
+        return None
+    table = table.iloc[thinned(len(table), _MAX_FRAMES)]
+    frames = [case.read_frame(number) for number in table["frame"].tolist()]
+    if not any(frame.mips for frame in frames):
+        return None
+    view = around(case.scan, [f.curves[name] for f in frames for name in _SMALL if name in f.curves])
+    plane = max(PLANES, key=lambda plane: float(view.size[plane.across] * view.size[plane.up]))
+    rows, width = -(-len(frames) // _COLUMNS), WIDTH_INCH / _COLUMNS
+    height = float(np.clip(width * view.size[plane.up] / view.size[plane.across], *_PANEL_INCH))
+    # thirty small panels without labels: a fixed lattice needs no fitting, which is most of the drawing time
+    figure = new_figure(rows * (height + _TITLE_INCH), WIDTH_INCH, fitted=False)
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    step = _TITLE_INCH / (height + _TITLE_INCH) / rows
+    figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - step, 0.04, _TITLE_INCH / height)
+    for axes in panels:
+        axes.set_axis_off()
+    for axes, frame, status, rms in zip(panels, frames, table["status"], table["rms_mm"], strict=False):
+        view.show(axes, frame, plane)
+        for name in _SMALL:
+            if name in frame.curves:
+                view.draw(axes, frame.curves[name], plane, **_SMALL[name])
+        axes.set_xlim(view.low[plane.across], view.high[plane.across])
+        axes.set_ylim(view.low[plane.up], view.high[plane.up])
+        axes.set_aspect("equal")
+        good = status in GOOD
+        text = f"{frame.frame}: {rms:.2f} mm" if good and np.isfinite(rms) else f"{frame.frame}: {status}"
+        axes.set_title(text, fontsize=8, loc="left", pad=2, color="black" if good else VERMILION)
+    return Drawing(figure, table[["frame", "status", "insertion_mm", "rms_mm"]], compact=True)
+
+
+def simulated_wires(case: CaseFiles) -> Drawing | None:
+    """Up to a dozen depths, the deepest last, in the three projections of the lumen."""
+    compared = bool(case.errors["rms_mm"].notna().any())
+    if case.scan is None or compared or not case.frames:
+        return None
+    deep = case.good[case.good["insertion_mm"].notna()]
+    picked = deep.iloc[thinned(len(deep), _MAX_WIRES)]
+    chosen = zip(picked["frame"].tolist(), picked["insertion_mm"].tolist(), strict=True)
+    read = [(n, depth, case.read_frame(n).curves.get("simulated")) for n, depth in chosen if n in case.frames]
+    wires = [(n, depth, points) for n, depth, points in read if points is not None]
+    if not wires:
+        return None
+    view = whole(case.scan)
+    figure, (row,) = view.sheet(1)
+    depths = [depth for _, depth, _ in wires]
+    scale = ScalarMappable(Normalize(min(depths), max(max(depths), min(depths) + 1e-9)), colormaps["viridis"])
+    # deep wires first and wide, shallow ones over them and thin: each is seen where it differs
+    widths = np.linspace(3.2, 1.0, len(wires))
+    for axes, plane in zip(row, PLANES, strict=True):
+        _outline(axes, view, plane)
+        for (_, depth, points), width in zip(reversed(wires), widths, strict=True):
+            colour = scale.to_rgba(np.array(depth))
+            view.draw(axes, points, plane, tip=4, color=colour, linewidth=width)
+        view.dress(axes, plane)
+    figure.colorbar(scale, ax=row, label="insertion depth, mm", pad=0.01, aspect=30, shrink=0.8)
+    parts = [points_table(points, frame=n, insertion_mm=depth) for n, depth, points in wires]
+    return Drawing(figure, pd.concat(parts))
+
+
+def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) -> Drawing | None:
+    """One row per frame: the three projections, and the tip close by where any frame has a curve."""
     if not chosen:
         return None
     frames = [case.read_frame(number) for number, _ in chosen]
-    curves = [points for frame in frames for _, points in _curves(frame)]
+    curves = [points for frame in frames for points in frame.curves.values()]
     view = around(scan, curves)
-    figure, rows = sheet(view, len(chosen), square=bool(curves))
+    figure, rows = view.sheet(len(chosen), square=bool(curves))
     for frame, (number, title), row in zip(frames, chosen, rows, strict=True):
-        for axes, (axis, plane) in zip(row[:3], PLANES, strict=True):
-            _panel(axes, frame, view, axis, plane)
-        for axes in row[3:]:
+        for axes, plane in zip(row, PLANES, strict=False):
+            _panel(axes, frame, view, plane)
+            if row is not rows[-1]:
+                axes.set_xlabel("")
+        for axes in row[len(PLANES) :]:
             _tip_panel(axes, frame, view)
         row[0].set_title(f"frame {number} ({title})", loc="left", fontsize=9)
-    for row in rows[:-1]:
-        for axes in row[:3]:
-            axes.set_xlabel("")
-    _legend(figure, rows[0][0])
-    return Drawing(figure, pd.concat([_tidy(frame) for frame in frames]), compact=True)
-
-
-def _curves(frame: Frame) -> list[tuple[str, NDArray[np.float64]]]:
-    arrays = ((label, getattr(frame, field)) for field, label, *_ in _CURVES)
-    return [(label, points) for label, points in arrays if points is not None and len(points)]
-
-
-def _panel(axes: Axes, frame: Frame, view: View, axis: int, plane: Plane) -> None:
-    if axis in frame.mips:
-        show(axes, frame.mips[axis], view, plane)
-    else:
-        axes.set_facecolor("0.25")
-    known = dict(_curves(frame))
-    for _, label, colour, style, width in _CURVES:
-        if label in known:
-            across, up = view.coordinates(known[label])[:, plane].T
-            axes.plot(across, up, color=colour, linestyle=style, linewidth=width, label=label)
-            axes.plot(across[-1:], up[-1:], "o", color=colour, markersize=3)
-    dress(axes, view, plane)
-
-
-def _tip_panel(axes: Axes, frame: Frame, view: View) -> None:
-    """Close to the tip, along the axis in which the wire's end is seen longest."""
-    known = _curves(frame)
-    if not known:
-        axes.remove()
-        return
-    end = view.coordinates(known[0][1])
-    tip = end[-1]
-    near = end[np.linalg.norm(end - tip, axis=1) < 0.5 * _TIP_WINDOW_MM]
-    axis, plane = max(PLANES, key=lambda item: float(np.ptp(near, axis=0)[list(item[1])].sum()))
-    _panel(axes, frame, view, axis, plane)
-    half = 0.5 * _TIP_WINDOW_MM
-    dress(axes, view, plane, (tip - half, tip + half))
-    axes.set_title(f"tip, {_TIP_WINDOW_MM:g} mm wide", loc="left", fontsize=9)
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
+    handles, labels = rows[0][0].get_legend_handles_labels()
     if handles:
         legend = figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
         legend.get_frame().set_facecolor("0.3")  # the line colours are chosen for the dark of the scan
         for text in legend.get_texts():
             text.set_color("white")
+    return Drawing(figure, pd.concat([_table(frame) for frame in frames]), compact=True)
 
 
-def _tidy(frame: Frame) -> pd.DataFrame:
-    columns = ["frame", "curve", "x_mm", "y_mm", "z_mm"]
-    parts = [
-        pd.DataFrame(points, columns=columns[2:]).assign(frame=frame.frame, curve=label)[columns]
-        for label, points in _curves(frame)
-    ]
-    nothing = pd.DataFrame([[frame.frame, "none"]], columns=columns[:2])
+def _panel(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
+    if plane.along not in frame.mips:
+        axes.set_facecolor("0.25")
+    view.show(axes, frame, plane)
+    for label, points in frame.curves.items():
+        view.draw(axes, points, plane, tip=3, label=label, **_LARGE[label])
+    view.dress(axes, plane)
+
+
+def _tip_panel(axes: Axes, frame: FrameArrays, view: View) -> None:
+    """Close to the tip, along the axis in which the wire's end is seen longest."""
+    if not frame.curves:
+        axes.remove()
+        return
+    end = view.coordinates(next(iter(frame.curves.values())))
+    tip, half = end[-1], 0.5 * _TIP_WINDOW_MM
+    near = end[np.linalg.norm(end - tip, axis=1) < half]
+    plane = max(PLANES, key=lambda plane: float(np.ptp(near, axis=0)[list(plane[1:])].sum()))
+    _panel(axes, frame, replace(view, low=tip - half, high=tip + half), plane)
+    axes.set_title(f"tip, {_TIP_WINDOW_MM:g} mm wide", loc="left", fontsize=9)
+
+
+def _table(frame: FrameArrays) -> pd.DataFrame:
+    parts = [points_table(points, frame=frame.frame, curve=label) for label, points in frame.curves.items()]
+    nothing = pd.DataFrame([[frame.frame, "none"]], columns=["frame", "curve"])
     return pd.concat(parts or [nothing])
+
+
+def _outline(axes: Axes, view: View, plane: Plane) -> None:
+    """The lumen's silhouette, where the file has one with an inside and an outside."""
+    mask = (view.scan.lumen_mips.get(plane.along, np.zeros((1, 1))) > 0).astype(float)
+    if min(mask.shape) < 2 or mask.min() == mask.max():
+        return
+    left, right, bottom, top = view.extent(plane)
+    half = 0.5 * view.scan.spacing_mm
+    across = np.linspace(left + half[plane.across], right - half[plane.across], mask.shape[0])
+    up = np.linspace(bottom + half[plane.up], top - half[plane.up], mask.shape[1])
+    axes.contourf(across, up, mask.T, levels=[0.5, 1.5], colors=["0.90"])
+    axes.contour(across, up, mask.T, levels=[0.5], colors=["0.45"], linewidths=0.7)

@@ -7,7 +7,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
-from reports.figures._style import STAGE_COLOURS, Drawing, has, new_figure, plain, whole_numbers
+from reports.figures._drawing import Drawing, legend, new_figure, plain, whole_numbers
+from reports.figures._style import STAGE_COLOURS
+from reports.tables import has
 
 
 def run_time(case: CaseFiles) -> Drawing | None:
@@ -38,15 +40,14 @@ def _stacked(axes: Axes, errors: pd.DataFrame, stages: list[str]) -> None:
     axes.set_xlabel("frame")
     axes.set_ylabel("seconds")
     whole_numbers(axes.xaxis)
-    axes.legend(frameon=False, fontsize=8, ncols=3)
+    legend(axes, ncols=3)
     axes.set_ylim(top=1.25 * max(float(base.max()), 1e-9))
     plain(axes)
 
 
 def _totals(axes: Axes, seconds: dict[str, float]) -> None:
-    names = list(seconds)
-    values = [seconds[name] for name in names]
-    bars = axes.barh(names, values, color=[STAGE_COLOURS[name] for name in names])
+    values = list(seconds.values())
+    bars = axes.barh(list(seconds), values, color=[STAGE_COLOURS[name] for name in seconds])
     axes.bar_label(bars, labels=[f"{v:.3g} s" for v in values], padding=3, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlim(right=1.3 * max([*values, 1e-9]))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from pipeline.load import LoadError, Source, load, read_header, require_same_geometry
+from pipeline.load import Crop, LoadError, Source, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.load.raw import read_mha_box
-from pipeline.load.scans import _expanded, load_counters
+from pipeline.load.scans import each_volume
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -54,7 +54,7 @@ def test_a_crop_is_the_same_voxels_at_the_same_place(tmp_path: Path, suffix: str
     crop = load(header, ((1, 2, 3), (4, 6, 8)))
     np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
     np.testing.assert_allclose(crop.to_mm([0, 0, 0]), header.grid.to_mm([1, 2, 3]), atol=1e-6)
-    counted = load_counters(header, ((1, 2, 3), (4, 6, 8)))
+    counted = Crop(header, ((1, 2, 3), (4, 6, 8))).counters
     assert counted == {"voxels_total": 315.0, "voxels_read": 60.0, "voxels_skipped": 255.0}
 
 
@@ -101,7 +101,7 @@ def test_an_hdf5_sequence_is_one_header_a_volume(tmp_path: Path) -> None:
         data.attrs["spacing_mm"] = SPACING
     header = read_header(Source(path, "/frames"))
     assert header.item_count == 2
-    second = load(_expanded(header)[1], ((0, 1, 2), (5, 3, 4)))
+    second = load(list(each_volume(header))[1], ((0, 1, 2), (5, 3, 4)))
     np.testing.assert_array_equal(second.values, (numbered() + 1)[:, 1:3, 2:4])
 
 
@@ -115,7 +115,7 @@ def test_an_hdf5_group_of_volumes_is_a_sequence_with_either_axis_order(tmp_path:
             data.attrs.update(spacing_mm=SPACING, origin_mm=ORIGIN, direction=TURN, axes=axes)
     header = read_header(Source(path, "/frames"))
     assert (header.item_count, header.shape) == (3, (5, 7, 9))
-    last = load(_expanded(header)[2], ((0, 1, 2), (5, 3, 4)))
+    last = load(list(each_volume(header))[2], ((0, 1, 2), (5, 3, 4)))
     np.testing.assert_array_equal(last.values, (numbered() + 2)[:, 1:3, 2:4])
     np.testing.assert_allclose(last.origin_mm, header.grid.to_mm([0, 1, 2]))
 
@@ -142,7 +142,7 @@ def test_a_four_dimensional_file_is_a_sequence(tmp_path: Path) -> None:
     sitk.WriteImage(both, str(tmp_path / "both.nrrd"))
     header = read_header(tmp_path / "both.nrrd")
     assert header.item_count == 2
-    np.testing.assert_array_equal(load(_expanded(header)[1]).values, numbered() + 1)
+    np.testing.assert_array_equal(load(list(each_volume(header))[1]).values, numbered() + 1)
 
 
 def write_series(folder: Path, values: np.ndarray, positions: list[tuple[float, float, float]]) -> None:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.manifest import ManifestError, natural_key, read_manifest
+from pipeline.study.manifest import ManifestError, read_manifest
+from pipeline.study.schema import natural_key
 
 GOOD = """
 schema = 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.compare import nulls, point_to_curve, rms
-from pipeline.model import Curve, Lumen, arc_length
+from pipeline.model import Clamp, Lumen, arc_length
 from solver.grid import Grid
 
 VOXEL, RADIUS, BEND = 0.4, 2.0, 15.0
@@ -27,20 +27,20 @@ def quarter_torus() -> tuple[Lumen, np.ndarray]:
     return lumen_of(distance, np.full(3, -4.0)), axis
 
 
-def built(lumen: Lumen, axis: np.ndarray) -> nulls.Nulls:
-    return nulls.build(lumen, axis[0], np.array([0.0, 0.0, 1.0]), axis, 0.2)
+def clues_of(lumen: Lumen, axis: np.ndarray) -> nulls.Clues:
+    return nulls.Clues(lumen, Clamp(axis[0], np.array([0.0, 0.0, 1.0])), 0.2, axis)
 
 
 def test_the_centreline_is_the_axis_to_half_a_voxel(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
-    path = built(lumen, axis).centreline
+    path = clues_of(lumen, axis).centreline
     assert path is not None
     assert rms(point_to_curve(path, axis)[0]) < 0.5 * VOXEL
 
 
 def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
-    path = built(lumen, axis).shortest
+    path = clues_of(lumen, axis).shortest
     assert path is not None
     middle = path[len(path) // 2]
     assert np.hypot(middle[0], middle[2]) < BEND - 0.6 * RADIUS
@@ -50,7 +50,7 @@ def test_the_shortest_way_hugs_the_inner_wall(quarter_torus: tuple[Lumen, np.nda
 def test_the_least_bent_curve_stays_inside_and_bends_less(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
     lumen, axis = quarter_torus
     depth = 0.9 * float(arc_length(axis)[-1])
-    path = built(lumen, axis).min_bending(depth)
+    path = nulls.min_bending(clues_of(lumen, axis), depth)
     assert path is not None
     assert arc_length(path)[-1] == pytest.approx(depth, abs=1e-6)
     assert np.hypot(np.hypot(path[:, 0], path[:, 2]) - BEND, path[:, 1]).max() < RADIUS - 0.2 + 0.1
@@ -68,15 +68,16 @@ def test_two_vessels_that_do_not_meet_have_no_path() -> None:
     distance = np.minimum(np.hypot(x - 3, y), np.hypot(x + 3, y)) - 1.5
     lumen = lumen_of(distance, np.full(3, -6.0))
     ends = np.array([[-3.0, 0.0, -5.0], [3.0, 0.0, 5.0]])
-    found = nulls.build(lumen, ends[0], np.array([0.0, 0.0, 1.0]), ends, 0.2)
+    found = clues_of(lumen, ends)
     assert found.centreline is None
-    assert found.at_depth("centreline", 5.0) is None
-    assert found.min_bending(5.0) is None
+    assert nulls.NULLS["centreline"](found, 5.0, None) is None
+    assert nulls.min_bending(found, 5.0) is None
 
 
-def test_the_previous_wire_is_pushed_on() -> None:
-    first = Curve(np.array([[0.0, 0, 0], [0.0, 0, 10.0]]), np.ones(2))
-    guess = nulls.previous([first, None], 1, 12.0)
+def test_the_previous_wire_is_pushed_on(quarter_torus: tuple[Lumen, np.ndarray]) -> None:
+    lumen, axis = quarter_torus
+    before = np.array([[0.0, 0, 0], [0.0, 0, 10.0]])
+    guess = nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, before)
     assert guess is not None
     np.testing.assert_allclose(guess[-1], [0, 0, 12.0])
-    assert nulls.previous([first], 0, 12.0) is None
+    assert nulls.NULLS["previous"](clues_of(lumen, axis), 12.0, None) is None

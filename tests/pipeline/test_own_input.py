@@ -11,7 +11,7 @@ import SimpleITK as sitk
 from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
-from pipeline.load.traces import read_curve
+from pipeline.load.curves import read_curve
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import read_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp

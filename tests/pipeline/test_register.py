@@ -10,15 +10,12 @@ import pytest
 from data_synthetic import catalogue
 from data_synthetic.scene import Study
 from data_synthetic.study import psf_scanner
-from pipeline.load.config import LoadConfig
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import place_of, record, said
 from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion
-from pipeline.run.frame import Frame
 from pipeline.segment import segment
-from pipeline.trace.config import TraceConfig
 
 VOXEL = 0.5
 SKIP = 0.1
@@ -86,9 +83,8 @@ def test_a_small_motion_is_measured_said_and_not_applied(
     assert not found.applied
     assert found.moved_voxels == pytest.approx(voxels, abs=0.05)
     np.testing.assert_array_equal(found.motion.rotation, np.eye(3))
-    whole = ((0, 0, 0), study.grid.shape)
-    place = place_of(lumen, whole, fixed.reference, LoadConfig(), TraceConfig(), own_curves=False)
-    texts, warnings = said(place, [Frame(0, registration=found)])
+    place = place_of(lumen, fixed.reference, SKIP, switched_on=True, own_curves=False)
+    texts, warnings = said(place, {0: found})
     assert texts[0].startswith("no registration applied to 1 of 1 frames: the phantom moved 0.0")
     assert not warnings
 
@@ -144,10 +140,9 @@ def test_motions_compose_and_undo() -> None:
 def test_what_is_not_registered_is_said(
     fixed: Anchor, lumen: Lumen, register_: str, reference: bool, own: bool, reason: str
 ) -> None:
-    config = TraceConfig(register=register_)  # type: ignore[arg-type]
     scan = fixed.reference if reference else None
-    place = place_of(lumen, ((0, 0, 0), (1, 1, 1)), scan, LoadConfig(), config, own)
-    texts, _ = said(place, [])
+    place = place_of(lumen, scan, SKIP, switched_on=register_ == "auto", own_curves=own)
+    texts, _ = said(place, {})
     assert texts[0].startswith("no registration applied: ")
     assert reason in texts[0]
 

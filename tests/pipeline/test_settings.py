@@ -9,12 +9,14 @@ import pytest
 
 from pipeline.commands.common import complain
 from pipeline.model import Curve, Lumen
-from pipeline.run.cache import Store, file_hash, key_of
-from pipeline.run.stored import pack_curve, pack_lumen, unpack_curve, unpack_lumen
+from pipeline.run.keys import digest, file_hash, key_of
+from pipeline.run.store import Store
+from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
 from pipeline.study.config import Config
 from pipeline.study.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
+from pipeline.trace import trace
 from solver.grid import Grid
 
 
@@ -46,6 +48,11 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
         ("sovler.segment_mm=1", "did you mean 'solver'"),
         ("solver.segment_mm=wide", "valid number"),
         ("segment_mm=1", "no setting; write table.key=value"),
+        ("simulate.entry=foo", "'traced' or 'manifest'"),
+        ("solver.segment_mm=-3", "greater than 0"),
+        ("compare.sample_mm=0", "greater than 0"),
+        ("segment.outer_mm=nan", "finite"),
+        ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
 )
 def test_a_wrong_setting_is_explained(text: str, expected: str) -> None:
@@ -66,39 +73,57 @@ def test_all_wrong_settings_come_at_once() -> None:
 def test_keys_follow_contents_and_settings_not_paths(tmp_path: Path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).write_bytes(b"same")
-    assert file_hash(tmp_path / "a") == file_hash(tmp_path / "b")
-    first = key_of("segment", file_hash(tmp_path / "a"), SegmentConfig())
-    assert first == key_of("segment", file_hash(tmp_path / "b"), SegmentConfig())
-    assert first != key_of("segment", file_hash(tmp_path / "a"), SegmentConfig(threshold=0.123))
-    assert first != key_of("trace", file_hash(tmp_path / "a"), SegmentConfig())
-    assert key_of("segment", np.array([1.0])) != key_of("segment", np.array([1.0 + 1e-15 * 4]))
+    a, b = tmp_path / "a", tmp_path / "b"
+    assert file_hash(a) == file_hash(b)
+    first = key_of(segment, a, SegmentConfig())
+    assert first == key_of(segment, b, SegmentConfig())
+    assert first != key_of(segment, a, SegmentConfig(threshold=0.123))
+    assert first != key_of(trace, a, SegmentConfig())
+    assert key_of(segment, np.array([1.0])) != key_of(segment, np.array([1.0 + 1e-15 * 4]))
     assert Config() == Config()
+
+
+def test_what_has_no_known_content_is_refused_in_a_key() -> None:
+    with pytest.raises(TypeError, match="cannot be part of a key"):
+        digest({"function": print})
+
+
+def test_the_voxels_behind_a_header_belong_to_its_content(tmp_path: Path) -> None:
+    header, voxels = tmp_path / "scan.mhd", tmp_path / "scan.raw"
+    header.write_text("ObjectType = Image\nElementDataFile = scan.raw\n")
+    voxels.write_bytes(b"first")
+    first = file_hash(header)
+    voxels.write_bytes(b"other")
+    assert file_hash(header) != first
 
 
 def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
     store = Store(tmp_path)
     grid = Grid(np.linspace(-1, 1, 60).reshape(3, 4, 5).astype(np.float32), np.full(3, 0.3), np.ones(3))
-    lumen = Lumen(
-        grid, grid.with_values((grid.values < 0).astype(np.uint8)), 550.0, ("thin",), {"visited": 7}
-    )
-    store.put("segment", "ab" * 32, *pack_lumen(lumen))
-    back = unpack_lumen(*(store.get("segment", "ab" * 32) or pytest.fail("not stored")))
+    mask = grid.with_values((grid.values < 0).astype(np.uint8))
+    lumen = Lumen(grid, mask, 550.0, ("thin",), {"visited": 7}, {"blur_mm": float(np.float32(0.3))})
+    store.put("segment", "ab" * 32, lumen)
+    back = store.get("segment", "ab" * 32)
+    assert isinstance(back, Lumen)
     np.testing.assert_array_equal(back.distance.values, grid.values)
     np.testing.assert_array_equal(back.mask.values, lumen.mask.values)
     assert (back.wall_level, back.warnings, dict(back.counters)) == (550.0, ("thin",), {"visited": 7})
+    assert digest(back) == digest(lumen)
     curve = Curve(
         np.eye(3), np.ones(3), 0.1, np.array([True, False, True]), FrameStatus.LENGTH_MISMATCH, "why"
     )
-    store.put("trace", "cd" * 32, *pack_curve(curve))
-    again = unpack_curve(*(store.get("trace", "cd" * 32) or pytest.fail("not stored")))
+    store.put("trace", "cd" * 32, curve)
+    again = store.get("trace", "cd" * 32)
+    assert isinstance(again, Curve)
     np.testing.assert_array_equal(again.points_mm, curve.points_mm)
     np.testing.assert_array_equal(again.flagged, curve.flagged)
     assert (again.status, again.note) == (FrameStatus.LENGTH_MISMATCH, "why")
+    assert digest(again) == digest(curve)
 
 
 def test_a_damaged_entry_counts_as_absent(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    store.put("trace", "ab" * 32, {"x": np.ones(3)}, {})
+    store.put("trace", "ab" * 32, Curve(np.eye(3), np.ones(3)))
     entry = store.entries()[0]
     entry.write_bytes(b"PK not a zip")
     assert store.get("trace", "ab" * 32) is None

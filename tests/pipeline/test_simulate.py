@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.model import Lumen, Simulated
-from pipeline.simulate.clamp import Entry
-from pipeline.simulate.config import SimulateConfig, SolverConfig
-from pipeline.simulate.replay import guide_wire, rolls, simulate
-from pipeline.study.manifest import Case, Wire, read_manifest
+from pipeline.model import Clamp, Lumen, Simulated
+from pipeline.run.stages.load import rolls
+from pipeline.simulate import insertion_of, simulate
+from pipeline.simulate.config import SolverConfig
+from pipeline.simulate.replay import guide_wire
+from pipeline.study.manifest import read_manifest
+from pipeline.study.schema import Case
 from solver.grid import Grid
 
 MANIFEST = """
@@ -46,9 +48,9 @@ def wide_open() -> Lumen:
 
 
 def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Simulated]:
-    entry = Entry(np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    config = SolverConfig(segment_mm=0.5)
-    return list(simulate(case, entry, wide_open(), depths, [roll] * len(depths), config))
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis))
+    insertion = insertion_of(case.wire, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
+    return list(simulate(insertion, depths, [roll] * len(depths)))
 
 
 def test_positive_rest_curvature_bends_towards_the_material_axis(case: Case) -> None:
@@ -78,17 +80,15 @@ def test_depth_is_the_length_of_the_wire(case: Case) -> None:
 
 
 def test_scales_reach_the_wire(case: Case) -> None:
-    plain = guide_wire(case.wire, SolverConfig(), SimulateConfig())
-    stiff = guide_wire(case.wire, SolverConfig(), SimulateConfig(bending_scale=1.2))
+    plain = guide_wire(case.wire, 1.0)
+    stiff = guide_wire(case.wire, 1.0, bending_scale=1.2)
     np.testing.assert_allclose(
         np.array(stiff.bending_stiffness_N_mm2)[:, 1], 1.2 * np.array(plain.bending_stiffness_N_mm2)[:, 1]
     )
-    number: Wire = replace(case.wire, bending_stiffness_N_mm2=2.0)
-    assert (
-        guide_wire(number, SolverConfig(), SimulateConfig(bending_scale=0.5)).bending_stiffness_N_mm2 == 1.0
-    )
+    number = replace(case.wire, bending_stiffness_N_mm2=2.0)
+    assert guide_wire(number, 1.0, bending_scale=0.5).bending_stiffness_N_mm2 == 1.0
 
 
-def test_rolls_per_frame_and_their_offset(case: Case) -> None:
-    assert rolls(case, 2, SimulateConfig(roll_offset_deg=15.0)) == [15.0, 15.0]
-    assert rolls(replace(case, roll_deg=(10.0, 20.0)), 2, SimulateConfig(roll_offset_deg=-5.0)) == [5.0, 15.0]
+def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:
+    assert rolls(15.0, 2) == (15.0, 15.0)
+    assert rolls((10.0, 20.0), 2) == (10.0, 20.0)

@@ -5,29 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.compare.metrics import Comparison, rms
-from pipeline.compare.pooled import blocks, intervals, pooled, skill_of
+from pipeline.compare.metrics import rms
+from pipeline.compare.pooled import Row, blocks, counts, intervals, pooled, skill_of
 from pipeline.run.frame import Frame
 from pipeline.status import FrameStatus
 
 
-def frame(index: int, errors: np.ndarray, null: float = 1.0, tip: float = 0.2) -> Frame:
-    zeros = np.zeros(len(errors))
-    comparison = Comparison(
-        np.zeros((len(errors), 3)), zeros, errors, zeros, rms(errors), float(errors.mean()), 0.0, float(errors.max()),
-        0.0, 0.0, rms(errors), 0.0, tip, 0.0, True, 1.0,
-    )  # fmt: skip
-    return Frame(index, comparison=comparison, nulls_rms_mm={"centreline": null})
+def frame(errors: np.ndarray, null: float = 1.0, tip: float = 0.2) -> tuple[Row, np.ndarray]:
+    row = {"status": "ok", "rms_mm": rms(errors), "arc_rms_mm": rms(errors), "tip_mm": tip, "branch_ok": True}
+    return row | {"null_centreline_rms_mm": null}, errors
 
 
-def frames(seed: int, count: int = 9) -> list[Frame]:
+def frames(seed: int, count: int = 9) -> list[tuple[Row, np.ndarray]]:
     draw = np.random.default_rng(seed)
-    return [frame(i, np.abs(draw.normal(size=10 + 7 * i)), tip=float(draw.random())) for i in range(count)]
+    return [frame(np.abs(draw.normal(size=10 + 7 * i)), tip=float(draw.random())) for i in range(count)]
 
 
 def test_points_are_pooled_not_averaged() -> None:
     short, long = np.full(10, 3.0), np.full(90, 1.0)
-    result = pooled([frame(0, short), frame(1, long)], 0)
+    result = pooled([frame(short), frame(long)], 0)
     assert result["rms_mm"] == pytest.approx(np.sqrt((10 * 9 + 90) / 100))
     assert result["mean_mm"] == pytest.approx(1.2)
     assert result["skill"] == pytest.approx(1 - result["rms_mm"] ** 2)
@@ -52,16 +48,16 @@ def test_the_order_of_frames_does_not_matter_to_the_statistics() -> None:
 
 
 def test_failed_frames_are_not_pooled_and_nothing_gives_nothing() -> None:
-    good, bad = frame(0, np.ones(5)), frame(1, np.full(5, 100.0))
-    bad.fail("trace", FrameStatus.LENGTH_MISMATCH, "why")
-    assert pooled([good, bad], 0)["rms_mm"] == pytest.approx(1.0)
-    assert pooled([bad], 0) == {}
+    row, errors = frame(np.full(5, 100.0))
+    assert counts(row, errors)
+    assert not counts({**row, "status": FrameStatus.LENGTH_MISMATCH.identifier}, errors)
+    assert not counts({**row, "status": FrameStatus.SIMULATED.identifier}, None)
+    assert pooled([], 0) == {}
 
 
 def test_the_first_failure_is_kept() -> None:
-    record = Frame(0)
-    record.fail("trace", FrameStatus.NO_WIRE, "first")
-    record.fail("simulate", FrameStatus.SIMULATE_FAILED, "second")
+    record = Frame(0).failed("trace", FrameStatus.NO_WIRE, "first")
+    record = record.failed("simulate", FrameStatus.SIMULATE_FAILED, "second")
     assert (record.status, record.stage, record.message) == ("no_wire", "trace", "first")
 
 
@@ -88,7 +84,7 @@ def test_the_interval_covers_the_true_value_about_as_often_as_it_says() -> None:
 
 
 def test_two_blocks_give_no_interval() -> None:
-    result = pooled([frame(0, np.ones(4)), frame(1, np.ones(4))], 100)
+    result = pooled([frame(np.ones(4)), frame(np.ones(4))], 100)
     assert np.isnan(result["rms_low_mm"])
 
 

@@ -17,7 +17,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from reports import export, frames_file, tables
-from reports.frames_file import Frame, Scan
+from reports.frames_file import FrameArrays, ScanCrop
+from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, SWEEP
 
 SPACING = np.full(3, 0.4)
 ORIGIN = np.array([-20.0, -14.0, -6.0])
@@ -63,10 +64,10 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
         )
         failures += [_failure(case, frame) for frame in case.failed]
         _write_case(folder, case, rows, statistics)
-    tables.write_summary(out / "summary.csv", summaries)
-    tables.write_failures(out / "failures.csv", failures)
+    tables.write(out / "summary.csv", SUMMARY, summaries)
+    tables.write(out / "failures.csv", FAILURES, failures)
     if sweep:
-        tables.write_sweep(out / "sweep.csv", list(_sweep(cases)))
+        tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
     overall = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31, "cases": 2, "groups": 1}
     run = {
         "cases": [c.name for c in cases],
@@ -185,11 +186,11 @@ def _failure(case: FakeCase, frame: int) -> dict[str, Any]:
 
 def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statistics: dict[str, Any]) -> None:
     folder.mkdir(parents=True)
-    tables.write_errors(folder / "errors.csv", rows)
+    tables.write(folder / "errors.csv", ERRORS, rows)
     frames = list(_frames(case))
     frames_file.write_frames(folder / "frames.h5", _scan(case), frames)
     if not case.simulated_only:
-        tables.write_points(folder / "points.csv.gz", _points(frames))
+        tables.write(folder / "points.csv.gz", POINTS, _points(frames))
     (folder / "log.txt").write_text("load: 30 frames\n")
     last = frames[-1].simulated_mm
     assert last is not None
@@ -202,8 +203,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "status": _status(case),
         "sentence": "two frames have no result" if case.failed else "every frame is ok",
         "frames": [_frame_status(case, row) for row in rows],
-        "counts": {"ok": statistics["frames_ok"], "failed": statistics["frames_failed"]},
-        "statistics": {k: v for k, v in statistics.items() if v is not None and v == v},
+        "summary": {k: v for k, v in statistics.items() if v is not None and v == v},
         "seconds": {s: statistics[f"{s}_s"] for s in STAGES} | {"report": 3.0},
         "assumptions": ["voxel spacing taken as 0.5 mm: the file gives none"] if case.simulated_only else [],
         "warnings": ["roll is unknown and was taken as 0"] if case.failed else [],
@@ -229,7 +229,7 @@ def _frame_status(case: FakeCase, row: dict[str, Any]) -> dict[str, Any]:
     return {"frame": row["frame"], "status": row["status"], **kept}
 
 
-def _frames(case: FakeCase) -> Iterator[Frame]:
+def _frames(case: FakeCase) -> Iterator[FrameArrays]:
     rng = np.random.default_rng(case.seed + 1)
     vessel = _tube(siphon(110.0), 1.6, 90.0)
     for frame, depth in enumerate(_depths(case)):
@@ -240,17 +240,17 @@ def _frames(case: FakeCase) -> Iterator[Frame]:
         force = np.where(bow > 0.9, 0.01 * depth / 70, 0.0)
         arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(simulated, axis=0), axis=1))])
         if case.simulated_only:
-            yield Frame(frame, simulated_mm=simulated, arc_mm=arc, contact_force_N=force)
+            yield FrameArrays(frame, simulated_mm=simulated, arc_mm=arc, contact_force_N=force)
             continue
         noise = gaussian_filter(rng.normal(0, 25, SHAPE), 0.7) * 2
         scan = vessel + noise + _tube(true, 0.0, 160.0)
         mips = {a: np.clip(scan.max(axis=a) + 20, 0, 255).astype(np.uint8) for a in range(3)}
         if frame in case.failed:
-            yield Frame(frame, mips=mips)
+            yield FrameArrays(frame, mips=mips)
             continue
         traced = true + rng.normal(0, 0.02, true.shape)
         truth = true if case.truth else None
-        yield Frame(frame, traced, simulated, error, arc, force, truth, np.full(len(true), 0.02), mips)
+        yield FrameArrays(frame, traced, simulated, error, arc, force, truth, np.full(len(true), 0.02), mips)
 
 
 def _tube(curve: np.ndarray, radius: float, grey: float) -> np.ndarray:
@@ -263,15 +263,15 @@ def _tube(curve: np.ndarray, radius: float, grey: float) -> np.ndarray:
     return np.clip(wide / level, 0, 1) * grey if radius == 0 else (wide > 0.35 * level) * grey
 
 
-def _scan(case: FakeCase) -> Scan:
+def _scan(case: FakeCase) -> ScanCrop:
     if not case.simulated_only:
-        return Scan(SPACING, ORIGIN, np.eye(3), SHAPE)
+        return ScanCrop(SPACING, ORIGIN, np.eye(3), SHAPE)
     mask = _tube(siphon(110.0), 1.6, 1.0) > 0
     pictures = {axis: mask.max(axis=axis).astype(np.uint8) for axis in range(3)}
-    return Scan(SPACING, ORIGIN, np.eye(3), SHAPE, pictures)
+    return ScanCrop(SPACING, ORIGIN, np.eye(3), SHAPE, pictures)
 
 
-def _points(frames: list[Frame]) -> dict[str, np.ndarray]:
+def _points(frames: list[FrameArrays]) -> dict[str, np.ndarray]:
     kept = [f for f in frames if f.simulated_mm is not None]
     nothing = [np.full(len(f.arc_mm), np.nan) for f in kept]  # type: ignore[arg-type]
     xyz = np.concatenate([f.simulated_mm for f in kept])  # type: ignore[misc]

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reports import bench
-from reports.figures._style import Drawing
+from reports.figures._drawing import Drawing
 from reports.figures.benchmark import convergence, orders, pareto, stress_outcomes
 
 

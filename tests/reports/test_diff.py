@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports import diff, tables
-from reports.schema import ERRORS_COLUMNS
+from reports.schema import ERRORS
 from tests.reports.fake_results import FakeCase, write_run
 
 TOLERANCE = {"rms_mm": 0.1, "skill": 0.05, "branch_ok": 0.0, "insertion_mm": 0.2}
 
 
 def _table(rows: list[dict[str, object]]) -> pd.DataFrame:
-    return tables._conform(pd.DataFrame(rows), ERRORS_COLUMNS)
+    return tables._conform(pd.DataFrame(rows), ERRORS)
 
 
 def _row(**changes: object) -> dict[str, object]:
@@ -88,9 +88,9 @@ def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> 
     worse = tmp_path / "b"
     shutil.copytree(out, worse)
     path = worse / "cases" / "d" / "errors.csv"
-    errors = tables.read_errors(path)
+    errors = tables.read(path, ERRORS)
     errors.loc[2, "tip_mm"] += 1.0
-    tables.write_table(path, errors, ERRORS_COLUMNS)
+    tables.write(path, ERRORS, errors)
     found = diff.diff_folders(out, worse, tolerance)
     assert found.regressions[["case", "frame", "column"]].to_numpy().tolist() == [["d", 2, "tip_mm"]]
     assert "case d frame 2, tip_mm" in found.sentence

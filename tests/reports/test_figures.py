@@ -14,10 +14,11 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _planes, _style
-from reports.figures._style import NULLS, STAGE_COLOURS, positive_axis
-from reports.frames_file import Frame, Scan, frame_numbers, read_frame, read_scan, write_frames
-from reports.schema import ERRORS_COLUMNS, POINTS_COLUMNS, SUMMARY_COLUMNS, SWEEP_COLUMNS
+from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _drawing, _planes, _style
+from reports.figures._drawing import positive_axis
+from reports.figures._style import STAGE_COLOURS, predictors
+from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
+from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
 from tests.reports.fake_results import FakeCase, write_run
 
 # no permutation, so that swapped or transposed axes cannot hide
@@ -28,8 +29,8 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
     fields = {
         "folder": folder,
         "result": {},
-        "errors": tables.empty_table(ERRORS_COLUMNS),
-        "points": tables.empty_table(POINTS_COLUMNS),
+        "errors": tables.read_if_there(None, ERRORS),
+        "points": tables.read_if_there(None, POINTS),
         "scan": None,
         "frames": (),
     }
@@ -40,14 +41,14 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
 def test_no_data_is_no_figure(name: str, tmp_path: Path) -> None:
     assert CASE_FIGURES[name](_empty_case(tmp_path)) is None
     rows = {"frame": [0, 1], "status": ["no_wire", "load_failed"]}
-    tables.write_table(tmp_path / "errors.csv", pd.DataFrame(rows), ERRORS_COLUMNS)
-    failed = _empty_case(tmp_path, errors=tables.read_errors(tmp_path / "errors.csv"))
+    tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(rows))
+    failed = _empty_case(tmp_path, errors=tables.read(tmp_path / "errors.csv", ERRORS))
     assert CASE_FIGURES[name](failed) is None
 
 
 @pytest.mark.parametrize("name", RUN_FIGURES)
 def test_an_empty_run_has_no_figure(name: str) -> None:
-    run = RunFiles({}, tables.empty_table(SUMMARY_COLUMNS), tables.empty_table(SWEEP_COLUMNS))
+    run = RunFiles({}, tables.read_if_there(None, SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES[name](run) is None
 
 
@@ -59,7 +60,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     absent = {"failed_projections", "simulated_wires"} | ({"every_frame"} if count == 1 else set())
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles(
-        {"c": case.errors}, tables.read_summary(out / "summary.csv"), tables.empty_table(SWEEP_COLUMNS)
+        {"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP)
     )
     assert RUN_FIGURES["case_frame_map"](run) is not None
 
@@ -71,8 +72,8 @@ def _heat_case(tmp_path: Path) -> CaseFiles:
         "arc_mm": np.concatenate(arcs),
         "error_mm": np.concatenate([a / 10 for a in arcs]),
     }
-    tables.write_points(tmp_path / "points.csv.gz", columns)
-    return _empty_case(tmp_path, points=tables.read_points(tmp_path / "points.csv.gz"))
+    tables.write(tmp_path / "points.csv.gz", POINTS, columns)
+    return _empty_case(tmp_path, points=tables.read(tmp_path / "points.csv.gz", POINTS))
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
@@ -92,16 +93,17 @@ def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("direction", [np.eye(3), TURN], ids=["aligned", "oblique"])
 def test_curves_fall_on_the_voxels_they_run_through(direction: np.ndarray) -> None:
-    scan = Scan(np.array([0.5, 0.8, 1.1]), np.array([10.0, -20.0, 5.0]), direction, (12, 9, 7))
+    scan = ScanCrop(np.array([0.5, 0.8, 1.1]), np.array([10.0, -20.0, 5.0]), direction, (12, 9, 7))
     index = np.array([[3, 4, 5], [11, 8, 6], [0, 0, 0]])
     points = scan.origin_mm + (index * scan.spacing_mm) @ direction.T
     view = _planes.whole(scan)
     place = view.coordinates(points)
-    for axis, (across, up) in _planes.PLANES:
+    for plane in _planes.PLANES:
+        axis, across, up = plane
         picture = np.zeros(scan.shape, np.uint8)
         picture[tuple(index.T)] = 1
         projected = picture.max(axis=axis)
-        left, right, bottom, top = view.extent(across, up)
+        left, right, bottom, top = view.extent(plane)
         columns = (place[:, across] - left) / (right - left) * projected.shape[0]
         rows = (place[:, up] - bottom) / (top - bottom) * projected.shape[1]
         found = projected[np.floor(columns).astype(int), np.floor(rows).astype(int)]
@@ -112,7 +114,7 @@ def test_curves_fall_on_the_voxels_they_run_through(direction: np.ndarray) -> No
 
 
 def test_views_follow_the_curves_and_stay_in_the_crop() -> None:
-    scan = Scan(np.ones(3), np.zeros(3), np.eye(3), (50, 50, 50))
+    scan = ScanCrop(np.ones(3), np.zeros(3), np.eye(3), (50, 50, 50))
     curve = np.array([[10.0, 20.0, 1.0], [12.0, 20.0, 30.0]])
     view = _planes.around(scan, [curve])
     np.testing.assert_allclose(view.low, [5.0, 15.0, -0.5])
@@ -125,9 +127,9 @@ def test_views_follow_the_curves_and_stay_in_the_crop() -> None:
 def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=9, failed=(0,)),))
     path = out / "cases" / "c" / "errors.csv"
-    errors = tables.read_errors(path)
+    errors = tables.read(path, ERRORS)
     errors.loc[errors["frame"] == 3, "rms_mm"] = 99.0
-    tables.write_table(path, errors, ERRORS_COLUMNS)
+    tables.write(path, ERRORS, errors)
     case = read_case(path.parent)
     drawing = CASE_FIGURES["projections"](case)
     failed = CASE_FIGURES["failed_projections"](case)
@@ -166,11 +168,11 @@ def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> 
 
 def test_frames_file_reads_back(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    scan = Scan(
+    scan = ScanCrop(
         np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)}
     )
     curve, picture = rng.normal(size=(7, 3)), rng.integers(0, 255, (5, 6), dtype=np.uint8)
-    frames = (Frame(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
+    frames = (FrameArrays(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
     write_frames(tmp_path / "frames.h5", scan, frames)
     back = read_scan(tmp_path / "frames.h5")
     assert back is not None
@@ -205,7 +207,8 @@ def test_colours_are_told_apart_by_dichromats() -> None:
         seen = np.array([matrix @ _linear(c) for c in stages])
         apart = np.linalg.norm(seen[:, None] - seen[None], axis=2) + np.eye(len(seen))
         assert apart.min() > 0.08
-    assert len({(style, marker) for _, _, _, style, marker in NULLS}) == len(NULLS)
+    rivals = list(predictors())
+    assert len({(style, marker) for _, _, _, style, marker in rivals}) == len(rivals) == 4
 
 
 def _linear(colour: np.ndarray) -> np.ndarray:
@@ -224,12 +227,12 @@ def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float]
 def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:
     sizes = []
     for compact in (False, True):
-        figure = _style.new_figure(2.0, 3.0, fitted=False)
+        figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
         axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
         path = tmp_path / f"{compact}.png"
-        _style.save(_style.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
+        _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import json
 import re
 import shutil
@@ -12,11 +14,11 @@ from urllib.parse import unquote
 
 import pytest
 
-from reports import tables
+from reports import figures, tables
 from reports.case_files import find_cases, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES
+from reports.figures import CASE_FIGURES, RUN_FIGURES, declared
 from reports.html import render_case, render_index
-from reports.sections import declared
+from reports.schema import ERRORS, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 
 PAGE_BUDGET = 2_000_000
@@ -55,10 +57,19 @@ def _pages(run: Path) -> list[Path]:
 def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     assert [s["figure"] for s in declared("case")] == list(CASE_FIGURES)
     assert {s["figure"] for s in declared("run")} == set(RUN_FIGURES)
+    written = set()
+    for path in Path(figures.__file__).parent.glob("[a-z]*.py"):
+        module = importlib.import_module(f"reports.figures.{path.stem}")
+        written |= {n for n, f in vars(module).items() if _draws(f) and not n.startswith("_")}
+    assert written == {s["figure"] for page in ("case", "run", "bench") for s in declared(page)}
     for page in ("case", "run", "bench"):
         for section in declared(page):
             assert section["read"].endswith(".")
             assert section["bad"].startswith(("Bad:", "Look"))
+
+
+def _draws(thing: object) -> bool:
+    return inspect.isfunction(thing) and thing.__annotations__.get("return") == "Drawing | None"
 
 
 def test_every_link_leads_somewhere(run: Path) -> None:
@@ -145,10 +156,10 @@ def test_embedding_makes_one_file(run: Path, tmp_path: Path) -> None:
 
 
 def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
-    summary = tables.read_summary(run / "summary.csv").set_index("case")
+    summary = tables.read(run / "summary.csv", SUMMARY).set_index("case")
     text = (run / "cases" / "cow-seed-100" / "report.html").read_text(encoding="utf-8")
     assert f"<b>{summary.loc['cow-seed-100', 'rms_mm']:.3f}</b>" in text
-    errors = tables.read_errors(run / "cases" / "cow-seed-100" / "errors.csv")
+    errors = tables.read(run / "cases" / "cow-seed-100" / "errors.csv", ERRORS)
     assert f"<td>{errors['p95_mm'][5]:.3f}</td>" in text
 
 
@@ -162,6 +173,37 @@ def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None
     assert "no result.json" in (dead / "report.html").read_text(encoding="utf-8")
     assert '<a href="cases/dead/report.html">dead</a>' in text
     assert 'class="status bad"' in text
+
+
+def test_a_crash_counts_its_frames_on_the_pages_as_on_the_terminal(tmp_path: Path) -> None:
+    """A crashed case has the row that the terminal counts from, and no frames of its own."""
+    out = write_run(tmp_path / "out", (FakeCase("fine", frames=3, failed=(1,)),))
+    crashed = out / "cases" / "crashed"
+    crashed.mkdir()
+    row = {"case": "crashed", "status": "crashed", "frames": 5, "frames_ok": 0, "frames_failed": 5}
+    result = {"case": "crashed", "status": "crashed", "sentence": "its log has the traceback", "frames": []}
+    (crashed / "result.json").write_text(json.dumps(result | {"summary": row}))
+    index = render_index(out).read_text(encoding="utf-8")
+    assert "2 cases, 8 frames: 2 ok, 6 without a result." in index
+    page = render_case(crashed).read_text(encoding="utf-8")
+    assert "<b>0</b><span>of 5 frames with a result</span>" in page
+
+
+def test_counters_are_sums_and_levels(tmp_path: Path) -> None:
+    folder = tmp_path / "c"
+    folder.mkdir()
+    cnr = {"min": 6.17, "median": 8.873, "max": 9.73}
+    counters = {"trace": {"voxels_read": 63610.0, "cnr": cnr, "blur_mm": dict.fromkeys(cnr)}}
+    (folder / "result.json").write_text(json.dumps({"case": "c", "status": "ok", "counters": counters}))
+    text = render_case(folder).read_text(encoding="utf-8")
+    work = text[text.index('<h2 id="work">') : text.index('<h2 id="settings">')]
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", work)
+    assert cells == [
+        "<code>trace.voxels_read</code>",
+        "63610",
+        "<code>trace.cnr</code>",
+        "8.87 (6.17 to 9.73)",
+    ]
 
 
 def test_a_case_that_failed_as_a_whole_says_why(tmp_path: Path) -> None:

@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports import schema, tables
+from reports import tables
 from reports.atomic import replacing
+from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, Table
 
 # the contract that other people's scripts rely on, typed again on purpose: a rename must be seen here
 ERRORS_HEADER = (
@@ -39,19 +40,19 @@ def _header(path: Path) -> str:
 
 
 def test_headers_are_the_contract(tmp_path: Path) -> None:
-    tables.write_errors(tmp_path / "errors.csv", [])
-    tables.write_summary(tmp_path / "summary.csv", [])
-    tables.write_failures(tmp_path / "failures.csv", [])
-    tables.write_points(tmp_path / "points.csv.gz", {})
+    tables.write(tmp_path / "errors.csv", ERRORS, [])
+    tables.write(tmp_path / "summary.csv", SUMMARY, [])
+    tables.write(tmp_path / "failures.csv", FAILURES, [])
+    tables.write(tmp_path / "points.csv.gz", POINTS, {})
     assert _header(tmp_path / "errors.csv") == ERRORS_HEADER
     assert _header(tmp_path / "summary.csv") == SUMMARY_HEADER
     assert _header(tmp_path / "failures.csv") == FAILURES_HEADER
     assert gzip.decompress((tmp_path / "points.csv.gz").read_bytes()).decode() == POINTS_HEADER + "\n"
 
 
-@pytest.mark.parametrize("columns", [schema.ERRORS_COLUMNS, schema.POINTS_COLUMNS, schema.SUMMARY_COLUMNS])
-def test_units_are_in_the_names(columns: tuple[schema.Column, ...]) -> None:
-    for column in columns:
+@pytest.mark.parametrize("table", [ERRORS, POINTS, SUMMARY])
+def test_units_are_in_the_names(table: Table) -> None:
+    for column in table:
         suffix = column.name.rsplit("_", 1)[-1]
         assert (suffix == column.unit) == (column.unit not in ("1", "-")), column
         assert column.meaning
@@ -63,11 +64,11 @@ def test_not_applicable_is_empty_and_zero_stays_zero(tmp_path: Path) -> None:
         {"frame": 0, "status": "ok", "rms_mm": 0.0, "branch_ok": True, "iterations": 0},
         {"frame": 1, "status": "no_wire", "rms_mm": math.nan, "branch_ok": None, "joints": math.nan},
     ]
-    tables.write_errors(path, rows)
+    tables.write(path, ERRORS, rows)
     first, second = path.read_text(encoding="utf-8").splitlines()[1:]
     assert first.startswith("0,ok,,,0,")
     assert second.replace(",", "") == "1no_wire"
-    back = tables.read_errors(path)
+    back = tables.read(path, ERRORS)
     assert back["rms_mm"][0] == 0.0
     assert math.isnan(back["rms_mm"][1])
     assert back["iterations"][0] == 0
@@ -78,26 +79,26 @@ def test_not_applicable_is_empty_and_zero_stays_zero(tmp_path: Path) -> None:
 
 def test_unknown_column_is_refused_with_a_suggestion(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"rmse_mm.*did you mean rms_mm"):
-        tables.write_errors(tmp_path / "errors.csv", [{"frame": 0, "rmse_mm": 1.0}])
+        tables.write(tmp_path / "errors.csv", ERRORS, [{"frame": 0, "rmse_mm": 1.0}])
     assert not list(tmp_path.iterdir())
 
 
 def test_unequal_points_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="differ in length"):
-        tables.write_points(tmp_path / "points.csv.gz", {"frame": [0, 0], "arc_mm": [0.0]})
+        tables.write(tmp_path / "points.csv.gz", POINTS, {"frame": [0, 0], "arc_mm": [0.0]})
 
 
 def test_messages_with_commas_quotes_and_new_lines_survive(tmp_path: Path) -> None:
     message = 'trace: "case" 07, frame 12:\n3 components; lower trace.x'
-    tables.write_failures(tmp_path / "failures.csv", [{"case": "a,b", "frame": 12, "message": message}])
-    back = tables.read_failures(tmp_path / "failures.csv")
+    tables.write(tmp_path / "failures.csv", FAILURES, [{"case": "a,b", "frame": 12, "message": message}])
+    back = tables.read(tmp_path / "failures.csv", FAILURES)
     assert back["message"][0] == message
     assert back["case"][0] == "a,b"
 
 
 def test_a_text_that_looks_like_nothing_is_kept(tmp_path: Path) -> None:
-    tables.write_summary(tmp_path / "summary.csv", [{"case": "NA", "group": "null", "frames": 3}])
-    back = tables.read_summary(tmp_path / "summary.csv")
+    tables.write(tmp_path / "summary.csv", SUMMARY, [{"case": "NA", "group": "null", "frames": 3}])
+    back = tables.read(tmp_path / "summary.csv", SUMMARY)
     assert back["case"].tolist() == ["NA"]
     assert back["group"].tolist() == ["null"]
 
@@ -106,7 +107,7 @@ def test_a_wrong_field_names_its_file(tmp_path: Path) -> None:
     path = tmp_path / "errors.csv"
     path.write_text("frame,rms_mm\n0,abc\n")
     with pytest.raises(ValueError, match=r"errors\.csv"):
-        tables.read_errors(path)
+        tables.read(path, ERRORS)
 
 
 @settings(max_examples=30, deadline=None)
@@ -118,19 +119,19 @@ def test_points_read_back(tmp_path_factory: pytest.TempPathFactory, error: list[
     path = tmp_path_factory.mktemp("points") / "points.csv.gz"
     frame = np.arange(len(error)) // 3
     forces = np.full(len(error), force)
-    tables.write_points(path, {"frame": frame, "error_mm": np.array(error), "contact_force_N": forces})
+    tables.write(path, POINTS, {"frame": frame, "error_mm": np.array(error), "contact_force_N": forces})
     first = path.read_bytes()
-    back = tables.read_points(path)
+    back = tables.read(path, POINTS)
     np.testing.assert_array_equal(back["frame"].to_numpy(dtype=int), frame)
     np.testing.assert_allclose(back["error_mm"].to_numpy(), error, rtol=1e-8)
     np.testing.assert_allclose(back["contact_force_N"].to_numpy(), forces, rtol=1e-8)
-    tables.write_table(path, back, schema.POINTS_COLUMNS)
+    tables.write(path, POINTS, back)
     assert path.read_bytes() == first, "writing what was read gives the same bytes"
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "errors.csv"
-    tables.write_errors(path, [{"frame": 0}])
+    tables.write(path, ERRORS, [{"frame": 0}])
     before = path.read_text(encoding="utf-8")
     with pytest.raises(RuntimeError):
         _fail_half_way(path)
@@ -147,5 +148,5 @@ def _fail_half_way(path: Path) -> None:
 def test_extra_columns_are_kept_at_the_end(tmp_path: Path) -> None:
     path = tmp_path / "errors.csv"
     pd.DataFrame({"mine": ["x"], "frame": [3]}).to_csv(path, index=False)
-    back = tables.read_errors(path)
+    back = tables.read(path, ERRORS)
     assert list(back.columns) == [*ERRORS_HEADER.split(","), "mine"]

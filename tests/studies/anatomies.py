@@ -16,7 +16,8 @@ from pathlib import Path
 import pandas as pd
 
 from pipeline.cli import main as wireval
-from reports.tables import read_errors
+from reports.schema import ERRORS
+from reports.tables import read
 
 TREES = ("BG001", "BG0002", "BG05", "BG10", "BG0019")
 FRAMES, SIZE, SEED = 6, 128, 100
@@ -58,7 +59,7 @@ def run_tree(path: Path, root: Path, size: int = SIZE, frames: int = FRAMES) -> 
     )
     if code not in (0, 1):
         return pd.DataFrame(), said.strip().splitlines()[-1]
-    table = read_errors(next((out / "cases").iterdir()) / "errors.csv")
+    table = read(next((out / "cases").iterdir()) / "errors.csv", ERRORS)
     return table, ""
 
 

@@ -6,18 +6,19 @@ import json
 import sys
 from pathlib import Path
 
-from reports.tables import read_errors
+from reports.schema import ERRORS
+from reports.tables import read
 
 
 def row(out: Path) -> str:
     """Frames ok, tracing in voxels (median frame), simulated against truth, peak memory."""
     case = next((out / "cases").iterdir())
     table, result = (
-        read_errors(case / "errors.csv"),
+        read(case / "errors.csv", ERRORS),
         json.loads((case / "result.json").read_text(encoding="utf-8")),
     )
     voxel = min(result["geometry"]["spacing_mm"])
-    numbers = result["statistics"]
+    numbers = result["summary"]
     return (
         f"{out.name:12s} {int((table['status'] == 'ok').sum()):3d}/{len(table)}"
         f"   {table['trace_mean_mm'].median() / voxel:6.3f} {table['trace_mean_mm'].max() / voxel:6.3f}"

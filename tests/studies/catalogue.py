@@ -20,10 +20,10 @@ from data_synthetic import catalogue
 from data_synthetic.scene import Scene
 from data_synthetic.write import write_study
 from pipeline.cli import main as wireval
-from pipeline.run.stages import STAGES
+from pipeline.run.log import STAGES
+from reports import tables
 from reports.case_files import GOOD
-from reports.schema import ERRORS_COLUMNS
-from reports.tables import read_errors, write_errors
+from reports.schema import ERRORS
 
 GOLDEN = Path(__file__).resolve().parents[2] / "reports" / "baseline" / "catalogue"
 SEED = 100  # nobody tunes on seeds from 100 up
@@ -46,7 +46,7 @@ class Outcome:
 
     @property
     def errors(self) -> pd.DataFrame:
-        return read_errors(self.folder / "errors.csv")
+        return tables.read(self.folder / "errors.csv", ERRORS)
 
     @property
     def statuses(self) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ def times(outcomes: list[Outcome]) -> str:
 def golden(errors: pd.DataFrame) -> pd.DataFrame:
     """What is worth keeping: no times; no numbers of a frame that failed, where only the status is a promise."""
     kept = errors.astype(object).where(errors.notna(), float("nan"))
-    for column in ERRORS_COLUMNS:
+    for column in ERRORS:
         if column.name.endswith("_s"):
             kept[column.name] = float("nan")
         elif column.kind == "float":
@@ -132,7 +132,7 @@ def write_golden(outcomes: list[Outcome], folder: Path) -> None:
         table["status"] = [
             s if s in e.split("|") else e.split("|")[0] for s, e in zip(o.statuses, o.expected, strict=True)
         ]
-        write_errors(folder / "cases" / o.name / "errors.csv", table.to_dict("records"))
+        tables.write(folder / "cases" / o.name / "errors.csv", ERRORS, table.to_dict("records"))
 
 
 def main(names: list[str]) -> None:

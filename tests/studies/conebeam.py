@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reports.tables import read_errors
+from reports.schema import ERRORS
+from reports.tables import read
 from tests.studies.conebeam_picture import draw
 
 SCENE, SCANNERS = "circle-of-willis", ("psf", "conebeam")
@@ -51,7 +52,7 @@ def make_and_run(scanner: str, out: Path, args: argparse.Namespace) -> dict[str,
 
 def errors(out: Path, scanner: str) -> pd.DataFrame:
     """The errors table of one run."""
-    return read_errors(next((out / f"out-{scanner}" / "cases").iterdir()) / "errors.csv")
+    return read(next((out / f"out-{scanner}" / "cases").iterdir()) / "errors.csv", ERRORS)
 
 
 def table(tables: dict[str, pd.DataFrame]) -> str:

@@ -1,4 +1,4 @@
-"""Compile every kernel once by running a tiny study (``python -m pipeline.run.warm_up``); later runs load them.
+"""Compile every kernel once by running a tiny study (``python -m pipeline.warm_up``); later runs load them.
 
 The solver compiles in a process of its own beside the imaging kernels: on two cores that is nearly half the time.
 """

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from reports import _format
+from reports import _content
 
 
 @pytest.mark.parametrize(
@@ -32,19 +32,30 @@ from reports import _format
     ],
 )
 def test_numbers(value: Any, text: str) -> None:
-    assert _format.number(value) == text
+    assert _content.number(value) == text
 
 
 def test_intervals_need_both_ends() -> None:
-    assert _format.interval(0.1, 0.25) == "0.100 to 0.250"
-    assert _format.interval(None, 0.25) == ""
+    assert _content.interval(0.1, 0.25) == "0.100 to 0.250"
+    assert _content.interval(None, 0.25) == ""
 
 
 def test_trees_become_rows_and_empty_leaves_go() -> None:
     tree = {"a": {"b": 1.0, "c": None, "d": [0.16557399795383654, 2]}, "argv": ["wireval", "run"], "e": ""}
-    assert list(_format.flatten(tree)) == [("a.b", "1"), ("a.d", "[0.165573998, 2]"), ("argv", "wireval run")]
+    assert list(_content.flatten(tree)) == [
+        ("a.b", "1"),
+        ("a.d", "[0.165573998, 2]"),
+        ("argv", "wireval run"),
+    ]
+
+
+def test_a_level_is_one_text_beside_plain_counts() -> None:
+    level = {"min": 0.5, "median": 0.8300158, "max": 12.0}
+    tree = {"segment": {"voxels_read": 10752.0, "blur_mm": level, "nothing": dict.fromkeys(level)}}
+    rows = list(_content.flatten(tree))
+    assert rows == [("segment.voxels_read", "10752"), ("segment.blur_mm", "0.830 (0.500 to 12.0)")]
 
 
 def test_settings_keep_their_source() -> None:
     config = {"solver": {"segment_mm": {"value": 0.5, "source": "command line"}}, "odd": {"key": 1}}
-    assert _format.settings(config) == [("solver.segment_mm", "0.5", "command line"), ("odd.key", "1", "")]
+    assert _content.settings(config) == [("solver.segment_mm", "0.5", "command line"), ("odd.key", "1", "")]

@@ -1,0 +1,168 @@
+"""The whole run: every case of a manifest, and of every point of a sweep, into one output folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.run import sweep
+from pipeline.run.aggregate import Totals, aggregate
+from pipeline.run.batch import run_all
+from pipeline.run.case import Job, finished, run_case
+from pipeline.run.keys import file_hash
+from pipeline.run.provenance import collect
+from pipeline.run.results import crashed, write_json
+from pipeline.study.manifest import Manifest
+from pipeline.study.schema import Case
+from pipeline.study.settings import to_toml
+from pipeline.study.suggest import did_you_mean
+from reports.atomic import write_text
+from reports.html import render_index
+from reports.schema import ERRORS, POINTS
+
+CASE_FILES = (ERRORS.file, POINTS.file, "frames.h5", "report.html")
+
+
+class UsageError(Exception):
+    """A command line that cannot be carried out."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to run and how. template : settings and output of every case; workers, address : where it runs.
+
+    shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
+    """
+
+    manifest: Manifest
+    cases: tuple[Case, ...]
+    template: Job
+    points: tuple[sweep.Point, ...] = ()
+    workers: int = 1
+    address: str = ""
+    shard: str = ""
+    assumptions: tuple[str, ...] = ()
+
+    @property
+    def out(self) -> Path:
+        """The output folder."""
+        return self.template.out
+
+    @property
+    def jobs(self) -> list[Job]:
+        """One per case."""
+        return [replace(self.template, case=case) for case in self.cases]
+
+
+def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case, ...]:
+    """The cases of the given ids (all where none is given); of these, with shard ``I/N``, every N-th by sorted id."""
+    by_id = {case.id: case for case in cases}
+    unknown = [name for name in only if name not in by_id]
+    if unknown:
+        msg = f"--only {unknown[0]!r}: no such case; {did_you_mean(unknown[0], by_id)}"
+        raise UsageError(msg)
+    ids = [name for name in by_id if not only or name in only]
+    if shard:
+        index, count = _shard(shard)
+        ids = sorted(ids)[index - 1 :: count]
+    return tuple(by_id[name] for name in ids)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    parts = text.split("/")
+    if len(parts) == 2 and all(p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
+        return int(parts[0]), int(parts[1])
+    msg = f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"
+    raise UsageError(msg)
+
+
+def guard_out(out: Path, manifest: Path) -> None:
+    """Refuse an output folder that holds something else than a run of the same manifest."""
+    if not out.exists() or not any(out.iterdir()):
+        return
+    info = out / "run.json"
+    known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256") if info.exists() else None
+    if not info.exists() and (list(out.glob("run.*.json")) or (out / "manifest.inferred.toml").exists()):
+        return
+    if known != file_hash(manifest):
+        what = "was made from another manifest" if known else "is not empty and holds no run"
+        msg = (
+            f"{out} {what}; name another folder, or say --resume (keep what fits) or --fresh (compute again)"
+        )
+        raise UsageError(msg)
+
+
+def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
+    """Run everything and write what is about the whole; the totals and the path of the page."""
+    out, jobs = plan.out, plan.jobs
+    info: dict[str, Any] = {
+        "manifest": str(plan.manifest.path),
+        "manifest_sha256": file_hash(plan.manifest.path),
+    }
+    info |= {
+        "provenance": collect(),
+        "assumptions": plan.assumptions,
+        "config": plan.template.settings.as_dict(),
+    }
+    name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
+    write_text(out / "config.resolved.toml", to_toml(plan.template.settings))
+    write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
+    run_cases(plan, jobs)
+    for point in plan.points:
+        run_cases(plan, sweep.jobs_of(point, jobs))
+    if plan.points:
+        sweep.write_sweep(out, plan.points)
+    totals = aggregate(out, info, name)
+    if junit:
+        from pipeline.run.junit import write_junit
+        from pipeline.run.results import found_results
+
+        write_junit(junit, found_results(out))
+    return totals, render_index(out, embed=plan.template.embed)
+
+
+def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
+    """Run jobs, the longest first, so that no long case is left for the end; a crash becomes that case's result."""
+    longest = (
+        sorted(jobs, key=lambda job: -job.case.frame_count) if plan.workers > 1 or plan.address else jobs
+    )
+    for outcome in run_all(longest, run_case, plan.workers, plan.address):
+        if not outcome.done:
+            job = outcome.job
+            job.folder.mkdir(parents=True, exist_ok=True)
+            for (
+                name
+            ) in CASE_FILES:  # of an earlier run: they would stand beside this result and belong to another
+                (job.folder / name).unlink(missing_ok=True)
+            with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
+                handle.write(outcome.log + "\n")
+            crashed(job.case, outcome.error).write(job.folder)
+
+
+def intention(plan: Plan) -> list[str]:
+    """What a run would do, a line each."""
+    lines = []
+    for job in plan.jobs:
+        known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
+        lines.append(f"{job.case.id}: {job.case.frame_count} frames, {known} -> {job.folder}")
+    for point in plan.points:
+        where = plan.out / "sweep" / point.folder
+        lines.append(f"sweep {point.parameter} = {point.value}: {len(plan.cases)} case(s) -> {where}")
+    return [*lines, "dry run: nothing was computed"]
+
+
+def last_line(totals: Totals, index: Path) -> str:
+    """Counts, median error, solver time and where the report lies."""
+    parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
+    if totals.frames_ok < totals.frames:
+        parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+    if np.isfinite(totals.median_mm):
+        parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
+    if totals.frames:
+        parts.append(f"solver {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
+    return ".  ".join(parts) + f".  report: {index}"

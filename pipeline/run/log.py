@@ -1,0 +1,71 @@
+"""What a case writes down on its way: times and counters, assumptions and warnings, and progress for the reader."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+
+from pipeline.model import Counters, Levels
+
+Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]
+STAGES: tuple[Stage, ...] = ("load", "segment", "trace", "simulate", "compare", "report")
+Progress = Callable[[str, int, int, str], None]
+"""Called with stage, steps done, steps in all, and a short text."""
+
+
+@dataclass
+class Log:
+    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage)."""
+
+    progress: Progress
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
+    assumptions: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    _counts: dict[str, dict[str, float]] = field(default_factory=lambda: {stage: {} for stage in STAGES})
+    _levels: dict[str, dict[str, list[float]]] = field(
+        default_factory=lambda: {stage: {} for stage in STAGES}
+    )
+
+    @contextmanager
+    def timed(self, stage: Stage, frame: int | None = None) -> Iterator[None]:
+        """Add the time of a block to a stage, and to a frame where one is given."""
+        clock = perf_counter()
+        try:
+            yield
+        finally:
+            self.spent(stage, perf_counter() - clock, frame)
+
+    def spent(self, stage: Stage, seconds: float, frame: int | None = None) -> None:
+        """Add a time that was measured elsewhere."""
+        self.seconds[stage] += seconds
+        if frame is not None:
+            self.frame_seconds[frame, stage] = self.frame_seconds.get((frame, stage), 0.0) + seconds
+
+    def count(self, stage: Stage, counters: Counters, levels: Levels | None = None) -> None:
+        """Add a stage's counters to the case's, and note its levels."""
+        total = self._counts[stage]
+        for name, value in counters.items():
+            total[name] = total.get(name, 0.0) + float(value)
+        for name, value in (levels or {}).items():
+            self._levels[stage].setdefault(name, []).append(float(value))
+
+    @property
+    def counters(self) -> dict[str, dict[str, float | dict[str, float]]]:
+        """By stage: counts as their sums, levels as their least, median and greatest value."""
+        return {stage: {**self._counts[stage], **_spread(self._levels[stage])} for stage in STAGES}
+
+
+def _spread(levels: dict[str, list[float]]) -> dict[str, dict[str, float]]:
+    """Least, median and greatest of the finite values of each level; nothing for a level without any."""
+    known = {name: np.array(values)[np.isfinite(values)] for name, values in levels.items()}
+    return {
+        name: {"min": float(v.min()), "median": float(np.median(v)), "max": float(v.max())}
+        for name, v in known.items()
+        if v.size
+    }

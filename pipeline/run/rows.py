@@ -1,0 +1,124 @@
+"""One frame as a row of errors.csv, all its points as points.csv.gz, and a case as a row of summary.csv."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.compare.metrics import rms
+from pipeline.compare.pooled import Row, counts, pooled, skill_of
+from pipeline.model import Array, arc_length
+from pipeline.run.frame import Frame
+from pipeline.run.log import STAGES, Log
+from pipeline.run.stages import Known
+from pipeline.study.schema import Case
+
+TIMED = STAGES[:-1]
+"""Stages whose seconds stand in the tables."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaseRows:
+    """What the tables hold of a case: rows of errors.csv and of failures.csv, and its row of summary.csv."""
+
+    errors: tuple[Row, ...]
+    failures: tuple[Row, ...]
+    summary: Row
+
+
+def rows_of(case: Case, known: Known, log: Log, draws: int) -> CaseRows:
+    """All rows of a case. draws : resamples behind the intervals."""
+    errors = tuple(error_row(frame, log) for frame in known.frames)
+    failed = next((f for f in known.frames if not f.ok), None)
+    status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
+    good = sum(frame.ok for frame in known.frames)
+    head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
+    head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
+    points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
+    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and counts(row, mm)]
+    times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
+    summary = head | pooled(scored, draws) | _forces(known.frames) | times
+    return CaseRows(errors, tuple(_failures(case.id, known)), summary)
+
+
+def error_row(frame: Frame, log: Log) -> dict[str, Any]:
+    """One row of errors.csv."""
+    row: dict[str, Any] = {
+        "frame": frame.index,
+        "status": frame.status,
+        "insertion_mm": frame.depth_mm,
+        "roll_deg": frame.roll_deg,
+    }
+    row |= {
+        f"{s}_s": log.frame_seconds[frame.index, s] for s in TIMED if (frame.index, s) in log.frame_seconds
+    }
+    row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
+    row |= frame.truth
+    if frame.comparison is not None:
+        row |= frame.comparison.values
+        null = frame.nulls_rms_mm.get("centreline", float("nan"))
+        row["skill"] = skill_of(float(frame.comparison["rms_mm"]), null)
+    if frame.curve is not None and len(frame.curve.sigma_mm):
+        row["trace_sigma_mm"] = rms(frame.curve.sigma_mm)
+    if frame.simulated is not None:
+        wire = frame.simulated
+        row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
+        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations}
+    return row
+
+
+def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
+    """Magnitude (n,) of the contact force at the joint nearest to each arc length (n,), N."""
+    assert frame.simulated is not None
+    force = np.linalg.norm(frame.simulated.contact_force_N, axis=1)
+    arc = arc_length(frame.simulated.joints_mm)
+    return np.asarray(force[np.abs(arc_mm[:, None] - arc[None, :]).argmin(axis=1)])
+
+
+def point_columns(frames: Sequence[Frame]) -> dict[str, NDArray[Any]]:
+    """points.csv.gz as columns; empty where nothing was compared."""
+    parts = [_points(frame) for frame in frames if frame.comparison is not None]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+
+
+def _points(frame: Frame) -> dict[str, NDArray[Any]]:
+    assert frame.comparison is not None
+    c = frame.comparison
+    return {
+        "frame": np.full(len(c.arc_mm), frame.index),
+        "arc_mm": c.arc_mm,
+        **{f"{axis}_mm": c.sample_mm[:, i] for i, axis in enumerate("xyz")},
+        "error_mm": c.error_mm,
+        "foot_arc_mm": c.foot_arc_mm,
+        "contact_force_N": contact_at(frame, c.arc_mm),
+    }
+
+
+def _forces(frames: Sequence[Frame]) -> dict[str, float]:
+    """Largest penetration and push force over all simulated frames."""
+    done = [f.simulated for f in frames if f.simulated is not None]
+    if not done:
+        return {}
+    return {
+        "max_penetration_mm": max(s.max_penetration_mm for s in done),
+        "push_force_max_N": max(s.push_force_N for s in done),
+    }
+
+
+def _failures(case: str, known: Known) -> list[Row]:
+    """Rows of failures.csv: the case itself, or each frame that is not ok."""
+    log = f"cases/{case}/log.txt"
+    if known.failure is not None:
+        status = known.failure.status
+        row = {"case": case, "stage": known.failed_stage, "status": status.identifier, "log": log}
+        return [row | {"sentence": status.value, "message": str(known.failure)}]
+    said = ("stage", "status", "sentence", "message")
+    return [
+        {"case": case, "frame": f.index} | {name: getattr(f, name) for name in said} | {"log": log}
+        for f in known.frames
+        if not f.ok
+    ]

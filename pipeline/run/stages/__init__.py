@@ -1,0 +1,42 @@
+"""One case through the stages: load -> segment -> trace -> simulate -> compare.
+
+A step takes what is known of the case and returns more; what it writes down on the way goes to the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from pipeline.run.log import STAGES, Stage
+from pipeline.run.stages.compare import compare_frames
+from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.load import open_case
+from pipeline.run.stages.segment import segment_vessel
+from pipeline.run.stages.simulate import simulate_frames
+from pipeline.run.stages.trace import trace_frames
+from pipeline.status import StageError
+
+__all__ = ["Context", "Known", "run_stages"]
+
+STEPS: dict[Stage, Callable[[Context, Known], Known]] = {
+    "load": open_case,
+    "segment": segment_vessel,
+    "trace": trace_frames,
+    "simulate": simulate_frames,
+    "compare": compare_frames,
+}
+
+
+def run_stages(run: Context, until: Stage = "report") -> Known:
+    """Run the stages up to one of them; what goes wrong with the whole case ends the way and is part of the result."""
+    known = Known()
+    for stage, step in STEPS.items():
+        if STAGES.index(stage) > STAGES.index(until):
+            break
+        try:
+            known = step(run, known)
+        except StageError as error:
+            frames = tuple(frame.failed(stage, error) for frame in known.frames)
+            return replace(known, frames=frames, failure=error, failed_stage=stage)
+    return known

@@ -1,0 +1,38 @@
+"""load: headers, truth and the list of frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipeline.load.geometry import LoadError
+from pipeline.load.scans import read_headers
+from pipeline.load.truth import read_truth
+from pipeline.run.frame import Frame
+from pipeline.run.stages.known import Context, Known
+from pipeline.study.schema import not_one_per_frame
+
+
+def open_case(run: Context, known: Known) -> Known:
+    """Read the headers and the truth, and list the frames with what the manifest says of each."""
+    case = run.case
+    with run.log.timed("load"):
+        scans = read_headers(case.reference, case.frames, run.config.load, case.spacing_mm)
+    run.log.assumptions += scans.assumed
+    count = len(scans.frames) or case.frame_count
+    wrong = not_one_per_frame({"insertion_mm": case.insertion_mm, "roll_deg": case.roll_deg}, count)
+    if wrong:
+        msg = f"case {case.id!r}: {wrong[0]}"
+        raise LoadError(msg)
+    offset = run.config.simulate.roll_offset_deg
+    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(rolls(case.roll_deg, count))]
+    if case.insertion_mm:
+        frames = [replace(f, expected_mm=mm) for f, mm in zip(frames, case.insertion_mm, strict=True)]
+    if case.truth:
+        truth = read_truth(case.truth, count)
+        frames = [replace(f, truth_mm=points) for f, points in zip(frames, truth, strict=True)]
+    return replace(known, scans=scans, frames=tuple(frames))
+
+
+def rolls(roll_deg: float | tuple[float, ...], count: int) -> tuple[float, ...]:
+    """Roll of every frame in degrees: the manifest's list, or its one number for all."""
+    return roll_deg if isinstance(roll_deg, tuple) else (roll_deg,) * count

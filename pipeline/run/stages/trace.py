@@ -1,0 +1,138 @@
+"""trace: the real wire of every frame, one crop held at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays.axis_order import corners_mm
+from pipeline.load import Crop, Header
+from pipeline.load.curves import read_curve
+from pipeline.model import Curve, Volume
+from pipeline.register import Motion
+from pipeline.register.frames import Place, counters_of, place_of, put_in_place, said
+from pipeline.run.frame import Frame
+from pipeline.run.projections import grey_window, projections
+from pipeline.run.stages.known import Context, Known
+from pipeline.status import FrameStatus, StageError
+from pipeline.trace import trace
+
+
+def trace_frames(run: Context, known: Known) -> Known:
+    """Every frame's wire, each with the previous one as a prior."""
+    assert known.scans is not None
+    assert known.lumen is not None
+    if not known.scans.frames:
+        return known
+    given = _given_traces(run)
+    work = _Tracing(run, known, own_curves=bool(given))
+    frames: list[Frame] = []
+    for frame, header in zip(known.frames, known.scans.frames, strict=True):
+        previous = next(
+            (f.curve for f in reversed(frames) if f.curve is not None and len(f.curve.points_mm)), None
+        )
+        try:
+            done = work.look(frame, header, previous, given[frame.index] if given else None)
+        except StageError as error:
+            done = frame.failed("load", error)
+        else:
+            length = 0.0 if done.curve is None else done.curve.length_mm
+            run.log.progress("trace", frame.index + 1, len(known.frames), f"{done.status} {length:.1f} mm")
+        frames.append(done)
+    run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
+    assumed, doubtful = said(work.place, {frame.index: frame.registration for frame in frames})
+    run.log.assumptions += assumed
+    run.log.warnings += doubtful
+    return replace(known, frames=tuple(frames))
+
+
+class _Tracing:
+    """What all frames share: the box around the lumen, the wire-free scan there, and where the phantom belongs."""
+
+    def __init__(self, run: Context, known: Known, *, own_curves: bool) -> None:
+        assert known.scans is not None
+        assert known.lumen is not None
+        self.run, self.lumen, self.load, settings = run, known.lumen, run.config.load, run.config.trace
+        self.corners = corners_mm(self.lumen.distance)
+        self.box = known.scans.frames[0].box_of(self.corners)
+        empty = known.scans.reference
+        self.reference = None if empty is None else run.load(Crop(empty, self.box, self.load))
+        self.window: tuple[float, float] | None = None
+        with run.log.timed("trace"):
+            self.place: Place = place_of(
+                self.lumen,
+                self.reference,
+                settings.register_skip_voxels,
+                switched_on=settings.register == "auto",
+                own_curves=own_curves,
+            )
+
+    def look(self, frame: Frame, header: Header, previous: Curve | None, given: Curve | None) -> Frame:
+        """One frame read, put in place and traced; LoadError where it cannot be read."""
+        log, volume = self.run.log, self.run.load(Crop(header, self.box, self.load), frame.index)
+
+        def read_moved(motion: Motion) -> Volume:
+            box = header.box_of(motion.moved(self.corners))
+            return volume if box == self.box else Crop(header, box, self.load).load()
+
+        with log.timed("trace", frame.index):
+            here, shown, registration = put_in_place(volume, self.place, read_moved)
+        log.count("trace", counters_of(registration))
+        self.window = self.window or grey_window(shown)
+        pictures: tuple[NDArray[np.uint8], ...] = projections(shown, self.window)
+        curve = given or self._trace(frame, here, previous)
+        done = replace(frame, registration=registration, projections=pictures, curve=curve)
+        return _judged(done, curve, self.run)
+
+    def _trace(self, frame: Frame, volume: Volume, previous: Curve | None) -> Curve:
+        case = self.run.case
+        return self.run.stored(
+            "trace",
+            trace,
+            volume,
+            self.lumen,
+            case.entry_mm,
+            case.entry_direction,
+            of_frame=frame.index,
+            reference=self.reference,
+            previous=previous,
+            expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
+            config=self.run.config.trace,
+        )
+
+
+def _given_traces(run: Context) -> list[Curve]:
+    """The user's own curves, where the manifest names them."""
+    if run.case.traces:
+        run.log.assumptions.append("the traced curves are the manifest's own files; no tracing was done")
+    return [read_curve(source.path) for source in run.case.traces]
+
+
+def _judged(frame: Frame, curve: Curve, run: Context) -> Frame:
+    """The frame with the tracer's verdict, or a length that disagrees with the manifest, as its status."""
+    allowed = run.config.trace.length_tolerance_mm
+    if curve.status is not FrameStatus.OK:
+        return frame.failed("trace", curve.status, curve.note)
+    if not abs(curve.length_mm - frame.expected_mm) > allowed:
+        return frame
+    return frame.failed(
+        "trace",
+        FrameStatus.LENGTH_MISMATCH,
+        f"trace: case {run.case.id!r} frame {frame.index}: traced {curve.length_mm:.2f} mm, insertion_mm "
+        f"says {frame.expected_mm:.2f} mm, allowed {allowed} mm apart; look at the "
+        "picture, then correct the manifest or trace.length_tolerance_mm",
+    )
+
+
+def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:
+    """A warning where traced wire runs in the plane of the scanner's rotation, with how much of it does."""
+    curves = [f.curve for f in frames if f.curve is not None and len(f.curve.points_mm)]
+    marks = np.concatenate([np.asarray(c.in_plane) for c in curves]) if curves else np.zeros(0, bool)
+    if not marks.any():
+        return []
+    return [
+        f"{100 * marks.mean():.0f} % of the traced points run within {limit_deg:g} degrees of the plane of rotation, "
+        "where cone-beam scans streak and resolve the rotation axis least (trace_flags 2 in frames.h5)"
+    ]

@@ -1,0 +1,151 @@
+"""What a page says, as text: values with three significant digits, trees, cards, tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import pandas as pd
+
+from reports.case_files import GOOD
+from reports.schema import ERRORS, SUMMARY, Column
+
+Grid = dict[str, Any]
+NOTHING = "–"
+_LEVEL = {"min", "median", "max"}
+
+
+def number(value: Any, digits: int = 3) -> str:
+    """A number with ``digits`` significant digits, no exponent between 0.0001 and a million; – for none."""
+    if value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value)):
+        return NOTHING
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, float):
+        return str(value)
+    if value == 0 or math.isinf(value):
+        return f"{value:g}"
+    exponent = math.floor(math.log10(abs(value)))
+    if not -4 <= exponent < 6:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+
+
+def interval(low: Any, high: Any) -> str:
+    """``low to high``; empty where either is missing."""
+    ends = (number(low), number(high))
+    return "" if NOTHING in ends else f"{ends[0]} to {ends[1]}"
+
+
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted keys and texts of a nested mapping, in its order; empty values are left out.
+
+    A level (a mapping of min, median and max, such as the contrast over all frames) is one text.
+    """
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping) and value.keys() == _LEVEL:
+            if value["median"] is not None:
+                yield name, f"{number(value['median'])} ({interval(value['min'], value['max'])})"
+        elif isinstance(value, Mapping):
+            yield from flatten(value, f"{name}.")
+        elif value not in (None, "", [], ()):
+            yield name, _text(value)
+
+
+def settings(config: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Rows (table.key, value, source) of a resolved configuration."""
+    rows = []
+    for table, keys in config.items():
+        for key, entry in keys.items() if isinstance(keys, Mapping) else ():
+            known = isinstance(entry, Mapping) and "value" in entry
+            value, source = (entry["value"], str(entry.get("source", ""))) if known else (entry, "")
+            rows.append((f"{table}.{key}", _text(value), source))
+    return rows
+
+
+def size(n_bytes: int) -> str:
+    """A file's size in kB or MB."""
+    return f"{n_bytes / 1e6:.1f} MB" if n_bytes >= 1e6 else f"{max(n_bytes / 1e3, 0.1):.1f} kB"
+
+
+def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The numbers at the head of a page; those that do not apply are left out.
+
+    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total.
+    """
+    shown = []
+    for entry in entries:
+        column = SUMMARY[entry["column"]]
+        value = number(statistics.get(column.name))
+        if value != NOTHING:
+            total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
+            ends = _interval(statistics, column)
+            interval_95 = f" (95 %: {ends})" if ends else ""
+            shown.append({"value": value, "label": f"{total}{entry['label']}{interval_95}"})
+    return shown
+
+
+def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The one number over all validation cases, with what it rests on."""
+    label = "mm rms, simulated to traced wire, all validation cases"
+    first = cards([{"column": "rms_mm", "label": label}], pooled)
+    groups = {
+        "value": f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}",
+        "label": "validation cases / groups of them, which the interval resamples",
+    }
+    return [*first, groups] if first else []
+
+
+def frames(errors: pd.DataFrame) -> Grid:
+    """One row per frame; columns without any value are left out."""
+    return grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
+
+
+def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
+    """One row per case, linked to its page."""
+    table = grid(summary, SUMMARY.shown("cases"), bad=(summary["frames_failed"] > 0).fillna(value=False))
+    for row, name in zip(table["rows"], summary["case"], strict=True):
+        row["cells"][0]["link"] = links.get(name, "")
+    return table
+
+
+def grid(
+    table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = ""
+) -> Grid:
+    """Headings and rows for a template; columns without any value are left out.
+
+    bad : for each row, whether it is marked.     nothing : what stands in an empty cell.
+    """
+    kept = [c for c in columns if table[c.name].notna().any()]
+    marks = [False] * len(table) if bad is None else map(bool, bad)
+    rows = [
+        {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
+        for record, mark in zip(table.to_dict("records"), marks, strict=True)
+    ]
+    heads = [{"name": c.name, "meaning": _meaning(c), "text": c.kind == "text"} for c in kept]
+    return {"columns": heads, "rows": rows}
+
+
+def _cell(record: Mapping[Any, Any], column: Column, nothing: str) -> dict[str, Any]:
+    value = number(record[column.name]).replace(NOTHING, nothing)
+    return {"value": value, "detail": _interval(record, column), "text": column.kind == "text", "link": ""}
+
+
+def _interval(record: Mapping[Any, Any], column: Column) -> str:
+    """The 95 % interval of rms_mm, tip_median_mm, ...: what rms_low_mm, tip_low_mm, ... hold; empty without."""
+    low, high = (column.with_word(end).replace("_median_", "_") for end in ("low", "high"))
+    return interval(record.get(low), record.get(high))
+
+
+def _meaning(column: Column) -> str:
+    return f"{column.meaning} [{column.unit}]" if column.unit not in ("-", "1") else column.meaning
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        parts = [_text(v) for v in value]
+        return " ".join(parts) if all(isinstance(v, str) for v in value) else f"[{', '.join(parts)}]"
+    # counts arrive as floats (16777216.0 voxels), directions with sixteen digits
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,153 @@
+"""A figure from nothing to its files, without display or pyplot: made, its panels furnished, saved as PNG and CSV."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.spatial import cKDTree
+
+from reports.atomic import write_bytes
+from reports.figures._style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, VERMILION, Look
+from reports.tables import write_csv
+
+Array = NDArray[np.floating[Any]]
+DOTS_PER_INCH = 110
+WIDTH_INCH = 8.0
+_LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
+_GREYS = 52  # finer than the noise of any scan worth a picture
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A figure and the numbers that it shows; ``compact`` stores it in a palette, for noisy grey scans."""
+
+    figure: Figure
+    table: pd.DataFrame
+    compact: bool = False
+
+
+def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool = True) -> Figure:
+    """Make an empty figure that draws into memory; ``fitted`` finds room for all labels by itself."""
+    layout: Literal["constrained"] | None = "constrained" if fitted else None
+    figure = Figure(figsize=(width_inch, height_inch), dpi=DOTS_PER_INCH, layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def lattice(
+    count: int, most_across: int, row_inch: float, more_inch: float = 0.0, width_inch: float = WIDTH_INCH
+) -> tuple[Figure, list[Axes]]:
+    """A figure of ``count`` panels, row by row; ``more_inch`` is what legends need beside the rows."""
+    across = min(count, most_across)
+    rows = -(-count // across)
+    figure = new_figure(row_inch * rows + more_inch, width_inch)
+    panels = list(figure.subplots(rows, across, squeeze=False).ravel())
+    for axes in panels[count:]:
+        axes.remove()
+    return figure, panels[:count]
+
+
+def plain(axes: Axes) -> None:
+    """Light grid, no box."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(visible=True, color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def legend(owner: Any, *entries: Any, **place: Any) -> None:
+    """Small print without a frame, for a panel or a figure; entries: handles and labels, else all there are."""
+    owner.legend(*entries, frameon=False, fontsize=8, **place)
+
+
+def whole_numbers(axis: Axis) -> None:
+    """Ticks at integers only: there is no frame 2.5."""
+    axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+
+
+def plain_decades(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Ticks of a logarithmic axis: these multiples of the powers of ten, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
+    """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
+    numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
+    kept = numbers[np.isfinite(numbers) & (numbers > 0)]
+    if len(kept) and kept.max() > _LOG_FROM_RATIO * kept.min():
+        axes.set_yscale("log")
+        axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
+        plain_decades(axes.yaxis)
+    else:
+        axes.set_ylim(bottom=0.0)
+
+
+def heat_map(
+    axes: Axes, grid: Array, edges: tuple[Array, Array], label: str, clip: float, bar: Look, **cells: Any
+) -> None:
+    """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left light grey.
+
+    clip : the percentile at which colours end: one wild value must not turn all others dark.
+    bar, cells : what else matplotlib is told of the colour bar and of the cells.
+    """
+    top = max(float(np.nanpercentile(grid, clip)), 1e-9) if np.isfinite(grid).any() else 1.0
+    mesh = axes.pcolormesh(*edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, **cells)
+    extend = "max" if (grid > top).any() else "neither"
+    figure: Any = axes.get_figure()
+    figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)
+    axes.set_facecolor("0.93")
+    plain(axes)
+    axes.grid(visible=False)
+
+
+def save(drawing: Drawing, path: Path) -> None:
+    """Write the PNG and, beside it, the CSV of what it shows."""
+    canvas: Any = drawing.figure.canvas
+    # drawn once: savefig would draw twice, and most of a page's time is drawing
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    picture = _in_palette(pixels) if drawing.compact else Image.fromarray(np.ascontiguousarray(pixels))
+    buffer = io.BytesIO()
+    picture.save(buffer, format="png")
+    write_bytes(path, buffer.getvalue())
+    write_csv(path.with_suffix(".csv"), drawing.table)
+
+
+def _in_palette(pixels: NDArray[np.uint8]) -> Image.Image:
+    """The picture (rows, columns, 3) in the palette: half the size where noise does not compress."""
+    packed = pixels.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+    codes, places = np.unique(packed, return_inverse=True)
+    colours = np.stack([codes >> 16, codes >> 8 & 255, codes & 255], axis=1)
+    nearest = np.asarray(cKDTree(_palette()).query(colours)[1], dtype=np.uint8)
+    height, width = packed.shape
+    picture = Image.frombytes("P", (width, height), nearest[places].tobytes())
+    picture.putpalette(_palette().ravel().tolist())
+    return picture
+
+
+@cache
+def _palette() -> NDArray[np.uint8]:
+    """Greys of a scan, and the curves' colours mixed with them: a palette taken from the picture loses these."""
+    greys = np.repeat(np.linspace(0.0, 255.0, _GREYS)[:, None], 3, axis=1)
+    backgrounds = np.linspace(0.0, 255.0, 5)
+    colours = [255.0 * np.array(to_rgb(c)) for c in (ORANGE, SKY, GREEN, VERMILION, BLUE)]
+    mixed = [
+        share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)
+    ]
+    return np.concatenate([greys, mixed]).round().astype(np.uint8)

@@ -1,0 +1,24 @@
+"""The log of a case: counts add up over frames, levels have a median."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.run.log import Log
+
+
+def test_counts_add_up_and_levels_do_not() -> None:
+    log = Log(lambda *_: None)
+    for cnr in (4.0, 12.0, 8.0, float("nan")):
+        log.count("trace", {"voxels": 10.0}, {"cnr": cnr})
+    assert log.counters["trace"] == {"voxels": 40.0, "cnr": {"min": 4.0, "median": 8.0, "max": 12.0}}
+
+
+def test_times_of_frames_add_up_to_the_stage() -> None:
+    log = Log(lambda *_: None)
+    for frame in (0, 1, 0):
+        log.spent("trace", 1.0, frame)
+    assert log.frame_seconds == {(0, "trace"): 2.0, (1, "trace"): 1.0}
+    with log.timed("trace"):
+        pass
+    assert log.seconds["trace"] == pytest.approx(3.0, abs=0.1)

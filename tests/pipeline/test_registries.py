@@ -1,0 +1,55 @@
+"""A metric and a predictor from outside are one registration each: tables, pooling and pages have them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.arrays.polyline import to_length
+from pipeline.cli import main
+from pipeline.compare import metrics, nulls
+from pipeline.compare.nulls import Clues
+from pipeline.model import Array
+from reports.schema import ERRORS, SUMMARY, Column
+
+
+@pytest.fixture
+def as_before() -> Iterator[None]:
+    """Take back what a test registers."""
+    columns = ERRORS.columns, SUMMARY.columns
+    known = dict(metrics.METRICS), dict(nulls.NULLS)
+    yield
+    ERRORS.columns, SUMMARY.columns = columns
+    for registry, entries in zip((metrics.METRICS, nulls.NULLS), known, strict=True):
+        registry.clear()
+        registry.update(entries)
+
+
+def straight_on(clues: Clues, depth_mm: float, _previous: Array | None) -> Array:
+    """A wire that ignores the vessel."""
+    return to_length(np.array([clues.clamp.entry_mm, clues.clamp.entry_mm + clues.clamp.direction]), depth_mm)
+
+
+def test_a_metric_and_a_predictor_from_outside(as_before: None, tmp_path: Path) -> None:
+    meaning = "share of the points within 0.1 mm of the traced curve"
+    shown = {"frames": ""}
+    column = Column("near_share", "1", meaning, better="high", pooled="mean", shown=shown)
+    metrics.register(column, lambda pair: float(np.mean(pair.error_mm < 0.1)))
+    nulls.register("ray", "straight on", "a straight line along the entry's direction", straight_on)
+    study, out = tmp_path / "study", tmp_path / "out"
+    assert main(["synth", "bend", "-o", str(study), "--frames", "3", "--size", "48"]) == 0
+    assert main(["run", str(study / "manifest.toml"), "-o", str(out), "--no-cache"]) == 0
+    frames, points = (pd.read_csv(out / "cases" / "bend" / name) for name in ("errors.csv", "points.csv.gz"))
+    summary = pd.read_csv(out / "summary.csv")
+    expected = (points["error_mm"] < 0.1).groupby(points["frame"]).mean()
+    np.testing.assert_allclose(frames["near_share"], expected, rtol=1e-8)
+    assert summary["near_share"][0] == pytest.approx(float(expected.mean()), rel=1e-8)
+    assert (frames["null_ray_rms_mm"] > 0).all()
+    assert summary["null_ray_rms_mm"][0] > 0
+    page = (out / "cases" / "bend" / "report.html").read_text(encoding="utf-8")
+    assert "near_<wbr>share" in page
+    assert meaning in page

@@ -1,0 +1,77 @@
+"""Machine code kept on disk goes when a source behind it changes, in every package that has kernels."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from solver._compile import sources_of
+
+ROOT = Path(__file__).resolve().parent.parent
+COPIES = ("solver", "data_synthetic")
+
+
+def test_the_two_copies_of_the_mechanism_are_one_text() -> None:
+    first, second = ((ROOT / package / "_compile.py").read_text(encoding="utf-8") for package in COPIES)
+    assert first == second
+
+
+@pytest.mark.parametrize("package", ["solver", "pipeline", "data_synthetic", "reports"])
+def test_nothing_is_cached_past_the_mechanism(package: str) -> None:
+    """numba's own ``cache=True`` looks at a function's own file alone."""
+    files = [p for p in (ROOT / package).rglob("*.py") if p.name != "_compile.py"]
+    wrong = [str(p) for p in files if re.search(r"cache\s*=\s*True", p.read_text(encoding="utf-8"))]
+    assert not wrong, "use on_disk of _compile"
+
+
+@pytest.mark.parametrize("package", COPIES)
+def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> None:
+    """The callee stands two files away, and its new text has the length and the time of the old one."""
+    folder = tmp_path / package
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
+    start = f"from {package}._compile import on_disk\n"
+    kernel = start + "{imports}\n\n@on_disk()\ndef {name}():\n    return {value}\n"
+    (folder / "callee.py").write_text(kernel.format(imports="", name="callee", value=1))
+    middle = kernel.format(imports=f"from {package}.callee import callee", name="middle", value="callee()")
+    (folder / "middle.py").write_text(middle)
+    caller = kernel.format(
+        imports=f"from {package} import middle as m\nmiddle = m.middle", name="caller", value="middle()"
+    )
+    (folder / "caller.py").write_text(caller)
+    assert [called(tmp_path, package) for _ in range(2)] == ["1", "1"]
+    path, state = folder / "callee.py", (folder / "callee.py").stat()
+    path.write_text(kernel.format(imports="", name="callee", value=2))
+    os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert called(tmp_path, package) == "2"
+
+
+def called(folder: Path, package: str) -> str:
+    code = f"from {package}.caller import caller; print(caller())"
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code], cwd=folder, capture_output=True, encoding="utf-8", check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_sources_are_followed_through_imports_of_every_form(tmp_path: Path) -> None:
+    folder = tmp_path / "solver"
+    folder.mkdir()
+    texts = {
+        "__init__": "from solver.unrelated import x",
+        "start": "from solver import one as first, two\nimport solver.three\nfrom solver.four import (\n    name,\n)\n"
+        "def late():\n    from solver.five import z",
+        **dict.fromkeys(("one", "two", "three", "five", "six", "unrelated"), ""),
+        "four": "from solver import six",
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    found = {path.stem for path in sources_of(folder / "start.py")}
+    assert found == {"start", "one", "two", "three", "four", "five", "six"}
