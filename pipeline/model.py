@@ -93,6 +93,25 @@ class Lumen:
     levels: Levels = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """A lumen as round cones: their ends, start and end (n, 3) LPS mm, and the radii (n,) there, mm."""
+
+    start_mm: Array
+    end_mm: Array
+    start_radius_mm: Array
+    end_radius_mm: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS."""
+
+    points_mm: Array
+    triangles: NDArray[np.int64]
+    lines: tuple[NDArray[np.int64], ...] = ()
+
+
 def arc_length(points_mm: NDArray[Any]) -> Array:
     """Arc length (n,) in mm from the first of (n, 3) points; empty for no points."""
     if len(points_mm) == 0:

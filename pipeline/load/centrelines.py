@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.load.curves import markups_in, positions_of
 from pipeline.load.geometry import refused
-
-
-@dataclass(frozen=True, eq=False)
-class Branches:
-    """Cones: start (n, 3), end (n, 3), and their radii (n,), mm, LPS."""
-
-    start_mm: NDArray[np.float64]
-    end_mm: NDArray[np.float64]
-    start_radius_mm: NDArray[np.float64]
-    end_radius_mm: NDArray[np.float64]
+from pipeline.model import Branches
 
 
 def read_swc(path: Path) -> Branches:

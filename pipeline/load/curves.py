@@ -61,8 +61,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
 def read_vtp_points(path: Path) -> NDArray[np.float64]:
     """Points (n, 3) of the first polyline, LPS mm; all points in order where the file has no lines."""
     shapes = read_vtp(path)
-    points = shapes.points_mm[shapes.lines[0]] if shapes.lines else shapes.points_mm
-    return points * RAS_TO_LPS if shapes.ras else points
+    return shapes.points_mm[shapes.lines[0]] if shapes.lines else shapes.points_mm
 
 
 READERS = {".csv": read_csv_points, ".vtp": read_vtp_points, ".mrk.json": read_markups_curve}

@@ -1,4 +1,7 @@
-"""Triangles and polylines from .vtp (ASCII, inline base64 or appended, zlib or not) and .stl (ASCII or binary)."""
+"""Triangles and polylines from .vtp (ASCII, inline base64 or appended, zlib or not) and .stl (ASCII or binary).
+
+Out: LPS mm.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ import re
 import struct
 import xml.etree.ElementTree as ET
 import zlib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused
+from pipeline.model import Shapes
 
 RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 _TYPES = {
@@ -23,19 +26,9 @@ _TYPES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """points_mm (n, 3) as in the file; triangles (t, 3) and lines of point indices; ``ras`` if the file says so."""
-
-    points_mm: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    lines: tuple[NDArray[np.int64], ...] = ()
-    ras: bool = False
-
-
-def _is_ras(text: bytes) -> bool:
-    """3D Slicer notes its coordinate system in a comment or header."""
-    return re.search(rb"SPACE=RAS", text[:4096]) is not None
+def _to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (n, 3) of a file in LPS mm: 3D Slicer says SPACE=RAS in a comment or header, all else is taken as LPS."""
+    return points * RAS_TO_LPS if b"SPACE=RAS" in text[:4096] else points
 
 
 def _blocks(data: bytes, header: str, compressed: bool) -> bytes:
@@ -69,7 +62,7 @@ class _Vtp:
     def __init__(self, path: Path) -> None:
         self.path = path
         raw = path.read_bytes()
-        self.ras = _is_ras(raw)
+        self.head = raw[:4096]
         self.tail = b""
         match = re.search(rb"<AppendedData[^>]*encoding=\"(raw|base64)\"[^>]*>\s*_", raw)
         if match:
@@ -123,14 +116,14 @@ def read_vtp(path: Path) -> Shapes:
         raise refused(
             path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData"
         )
-    points = file.array(node).astype(np.float64).reshape(-1, 3)
+    points = _to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3))
     fans = [
         np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
         for p in _cells(file, piece, "Polys")
         if len(p) > 2
     ]
     triangles = np.concatenate(fans) if fans else np.zeros((0, 3), np.int64)
-    return Shapes(points, triangles, tuple(_cells(file, piece, "Lines")), file.ras)
+    return Shapes(points, triangles, tuple(_cells(file, piece, "Lines")))
 
 
 def read_stl(path: Path) -> Shapes:
@@ -146,4 +139,4 @@ def read_stl(path: Path) -> Shapes:
     if len(corners) == 0 or len(corners) % 3:
         raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
     points, index = np.unique(corners, axis=0, return_inverse=True)
-    return Shapes(points, index.reshape(-1, 3).astype(np.int64), (), _is_ras(raw))
+    return Shapes(_to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))

@@ -1,18 +1,14 @@
-"""The user's own lumen instead of segment: a label map, a closed surface, or a centreline with radius."""
+"""The signed distance of a lumen that the user brings: a label map, a closed surface, or a centreline with radius."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
-from pipeline.load import LoadError, load, read_header
-from pipeline.load.centrelines import Branches, read_markups_branches, read_swc
-from pipeline.load.surfaces import RAS_TO_LPS, Shapes, read_stl, read_vtp
-from pipeline.model import Lumen
+from pipeline.model import Branches, Lumen, Shapes, Volume
 from pipeline.segment._kernels.distance import propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
 from pipeline.segment.config import SegmentConfig
@@ -54,15 +50,9 @@ def lumen_from_branches(branches: Branches, config: SegmentConfig) -> Lumen:
     return _lumen(grid.with_values(distance), "the lumen is the union of cones along the given centreline")
 
 
-def lumen_from_surface(shapes: Shapes, path: Path, config: SegmentConfig) -> Lumen:
+def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     """What a closed triangle surface encloses."""
-    points = shapes.points_mm * RAS_TO_LPS if shapes.ras else shapes.points_mm
-    edges = np.sort(shapes.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    open_edges = int(np.sum(np.unique(edges, axis=0, return_counts=True)[1] % 2)) if len(edges) else -1
-    if open_edges:
-        got = "no triangles" if open_edges < 0 else f"{open_edges} open edges"
-        msg = f"{path}: got {got}; expected a closed surface; cap the vessel's ends (3D Slicer: Surface Toolbox)"
-        raise LoadError(msg)
+    points = shapes.points_mm
     grid = _empty(points.min(0), points.max(0), config.margin_mm)
     corners = np.ascontiguousarray((points - grid.origin_mm)[shapes.triangles])
     spacing = np.asarray(grid.spacing_mm)
@@ -84,15 +74,10 @@ def lumen_from_surface(shapes: Shapes, path: Path, config: SegmentConfig) -> Lum
     )
 
 
-def lumen_from_labels(path: Path, config: SegmentConfig) -> Lumen:
+def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
     """Everything but 0 in a label map; the wall is its half level after light smoothing."""
-    volume = load(read_header(path))
-    grid, axes = in_memory_order(volume)
+    grid, axes = in_memory_order(labels)
     order = np.flatnonzero(grid.values.reshape(-1))
-    if len(order) < config.least_voxels:
-        allowed = f"at least {config.least_voxels} (segment.least_voxels)"
-        msg = f"{path}: got {len(order)} labelled voxels; expected {allowed}; check the label map"
-        raise LoadError(msg)
     binary = grid.with_values((grid.values != 0).astype(np.uint8))
     site = prepare(binary, order, LABEL_TAPS, config.margin_mm)
     values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0), config.outer_mm).values
@@ -100,21 +85,10 @@ def lumen_from_labels(path: Path, config: SegmentConfig) -> Lumen:
     return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 
 
-def read_lumen(path: Path, config: SegmentConfig) -> Lumen:
-    """The lumen in a file: .swc or .mrk.json (centreline with radius), .stl or .vtp (closed surface), else label map.
-
-    Raises LoadError when the file does not hold a lumen.
-    """
-    name = path.name.lower()
-    if not path.exists():
-        msg = f"{path}: no such file; check lumen in the manifest (relative to the manifest itself)"
-        raise LoadError(msg)
-    if name.endswith(".swc"):
-        return lumen_from_branches(read_swc(path), config)
-    if name.endswith(".mrk.json"):
-        return lumen_from_branches(read_markups_branches(path), config)
-    if name.endswith(".stl"):
-        return lumen_from_surface(read_stl(path), path, config)
-    if name.endswith(".vtp"):
-        return lumen_from_surface(read_vtp(path), path, config)
-    return lumen_from_labels(path, config)
+def given_lumen(given: Branches | Shapes | Volume, config: SegmentConfig) -> Lumen:
+    """The lumen that is the union of cones, or inside a closed surface, or labelled with anything but 0."""
+    if isinstance(given, Branches):
+        return lumen_from_branches(given, config)
+    if isinstance(given, Shapes):
+        return lumen_from_surface(given, config)
+    return lumen_from_labels(given, config)

@@ -12,12 +12,18 @@ from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
 from pipeline.load.curves import read_curve
+from pipeline.load.lumens import read_lumen
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.given import read_lumen
+from pipeline.segment.given import given_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
 
 RADIUS, LENGTH = 1.5, 12.0
 START = np.array([3.0, -2.0, 1.0])
+
+
+def lumen_in(path):
+    config = SegmentConfig()
+    return given_lumen(read_lumen(path, config.least_voxels), config)
 
 
 def true_distance(points):
@@ -55,12 +61,12 @@ def test_centreline_with_radius(tmp_path):
         for n in range(3)
     ]
     (tmp_path / "tree.swc").write_text("\n".join(rows))
-    assert np.abs(errors(read_lumen(tmp_path / "tree.swc", SegmentConfig()))).max() < 1e-5
+    assert np.abs(errors(lumen_in(tmp_path / "tree.swc"))).max() < 1e-5
     points = [{"position": list((START + np.array([LENGTH * t, 0, 0])) * [-1, -1, 1])} for t in (0, 0.5, 1)]
     measure = [{"name": "Radius", "controlPointValues": [RADIUS] * 3}]
     markup = {"markups": [{"coordinateSystem": "RAS", "controlPoints": points, "measurements": measure}]}
     (tmp_path / "tree.mrk.json").write_text(json.dumps(markup))
-    assert np.abs(errors(read_lumen(tmp_path / "tree.mrk.json", SegmentConfig()))).max() < 1e-5
+    assert np.abs(errors(lumen_in(tmp_path / "tree.mrk.json"))).max() < 1e-5
 
 
 def write_binary_stl(path, vertices, triangles):
@@ -81,7 +87,7 @@ def test_closed_surface(tmp_path, kind):
     else:
         corners = "\n".join(f"vertex {p[0]} {p[1]} {p[2]}" for t in triangles for p in vertices[t])
         path.write_text(f"solid lumen\n{corners}\nendsolid")
-    error = errors(read_lumen(path, SegmentConfig()))
+    error = errors(lumen_in(path))
     assert np.sqrt(np.mean(error**2)) < 0.02
     assert np.abs(error).max() < 0.15
 
@@ -90,7 +96,7 @@ def test_an_open_surface_is_refused(tmp_path):
     vertices, triangles = surface()
     write_binary_stl(tmp_path / "open.stl", vertices, triangles[:-20])
     with pytest.raises(LoadError, match="open edges"):
-        read_lumen(tmp_path / "open.stl", SegmentConfig())
+        lumen_in(tmp_path / "open.stl")
 
 
 def test_label_map(tmp_path):
@@ -99,7 +105,7 @@ def test_label_map(tmp_path):
     image.SetSpacing([voxel] * 3)
     image.SetOrigin(origin.tolist())
     sitk.WriteImage(image, str(tmp_path / "label.nrrd"))
-    error = errors(read_lumen(tmp_path / "label.nrrd", SegmentConfig()), within=0.3)
+    error = errors(lumen_in(tmp_path / "label.nrrd"), within=0.3)
     assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
 
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.load import Crop
+from pipeline.load.lumens import read_lumen
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
-from pipeline.segment.given import read_lumen
+from pipeline.segment.given import given_lumen
 
 
 def segment_vessel(run: Context, known: Known) -> Known:
@@ -17,7 +18,8 @@ def segment_vessel(run: Context, known: Known) -> Known:
     case, config, log = run.case, run.config, run.log
     if case.lumen is not None:
         with log.timed("segment"):
-            return replace(known, lumen=read_lumen(case.lumen.path, config.segment))
+            given = read_lumen(case.lumen.path, config.segment.least_voxels)
+            return replace(known, lumen=given_lumen(given, config.segment))
     assert known.scans is not None
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
