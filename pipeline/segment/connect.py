@@ -29,9 +29,9 @@ def cut_level(threshold: float) -> int:
 
 
 def _search(grid: Grid, affinity: Affinity, offsets: Index) -> Search:
-    tiles = np.zeros([-(-n // SIDE) + 2 for n in grid.shape], np.uint8)
-    cells = sparse_zeros((tiles.size * CELLS,), np.uint16)
-    return Search(grid.values, affinity, cells, tiles, np.ascontiguousarray(offsets))
+    a, b, c = (-(-n // SIDE) + 2 for n in grid.shape)
+    tiles, cells = np.zeros(a * b * c, np.uint8), sparse_zeros((a * b * c * CELLS,), np.uint16)
+    return Search(grid.values, affinity, cells, tiles, (a, b, c), np.ascontiguousarray(offsets))
 
 
 def _read(search: Search) -> float:

@@ -45,28 +45,30 @@ class Search(NamedTuple):
     """What a search goes over, and what it knows of it.
 
     volume : C-contiguous grey.  cells : uint16, level and SEEN of a voxel, 0 at first.  tiles : uint8, READ or BEYOND,
-    0 at first; tile (1, 1, 1) holds voxel (0, 0, 0).  offsets : (n, 3) of a voxel's neighbours.
+    0 at first.  layout : tiles along each axis; tile (1, 1, 1) holds voxel (0, 0, 0).  offsets : (n, 3) of a voxel's
+    neighbours.
     """
 
     volume: NDArray[Any]
     affinity: Affinity
     cells: NDArray[Any]
     tiles: NDArray[Any]
+    layout: tuple[int, int, int]
     offsets: NDArray[Any]
 
 
 @kernel
 def _read_tile(s: Search, tile: int, work: NDArray[Any]) -> None:
     """Quantised smoothed grey 0..GREY_STEPS-1 of one tile into its cells; those outside the volume are marked SEEN."""
-    a, b, c = unravelled(tile, s.tiles.shape)
+    a, b, c = unravelled(tile, s.layout)
     i0, j0, k0 = (a - 1) * SIDE, (b - 1) * SIDE, (c - 1) * SIDE
     ni, nj, nk = s.volume.shape
     cells = s.cells[tile * CELLS : (tile + 1) * CELLS]
     if min(i0, j0, k0) < 0 or i0 >= ni or j0 >= nj or k0 >= nk:
-        s.tiles[a, b, c] = BEYOND
+        s.tiles[tile] = BEYOND
         cells[:] = SEEN
         return
-    s.tiles[a, b, c] = READ
+    s.tiles[tile] = READ
     smooth_tile(s.volume, s.affinity.taps, (i0, j0, k0), work[0], work[1])
     low, scale, w = s.affinity.low, s.affinity.scale, SIDE + 2 * (s.affinity.taps.shape[0] // 2)
     n = 0
@@ -101,11 +103,34 @@ def _flat(s: Search, cells: NDArray[Any]) -> NDArray[Any]:
         cell = cells[n]
         if cell // CELLS != tile:
             tile = cell // CELLS
-            a, b, c = unravelled(tile, s.tiles.shape)
+            a, b, c = unravelled(tile, s.layout)
         i = (a - 1) * SIDE + ((cell >> (2 * SHIFT)) & INNER)
         j = (b - 1) * SIDE + ((cell >> SHIFT) & INNER)
         out[n] = (i * nj + j) * nk + (c - 1) * SIDE + (cell & INNER)
     return out
+
+
+@kernel
+def _affinity(
+    cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: int, to: int
+) -> float:
+    """Affinity of a voxel of grey level ``here`` and that of the cell ``to``, 0 to 255; -1 where that is SEEN.
+
+    Arrays, not a Search: both searches spend their time here, and would take five times as long.
+    """
+    there = np.int64(cells[to])
+    if there >= SEEN:
+        return -1.0
+    return float(homogeneity[abs(here - there)] * feature[here + there])
+
+
+@kernel
+def _seed(s: Search, seeds: NDArray[Any], n: int, work: NDArray[Any]) -> int:
+    """The cell of a seed, its tile read."""
+    cell, tile = _away(0, seeds[n, 0] + SIDE, seeds[n, 1] + SIDE, seeds[n, 2] + SIDE, s.layout)
+    if s.tiles[tile] == 0:
+        _read_tile(s, tile, work)
+    return int(cell)
 
 
 @door
@@ -116,39 +141,29 @@ def flood(s: Search, seeds: NDArray[Any], threshold: int) -> NDArray[Any]:
     which is several times faster than ordering by strength. Returns flat indices in the order they were reached in.
     """
     work, cut = scratch(s.affinity.taps), np.float32(threshold - 0.5)
-    cells, tiles, homogeneity, feature, offsets = (
-        s.cells,
-        s.tiles.reshape(-1),
-        s.affinity.homogeneity,
-        s.affinity.feature,
-        s.offsets,
-    )
+    cells, tiles, offsets, (homogeneity, feature) = s.cells, s.tiles, s.offsets, s.affinity[:2]
     order = np.empty(65536, np.int64)
     count = done = 0
     for n in range(seeds.shape[0]):
-        start, tile = _away(0, seeds[n, 0] + SIDE, seeds[n, 1] + SIDE, seeds[n, 2] + SIDE, s.tiles.shape)
-        if tiles[tile] == 0:
-            _read_tile(s, tile, work)
-        if s.cells[start] < SEEN:
-            s.cells[start] |= SEEN
+        start = _seed(s, seeds, n, work)
+        if cells[start] < SEEN:
+            cells[start] |= SEEN
             order[count] = start
             count += 1
     while done < count:
         cell = order[done]
         done += 1
-        if count + s.offsets.shape[0] > order.shape[0]:
+        if count + offsets.shape[0] > order.shape[0]:
             order = grown(order)
         here = np.int64(cells[cell]) & GREY
         for m in range(offsets.shape[0]):
-            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.tiles.shape)
+            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.layout)
             if tiles[tile] == 0:
                 _read_tile(s, tile, work)
-            there = np.int64(cells[to])
-            if there >= SEEN or homogeneity[abs(here - there)] * feature[here + there] < cut:
-                continue
-            cells[to] = there | SEEN
-            order[count] = to
-            count += 1
+            if _affinity(cells, homogeneity, feature, here, to) >= cut:
+                cells[to] |= SEEN
+                order[count] = to
+                count += 1
     return np.asarray(_flat(s, order[:count]))
 
 
@@ -165,63 +180,69 @@ def _push(b: _Buckets, strength: int, cell: int, entry: int) -> None:
     b.cell[entry], b.after[entry], b.head[strength] = cell, b.head[strength], entry
 
 
+@kernel
+def _pop(b: _Buckets, strength: NDArray[Any], bucket: int, threshold: int) -> tuple[int, int]:
+    """The strongest cell left to go on from, and its bucket; -1 where there is none of at least ``threshold``.
+
+    A cell is pushed only when its strength rises, so an entry is stale exactly when its bucket is not that strength.
+    """
+    while bucket >= threshold:
+        entry = b.head[bucket]
+        if entry < 0:
+            bucket -= 1
+            continue
+        b.head[bucket] = b.after[entry]
+        if strength[b.cell[entry]] == bucket:
+            return b.cell[entry], bucket
+    return -1, bucket
+
+
+@kernel
+def _once(s: Search, entries: NDArray[Any], strength: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Voxels (flat) and strengths of cells that may be listed several times; sets their ``strength`` back to 0."""
+    found, count = np.empty(entries.shape[0], np.uint8), 0
+    for cell in entries:
+        if strength[cell] > 0:
+            entries[count], found[count], strength[cell] = cell, strength[cell], 0
+            count += 1
+    return _flat(s, entries[:count]), found[:count]
+
+
 @door
 def strengths(
     s: Search, seeds: NDArray[Any], threshold: int, strength: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Strength of connectedness 0..255 of every voxel that has at least ``threshold``: flat indices, strengths (uint8).
 
-    Dijkstra's algorithm for max-min paths with one bucket per quantised strength. A voxel is pushed only when its
-    strength rises, so an entry is stale exactly when its bucket differs from the voxel's strength. ``strength``: uint8
-    zeros, one a cell, working memory.
+    Dijkstra's algorithm for max-min paths with one bucket per quantised strength. strength : uint8 zeros, one a cell,
+    working memory.
     """
     work = scratch(s.affinity.taps)
-    cells, tiles, homogeneity, feature, offsets = (
-        s.cells,
-        s.tiles.reshape(-1),
-        s.affinity.homogeneity,
-        s.affinity.feature,
-        s.offsets,
-    )
+    cells, tiles, offsets, (homogeneity, feature) = s.cells, s.tiles, s.offsets, s.affinity[:2]
     b = _Buckets(np.full(FULL + 1, -1, np.int64), np.empty(4096, np.int64), np.empty(4096, np.int64))
     pushed = 0
     for n in range(seeds.shape[0]):
-        start, tile = _away(0, seeds[n, 0] + SIDE, seeds[n, 1] + SIDE, seeds[n, 2] + SIDE, s.tiles.shape)
-        if tiles[tile] == 0:
-            _read_tile(s, tile, work)
+        start = _seed(s, seeds, n, work)
         if strength[start] < FULL:
             strength[start] = FULL
             _push(b, FULL, start, pushed)
             pushed += 1
-    bucket = FULL
-    while bucket >= threshold:
-        entry = b.head[bucket]
-        if entry < 0:
-            bucket -= 1
-            continue
-        cell, b.head[bucket] = b.cell[entry], b.after[entry]
-        if strength[cell] != bucket:
-            continue
+    cell, bucket = _pop(b, strength, FULL, threshold)
+    while cell >= 0:
         if pushed + offsets.shape[0] > b.cell.shape[0]:
             b = _Buckets(b.head, grown(b.cell), grown(b.after))
         here = np.int64(cells[cell])
         for m in range(offsets.shape[0]):
-            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.tiles.shape)
+            to, tile = _away(cell, offsets[m, 0], offsets[m, 1], offsets[m, 2], s.layout)
             if tiles[tile] == 0:
                 _read_tile(s, tile, work)
-            there = np.int64(cells[to])
-            if there >= SEEN or strength[to] >= bucket:
+            if strength[to] >= bucket:
                 continue
-            link = min(bucket, int(homogeneity[abs(here - there)] * feature[here + there] + 0.5))
+            link = min(bucket, int(_affinity(cells, homogeneity, feature, here, to) + 0.5))
             if link >= threshold and link > strength[to]:
                 strength[to] = link
                 _push(b, link, to, pushed)
                 pushed += 1
-    # an entry a rise: the first of a voxel stands for it
-    found, count = np.empty(pushed, np.uint8), 0
-    for entry in range(pushed):
-        cell = b.cell[entry]
-        if strength[cell] > 0:
-            b.cell[count], found[count], strength[cell] = cell, strength[cell], 0
-            count += 1
-    return _flat(s, b.cell[:count]), found[:count]
+        cell, bucket = _pop(b, strength, bucket, threshold)
+    voxels, found = _once(s, b.cell[:pushed], strength)
+    return voxels, found

@@ -22,6 +22,21 @@ def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
     return float((x - p[0]) * (x - p[0]) + (y - p[1]) * (y - p[1]) + (z - p[2]) * (z - p[2]))
 
 
+@kernel
+def _takes(
+    at: tuple[float, float, float], known: int, inside: int, foot: NDArray[Any], m: int, most: float
+) -> bool:
+    """Whether a voxel at ``at`` takes foot m for its own: nearer than what it has (``known`` - 1), or its first.
+
+    Outside a first one must lie within the square root of ``most``.
+    """
+    x, y, z = at
+    far = _square(x, y, z, foot[m])
+    if known > 0:
+        return bool(far < _square(x, y, z, foot[known - 1]) - 1e-9)
+    return bool(far <= most or inside & 1)
+
+
 @door
 def propagate(
     owner: NDArray[Any],
@@ -46,27 +61,19 @@ def propagate(
             i, j, k = unravelled(front[n], owner.shape)
             inside[i, j, k] &= ~QUEUED
             m = owner[i, j, k] - 1
-            p = foot[m]
             for a in range(max(0, i - 1), min(ni, i + 2)):
                 for b in range(max(0, j - 1), min(nj, j + 2)):
                     for c in range(max(0, k - 1), min(nk, k + 2)):
-                        known = owner[a, b, c]
-                        if known == m + 1:
-                            continue
-                        far = _square(a * hx, b * hy, c * hz, p)
-                        if known > 0:
-                            if far >= _square(a * hx, b * hy, c * hz, foot[known - 1]) - 1e-9:
-                                continue
-                        elif far > outer * outer and not inside[a, b, c] & 1:
+                        known, at, mark = owner[a, b, c], (a * hx, b * hy, c * hz), inside[a, b, c]
+                        if known == m + 1 or not _takes(at, known, mark, foot, m, outer * outer):
                             continue
                         owner[a, b, c] = m + 1
-                        if inside[a, b, c] & QUEUED:
-                            continue
-                        inside[a, b, c] |= QUEUED
-                        if fresh + 1 >= following.shape[0]:
-                            following = grown(following)
-                        following[fresh] = (a * nj + b) * nk + c
-                        fresh += 1
+                        if not mark & QUEUED:
+                            inside[a, b, c] |= QUEUED
+                            if fresh + 1 >= following.shape[0]:
+                                following = grown(following)
+                            following[fresh] = (a * nj + b) * nk + c
+                            fresh += 1
         visits += fresh
         front, following = following, front
         count = fresh

@@ -22,8 +22,6 @@ CELLS = SIDE**3
 """8^3 voxels: with 16^3 a vessel of 10 voxels smooths three times as many as it needs, with 4^3 halos dominate."""
 GREY_STEPS = 1024
 """Grey steps of the affinity tables; 256 to 1024 change fewer than ten voxels of a vessel tree."""
-SEEN = 1 << 15
-"""Mark of a cell that is reached, or lies outside the volume and never will be."""
 
 
 @kernel

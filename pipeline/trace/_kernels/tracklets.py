@@ -98,6 +98,15 @@ def _step(field: Blurred, rules: Rules, probe: Probe) -> bool:
 
 
 @kernel
+def _unstamp(stamp: NDArray[Any], points: NDArray[Any], spacing: NDArray[Any]) -> None:
+    """Take the marks of the walk that is under way from the voxels of points (n, 3)."""
+    for point in points:
+        i, j, k, there = _voxel(point, spacing, stamp.shape)
+        if there:
+            stamp[i, j, k] = max(0, stamp[i, j, k])
+
+
+@kernel
 def _walk(
     field: Blurred,
     allowed: NDArray[Any],
@@ -134,10 +143,8 @@ def _walk(
             track.points[count, axis], track.tangents[count, axis] = p[axis], probe.tangent[axis]
         track.values[count] = probe.jet[0]
         count += 1
-    for m in range(count + 1):
-        i, j, k, there = _voxel(track.points[m] if m < count else p, spacing, stamp.shape)
-        if there:
-            stamp[i, j, k] = max(0, stamp[i, j, k])
+    _unstamp(stamp, track.points[:count], spacing)
+    _unstamp(stamp, p.reshape((1, 3)), spacing)
     return count - swung
 
 
