@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.grid import Array, Grid
+from solver.grid import Grid
 
 
 def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
@@ -26,21 +26,3 @@ def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
     reverse = grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous
     axes = (2, 1, 0) if reverse else (0, 1, 2)
     return contiguous(reorder(grid, axes)), axes
-
-
-def integer_offset(grid: Grid, inner: Grid) -> Array | None:
-    """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
-
-    A lattice is the same when spacing and axes agree to a ten-thousandth and the shift is whole to 0.02 voxel.
-    """
-    same = np.allclose(grid.spacing_mm, inner.spacing_mm, rtol=1e-4) and np.allclose(
-        grid.direction, inner.direction, atol=1e-4
-    )
-    shift = grid.to_index(inner.origin_mm)
-    return np.rint(shift) if same and np.all(np.abs(shift - np.rint(shift)) <= 0.02) else None
-
-
-def corners_mm(grid: Grid) -> Array:
-    """The centres of the grid's eight corner voxels (8, 3), LPS mm."""
-    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in grid.shape], indexing="ij"), -1).reshape(-1, 3)
-    return grid.to_mm(ends)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from pipeline.arrays.motion import Motion
-from pipeline.arrays.resample import sampled
+from pipeline.arrays.placement import sampled
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 
@@ -83,7 +82,7 @@ def said(place: Place, found: Mapping[int, Registration | None]) -> tuple[list[s
     return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted]
 
 
-def record(found: Registration | None) -> dict[str, Any] | None:
+def record(found: Registration | None) -> dict[str, object] | None:
     """The transform of one frame for result.json: reference -> frame, p -> rotation @ p + shift (LPS mm)."""
     if found is None:
         return None

@@ -16,7 +16,15 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.sparse import sparse_zeros
-from pipeline.segment._kernels.contact import along_cores, meetings, nearest_core, runs_on, thickness
+from pipeline.segment._kernels.contact import (
+    Cores,
+    Inner,
+    along_cores,
+    meetings,
+    nearest_core,
+    runs_on,
+    thickness,
+)
 from pipeline.segment.region import Index
 from solver.grid import Array, Grid
 
@@ -69,22 +77,21 @@ def parts(points: Array, apart: float) -> Index:
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
-def numbered(shape: tuple[int, ...], inner: Index) -> NDArray[np.int32]:
-    """A box that holds the position + 1 of each of the voxels ``inner`` (flat), 0 elsewhere."""
+def numbered(shape: tuple[int, ...], flat: Index) -> Inner:
+    """The voxels (flat, ascending) of a lumen in a box of this shape."""
     ids = sparse_zeros(shape, np.int32)
-    ids.reshape(-1)[inner] = np.arange(1, len(inner) + 1)
-    return ids
+    ids.reshape(-1)[flat] = np.arange(1, len(flat) + 1)
+    return Inner(ids, flat)
 
 
-def _vessels_only(
-    core: NDArray[np.bool_], part: NDArray[np.int32], steps: NDArray[np.int32], thick: Array, voxel: float
-) -> NDArray[np.bool_]:
+def _vessels_only(core: NDArray[np.bool_], cores: Cores, thick: Array, voxel: float) -> NDArray[np.bool_]:
     """The core (n,) without parts too short or too thin to be a vessel's."""
+    part, steps = cores
     length, radius = np.zeros(part.max() + 1), np.zeros(part.max() + 1)
     np.maximum.at(length, part[core], steps[core] * voxel)
     np.maximum.at(radius, part[core], thick[core])
     good = (length >= LONG * radius) & (radius >= LEAST_DEPTH * voxel)
-    return core & good[part]
+    return np.asarray(core & good[part])
 
 
 def contacts(distance: Grid) -> tuple[Contact, ...]:
@@ -98,25 +105,25 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     inner = np.flatnonzero(inside)
     if len(inner) == 0:
         return ()
-    ids = numbered(inside.shape, inner)
+    voxels = numbered(inside.shape, inner)
     depth = -values[values < 0].astype(np.float64)
-    thick = thickness(ids, inner, depth, spacing)
+    thick = thickness(voxels, depth, spacing)
     core = depth >= CORE * thick
-    part, steps = along_cores(ids, inner, core)
+    cores = along_cores(voxels, core)
     voxel = float(spacing.min())
-    owner = nearest_core(ids, inner, _vessels_only(core, part, steps, thick, voxel))
-    found = meetings(ids, inner, owner, part, steps, np.ceil(FAR * thick / voxel).astype(np.int32))
+    owner = nearest_core(voxels, _vessels_only(core, cores, thick, voxel))
+    found = meetings(voxels, owner, cores, np.ceil(FAR * thick / voxel).astype(np.int32))
     if len(found) < LEAST_FACES:
         return ()
     passes = {}
     for core_voxel in np.unique(found[:, 1:]):
         radius = thick[core_voxel] / voxel
         window, least = int(np.ceil(WINDOW * radius)), int(np.ceil(ONWARD * radius))
-        passes[core_voxel] = runs_on(ids, inner, part, steps, int(core_voxel), window, least)
+        passes[core_voxel] = runs_on(voxels, cores, int(core_voxel), window, least)
     found = found[[passes[p] and passes[q] for _, p, q in found]]
     if len(found) == 0:
         return ()
-    places = np.stack(np.unravel_index(inner[found[:, 0]], ids.shape), axis=1) - 1
+    places = np.stack(np.unravel_index(inner[found[:, 0]], inside.shape), axis=1) - 1
     group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
     face = float(np.prod(spacing) ** (2 / 3))
     groups = [places[group == n] for n in range(group.max() + 1)]

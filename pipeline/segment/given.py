@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.axis_order import in_memory_order, reorder
 from pipeline.model import Branches, Lumen, Shapes, Volume
-from pipeline.segment._kernels.distance import propagate
+from pipeline.segment._kernels.distance import Owned, propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.levels import GreyLevels
@@ -57,18 +57,18 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     corners = np.ascontiguousarray((points - grid.origin_mm)[shapes.triangles])
     spacing = np.asarray(grid.spacing_mm)
     voxel = float(spacing[0])
-    inside, owner = np.zeros(grid.shape, np.uint8), np.zeros(grid.shape, np.int32)
-    enclosed(corners, spacing, inside)
+    box = Owned(np.zeros(grid.shape, np.int32), np.zeros(grid.shape, np.uint8), spacing)
+    enclosed(corners, spacing, box.inside)
     area = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
     corners = np.ascontiguousarray(corners[area > 1e-9 * voxel**2])
     foot = np.zeros((int(8 * area.sum() / voxel**2) + 8 * len(corners) + 1000, 3))
-    voxels = splat_triangles(corners, spacing, 1.5 * voxel, owner, foot)[:, 0]
+    voxels = splat_triangles(corners, spacing, 1.5 * voxel, box.owner, foot)[:, 0]
     foot = foot[: len(voxels)]
-    propagate(owner, inside, spacing, voxels, foot, config.outer_mm)
+    propagate(box, voxels, foot, config.outer_mm)
     flat = (foot, np.zeros_like(foot), np.zeros(len(foot)))
-    distance = signed(owner, inside, spacing, flat, config.outer_mm, 0)
+    distance = signed(box, flat, config.outer_mm, 0)
     return _lumen(
         grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)"
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Counters
-from pipeline.segment._kernels.distance import distances, lost_feet, propagate
+from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import (
     PAD,
     Wall,
@@ -57,7 +57,7 @@ class Site:
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
 
 
-def box_around(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, tuple[int, ...]]:
+def padded_box(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, tuple[int, ...]]:
     """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded."""
     margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
     index = np.unravel_index(voxels, grid.shape)
@@ -81,7 +81,7 @@ def prepare(
 
     more : further voxels that the box must hold.
     """
-    corner, shape = box_around(order if more is None else np.concatenate([order, more]), volume, margin_mm)
+    corner, shape = padded_box(order if more is None else np.concatenate([order, more]), volume, margin_mm)
     state = sparse_zeros(shape, np.uint8)
     flat = into_box(order, volume, corner, shape)
     state.reshape(-1)[flat] = 1
@@ -109,17 +109,14 @@ def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: flo
     return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)
 
 
-def signed(
-    owner: NDArray[np.int32], inside: NDArray[np.uint8], spacing: Array, wall: tuple[Array, Array, Array],
-    outer_mm: float, pad: int,
-) -> NDArray[np.float32]:  # fmt: skip
+def signed(box: Owned, wall: tuple[Array, Array, Array], outer_mm: float, pad: int) -> NDArray[np.float32]:
     """Signed distances on a box less its padding, from every voxel's foot, the normal and the curvature there.
 
     They overwrite the feet's numbers (``owner``) that they are read from: one box is held instead of two.
     """
-    shape = tuple(n - 2 * pad for n in owner.shape)
-    values = owner.reshape(-1).view(np.float32)[: int(np.prod(shape))].reshape(shape)
-    distances(owner, inside, spacing, wall, outer_mm, values)
+    shape = tuple(n - 2 * pad for n in box.owner.shape)
+    values = box.owner.reshape(-1).view(np.float32)[: int(np.prod(shape))].reshape(shape)
+    distances(box, wall, outer_mm, values)
     return values
 
 
@@ -140,6 +137,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
     """The distance from the surface at the half level."""
     spacing: Array = np.asarray(site.volume.spacing_mm)
     inside, owner = sparse_zeros(site.state.shape, np.uint8), np.zeros(site.state.shape, np.int32)
+    box = Owned(owner, inside, spacing)
     voxels, wall = _half_level_wall(site, levels.half, inside)
     good = np.isfinite(wall.distance)
     if not good.any():
@@ -151,12 +149,12 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
     blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
     wall = _corrected(wall, voxels, owner, blur, float(spacing.min()))
     inside.reshape(-1)[seen] = wall.distance[good] < 0
-    visits = propagate(owner, inside, spacing, seen, wall.foot, outer_mm)
-    stray = lost_feet(owner, spacing, voxels, wall.foot, good)
+    visits = propagate(box, seen, wall.foot, outer_mm)
+    stray = lost_feet(box, voxels, wall.foot, good)
     if len(stray):
         wall.curvature[stray] = 0.0
-        visits += propagate(owner, inside, spacing, voxels[stray], wall.foot, outer_mm)
-    values = signed(owner, inside, spacing, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
+        visits += propagate(box, voxels[stray], wall.foot, outer_mm)
+    values = signed(box, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
     counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits)}
     return SignedDistance(values, levels.half, blur, counters)
 

@@ -17,7 +17,7 @@ from pipeline.arrays.jets import Blurred, smooth_voxels
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
 from pipeline.segment._kernels.connect import Affinity
-from pipeline.segment._kernels.contact import along_cores
+from pipeline.segment._kernels.contact import Inner, along_cores
 from pipeline.segment._kernels.crests import crests
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.wall import PAD, dilate
@@ -26,7 +26,7 @@ from pipeline.segment.connect import connect, neighbours
 from pipeline.segment.contact import numbered, parts
 from pipeline.segment.levels import GreyLevels
 from pipeline.segment.region import Index
-from pipeline.segment.surface import box_around, into_box
+from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 
 FAINTEST = 0.09
@@ -76,12 +76,9 @@ def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
     return affinity._replace(homogeneity=alike, feature=feature)
 
 
-def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, NDArray[np.int32], Index]:
-    """Voxels of ``low`` that the blur of ``thick`` does not reach, a box of their positions + 1, and where it has them.
-
-    All voxels are flat indices; those returned ascend.
-    """
-    corner, shape = box_around(low, volume, 0.0)
+def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
+    """Voxels of ``low`` that the blur of ``thick`` does not reach, flat and ascending, and the same voxels in a box."""
+    corner, shape = padded_box(low, volume, 0.0)
     state = sparse_zeros(shape, np.uint8)
     main, wide = (into_box(o, volume, corner, shape) for o in (thick, low))
     state.reshape(-1)[main] = 1
@@ -89,7 +86,7 @@ def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, NDArra
     inner = np.sort(wide[state.reshape(-1)[wide] == 0])
     index = np.unravel_index(inner, shape)
     found = np.ravel_multi_index(tuple(i - PAD + c for i, c in zip(index, corner, strict=True)), volume.shape)
-    return found, numbered(shape, inner), inner
+    return found, numbered(shape, inner)
 
 
 def thin_branches(
@@ -105,10 +102,10 @@ def thin_branches(
     thick = order[bright >= levels.outside + FULL * levels.contrast]
     if len(low) <= len(order) or len(thick) == 0:
         return nothing, read
-    found, ids, inner = _beyond_skirt(volume, thick, low)
+    found, beyond = _beyond_skirt(volume, thick, low)
     if len(found) < SHORTEST:
         return nothing, read
-    part, steps = along_cores(ids, inner, np.ones(len(inner), bool))
+    part, steps = along_cores(beyond, np.ones(len(found), bool))
     share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
     count = np.bincount(part)
     length, most = np.zeros(len(count)), np.zeros(len(count))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
-from pipeline.arrays.resample import sampled
+from pipeline.arrays.axis_order import contiguous, reorder
+from pipeline.arrays.placement import integer_offset, sampled
 from pipeline.arrays.robust import spread
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Lumen, Volume

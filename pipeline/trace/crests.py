@@ -14,7 +14,7 @@ from pipeline.arrays.robust import spread
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.runs import above
-from pipeline.trace._kernels.tracklets import Rules, tracklets
+from pipeline.trace._kernels.tracklets import Ground, Rules, tracklets
 from pipeline.trace.subtraction import Subtraction
 
 SEED_SIGMAS = 5.5
@@ -79,5 +79,5 @@ def find_crests(
     # a crest of height low in a blur of sigma bends by about low / sigma^2
     rules = Rules(seed_sigmas * noise, low, 0.15 * low / sigma**2, TURN, bend, 0.7 * image.voxel)
     field, stamp = Blurred(image.grey, image.spacing, sigma), sparse_zeros(image.grey.shape, np.int32)
-    points, tangents, values, first = tracklets(field, image.region.allowed, stamp, seeds, rules, LONGEST)
-    return [Tracklet(points[a:b], tangents[a:b], values[a:b]) for a, b in pairwise(first)]
+    found, first = tracklets(Ground(field, image.region.allowed, stamp), seeds, rules, LONGEST)
+    return [Tracklet(*(part[a:b] for part in found)) for a, b in pairwise(first)]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.axis_order import contiguous, integer_offset, reorder
-from pipeline.arrays.resample import sampled
+from pipeline.arrays.axis_order import contiguous, reorder
+from pipeline.arrays.placement import corners_mm, integer_offset, sampled
 from pipeline.model import Lumen
 from solver.grid import Grid
 
@@ -56,8 +56,7 @@ def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
             return distance.crop((0, 0, 0), (1, 1, 1)), low
         a, b = (low - corner).tolist(), (high - corner).tolist()
         return distance.crop((a[0], a[1], a[2]), (b[0], b[1], b[2])), low
-    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in distance.shape], indexing="ij"), -1).reshape(-1, 3)
-    index = frame.to_index(distance.to_mm(ends))
+    index = frame.to_index(corners_mm(distance))
     low = np.clip(np.floor(index.min(0)), 0, np.array(frame.shape) - 1).astype(np.int64)
     high = np.clip(np.ceil(index.max(0)), low + 1, np.array(frame.shape)).astype(np.int64)
     empty = np.broadcast_to(np.float32(0), tuple(high - low))

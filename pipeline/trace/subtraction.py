@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pipeline.arrays.axis_order import in_memory_order
 from pipeline.arrays.jets import Blurred, values_at
@@ -60,15 +60,15 @@ class Subtraction:
         """Smallest of ``spacing``, mm."""
         return float(self.spacing.min())
 
-    def local(self, points_mm: Any) -> Array:
+    def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""
         return np.ascontiguousarray(self.region.box.to_index(points_mm) * self.spacing)
 
-    def world(self, points: Any) -> Array:
+    def world(self, points: ArrayLike) -> Array:
         """Kernel coordinates -> LPS mm."""
         return self.region.box.to_mm(np.asarray(points, float) / self.spacing)
 
-    def turned(self, direction: Any) -> Array:
+    def turned(self, direction: ArrayLike) -> Array:
         """A direction in LPS -> kernel coordinates."""
         along = np.asarray(direction, float) @ self.region.box.direction
         along = along * self.spacing / self.region.box.spacing_mm

@@ -293,5 +293,4 @@ def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     line, blob = sampled(tube, sampling(tube, data.voxel)), tube.blob(data.voxel)
     slot = sparse_zeros(data.grey.shape, np.int32)
     voxels = active_voxels(slot, data.spacing, line.curve, blob.radius)
-    weight = line.amplitude * line.samples.measure * line.speed
-    return voxels, render(slot, data.spacing, len(voxels), line.curve, weight, blob)
+    return voxels, render(slot, data.spacing, len(voxels), line, blob)

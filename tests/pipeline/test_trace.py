@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.run.log import Log
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import trace
@@ -50,6 +51,22 @@ def scans(cnr, seed=0):
         for n, v in enumerate((wired, empty))
     )
     return frame, reference, segment(reference, vessel()[4][None])
+
+
+def test_what_is_measured_is_never_summed():
+    frame, reference, lumen = scans(8)
+    curve = trace(frame, lumen, *vessel()[4:], reference=reference)
+    assert {"cnr", "blur_mm", "noise", "residual_rms", "inflation", "inflation_tip"} == set(curve.levels)
+    assert {"noise", "blur_mm", "scanner_blur_mm"} == set(lumen.levels)
+    log = Log(lambda *_: None)
+    for _ in range(3):
+        log.count("trace", curve.counters, curve.levels)
+    pooled = log.counters["trace"]
+    assert pooled["voxels_read"] == 3 * curve.counters["voxels_read"]
+    assert pooled["cnr"] == dict.fromkeys(("min", "median", "max"), pytest.approx(curve.levels["cnr"]))
+    for stage in (curve, lumen):
+        assert not set(stage.counters) & set(stage.levels)
+        assert not [name for name in stage.counters if "cnr" in name or "blur" in name or "fraction" in name]
 
 
 @pytest.mark.parametrize(("cnr", "mean_bar", "tip_bar"), [(16, 0.05, 0.4), (8, 0.08, 0.7), (4, 0.15, 1.1)])

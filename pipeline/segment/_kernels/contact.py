@@ -1,17 +1,33 @@
-"""Cores of a lumen's parts, how far along each part a voxel lies, and where two parts' voxels meet.
-
-``inner`` are the lumen's voxels (flat box indices, ascending), ``ids`` is the box with their position + 1, 0 elsewhere
-and at its border.
-"""
+"""Cores of a lumen's parts, how far along each part a voxel lies, and where two parts' voxels meet."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.lattice import door, grown, kernel, steps_around, unravelled
+
+
+class Inner(NamedTuple):
+    """The voxels of a lumen as ``flat`` (n,) box indices, ascending, and as a box of their positions + 1 (``ids``).
+
+    ids : 0 elsewhere, and all along the box's border.
+    """
+
+    ids: NDArray[Any]
+    flat: NDArray[Any]
+
+
+class Cores(NamedTuple):
+    """For each voxel (n,) the number of the connected core that it is of, and the steps to one of that core's ends.
+
+    Both are -1 outside the cores.
+    """
+
+    part: NDArray[Any]
+    steps: NDArray[Any]
 
 
 @kernel
@@ -32,14 +48,12 @@ def _covered(
 
 
 @door
-def thickness(
-    ids: NDArray[Any], inner: NDArray[Any], depth: NDArray[Any], spacing: NDArray[Any]
-) -> NDArray[Any]:
+def thickness(voxels: Inner, depth: NDArray[Any], spacing: NDArray[Any]) -> NDArray[Any]:
     """Local thickness (n,): the radius of the largest inscribed ball that covers a voxel (Hildebrand, Ruegsegger 1997).
 
     depth : (n,) mm to the wall. Balls that lie within a neighbour's are passed over.
     """
-    hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    (ids, inner), (hx, hy, hz) = voxels, (spacing[0], spacing[1], spacing[2])
     ni, nj, nk = ids.shape
     out = depth.copy()
     for n in range(inner.shape[0]):
@@ -60,21 +74,19 @@ def thickness(
 
 
 @kernel
-def _spread(
-    ids: NDArray[Any], inner: NDArray[Any], allowed: NDArray[Any], steps: NDArray[Any], queue: NDArray[Any]
-) -> int:
+def _spread(voxels: Inner, allowed: NDArray[Any], steps: NDArray[Any], queue: NDArray[Any]) -> int:
     """Number voxels by 26-neighbour steps from the first in ``queue``; ``steps`` is -1 where not reached yet.
 
     Returns how many were reached; they stand in ``queue`` in that order.
     """
-    flat, around = ids.reshape(-1), steps_around(ids.shape, 1)
+    inner, ids, around = voxels.flat, voxels.ids.reshape(-1), steps_around(voxels.ids.shape, 1)
     steps[queue[0]] = done = 0
     count = 1
     while done < count:
         n = queue[done]
         done += 1
         for step in around:
-            m = flat[inner[n] + step] - 1
+            m = ids[inner[n] + step] - 1
             if m >= 0 and allowed[m] and steps[m] < 0:
                 steps[m] = steps[n] + 1
                 queue[count] = m
@@ -83,31 +95,29 @@ def _spread(
 
 
 @door
-def along_cores(
-    ids: NDArray[Any], inner: NDArray[Any], core: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """For core voxels the number of their connected part (-1 elsewhere) and the steps to one of the part's ends."""
-    size = inner.shape[0]
+def along_cores(voxels: Inner, core: NDArray[Any]) -> Cores:
+    """The connected parts of the voxels that are marked as ``core`` (n,)."""
+    size = voxels.flat.shape[0]
     part, steps, first = np.full(size, -1, np.int32), np.full(size, -1, np.int32), np.full(size, -1, np.int32)
     queue = np.empty(size, np.int32)
     parts = 0
     for n in range(size):
         if core[n] and part[n] < 0:
             queue[0] = n
-            count = _spread(ids, inner, core, first, queue)
+            count = _spread(voxels, core, first, queue)
             for m in queue[:count]:
                 part[m] = parts
             queue[0] = queue[count - 1]
-            _spread(ids, inner, core, steps, queue)
+            _spread(voxels, core, steps, queue)
             parts += 1
-    return part, steps
+    return Cores(part, steps)
 
 
 @door
-def nearest_core(ids: NDArray[Any], inner: NDArray[Any], core: NDArray[Any]) -> NDArray[Any]:
+def nearest_core(voxels: Inner, core: NDArray[Any]) -> NDArray[Any]:
     """For every voxel the core voxel (position) that reaches it first, layer by layer; -1 where none does."""
+    inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
     size = inner.shape[0]
-    flat, (_, nj, nk) = ids.reshape(-1), ids.shape
     owner, queue = np.full(size, -1, np.int32), np.empty(size, np.int32)
     count = done = 0
     for n in range(size):
@@ -118,7 +128,7 @@ def nearest_core(ids: NDArray[Any], inner: NDArray[Any], core: NDArray[Any]) -> 
         n = queue[done]
         done += 1
         for step in (-nj * nk, nj * nk, -nk, nk, -1, 1):
-            m = flat[inner[n] + step] - 1
+            m = ids[inner[n] + step] - 1
             if m >= 0 and owner[m] < 0:
                 owner[m] = owner[n]
                 queue[count] = m
@@ -127,24 +137,18 @@ def nearest_core(ids: NDArray[Any], inner: NDArray[Any], core: NDArray[Any]) -> 
 
 
 @door
-def meetings(
-    ids: NDArray[Any],
-    inner: NDArray[Any],
-    owner: NDArray[Any],
-    part: NDArray[Any],
-    steps: NDArray[Any],
-    reach: NDArray[Any],
-) -> NDArray[Any]:
+def meetings(voxels: Inner, owner: NDArray[Any], cores: Cores, reach: NDArray[Any]) -> NDArray[Any]:
     """Faces (m, 3) between voxels of different parts, or far along one part: voxel, and the core voxels of both sides.
 
     reach : (n,) steps along a part within which a neighbour belongs to the same stretch of vessel.
     """
-    flat, (_, nj, nk) = ids.reshape(-1), ids.shape
+    inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
+    part, steps = cores
     found = np.empty((1024, 3), np.int32)
     count = 0
     for n in range(inner.shape[0]):
         for step in (nj * nk, nk, 1):
-            m = flat[inner[n] + step] - 1
+            m = ids[inner[n] + step] - 1
             if m < 0 or owner[m] < 0 or owner[n] < 0:
                 continue
             p, q = owner[n], owner[m]
@@ -158,16 +162,9 @@ def meetings(
 
 
 @door
-def runs_on(
-    ids: NDArray[Any],
-    inner: NDArray[Any],
-    part: NDArray[Any],
-    steps: NDArray[Any],
-    voxel: int,
-    window: int,
-    least: int,
-) -> bool:
+def runs_on(voxels: Inner, cores: Cores, voxel: int, window: int, least: int) -> bool:
     """Whether the part goes on by ``least`` steps both ways from a core voxel, within ``window`` voxels of it."""
+    (ids, inner), (part, steps) = voxels, cores
     i, j, k = unravelled(inner[voxel], ids.shape)
     before = after = False
     for a in range(max(0, i - window), min(ids.shape[0], i + window + 1)):

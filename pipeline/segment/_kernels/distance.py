@@ -1,12 +1,11 @@
 """Closest points of a wall handed on from voxel to voxel, and the signed distances that follow from them.
 
-Coordinates are index * spacing (mm along the grid's axes). ``owner`` (int32 box) holds the position + 1 of a voxel's
-closest point in ``foot``, or 0. ``inside`` (uint8 box) holds 1 inside the wall.
+Coordinates are index * spacing (mm along the grid's axes).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,16 @@ from pipeline.arrays.lattice import door, grown, kernel, unravelled
 
 QUEUED = 2
 """Mark in ``inside``, for as long as feet are handed on, of a voxel that has one to hand on."""
+
+
+class Owned(NamedTuple):
+    """A box whose voxels have closest points: ``owner`` (int32) holds the position + 1 of a voxel's closest point in a
+    list of feet, or 0; ``inside`` (uint8) holds 1 inside the wall.
+    """
+
+    owner: NDArray[Any]
+    inside: NDArray[Any]
+    spacing: NDArray[Any]
 
 
 @kernel
@@ -38,21 +47,14 @@ def _takes(
 
 
 @door
-def propagate(
-    owner: NDArray[Any],
-    inside: NDArray[Any],
-    spacing: NDArray[Any],
-    voxels: NDArray[Any],
-    foot: NDArray[Any],
-    outer: float,
-) -> int:
+def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float) -> int:
     """Hand closest points on from ``voxels``, which have one: to all of the inside, and outside as far as ``outer`` mm.
 
     voxels : flat, ascending for the sake of the cache. Layer by layer; a voxel that gets a nearer foot hands it on
     again. Returns the number of hand-overs.
     """
+    owner, inside, (hx, hy, hz) = box.owner, box.inside, (box.spacing[0], box.spacing[1], box.spacing[2])
     ni, nj, nk = owner.shape
-    hx, hy, hz = spacing[0], spacing[1], spacing[2]
     front, following = voxels.copy(), np.empty(max(4096, voxels.shape[0]), np.int64)
     count = visits = voxels.shape[0]
     while count:
@@ -81,14 +83,13 @@ def propagate(
 
 
 @door
-def lost_feet(
-    owner: NDArray[Any], spacing: NDArray[Any], voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]
-) -> NDArray[Any]:
+def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]) -> NDArray[Any]:
     """Voxels beside the surface whose foot was not found and whose neighbours' are two voxels off and more.
 
     A branch as thin as that has its peak at the level of the wall: the wall is put through the voxel itself.
     Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
     """
+    owner, _, spacing = box
     limit = (2.0 * max(spacing[0], spacing[1], spacing[2])) ** 2
     lost = np.empty(voxels.shape[0], np.int64)
     count = 0
@@ -125,19 +126,14 @@ def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], b
 
 @door
 def distances(
-    owner: NDArray[Any],
-    inside: NDArray[Any],
-    spacing: NDArray[Any],
-    wall: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
-    outer: float,
-    out: NDArray[Any],
+    box: Owned, wall: tuple[NDArray[Any], NDArray[Any], NDArray[Any]], outer: float, out: NDArray[Any]
 ) -> None:
     """Signed distance (float32) of every voxel from its owner's foot; ``outer`` where it has none.
 
     wall : feet, normals and curvatures.  ``out`` is the inner part of the box, and may be the beginning of ``owner``'s
     memory seen as float32: a voxel is written after it is read, and never further on.
     """
-    foot, normal, bend = wall
+    (owner, inside, spacing), (foot, normal, bend) = box, wall
     hx, hy, hz = spacing[0], spacing[1], spacing[2]
     skip = (owner.shape[0] - out.shape[0]) // 2
     for a in range(out.shape[0]):

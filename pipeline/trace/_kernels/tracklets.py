@@ -28,6 +28,16 @@ class Track(NamedTuple):
     values: NDArray[Any]
 
 
+class Ground(NamedTuple):
+    """What is walked over: a lattice, where its crests may run (``allowed``, uint8 box), and an int32 box of zeros in
+    which a walk leaves its marks.
+    """
+
+    field: Blurred
+    allowed: NDArray[Any]
+    stamp: NDArray[Any]
+
+
 class Rules(NamedTuple):
     """When a walk begins and ends: crest grey to start at (``high``) and to go on at (``low``), least curvature across
     (``sharp``), least cosine between two steps (``turn``) and against the last LAG steps (``bend``), and its step, mm.
@@ -107,20 +117,13 @@ def _unstamp(stamp: NDArray[Any], points: NDArray[Any], spacing: NDArray[Any]) -
 
 
 @kernel
-def _walk(
-    field: Blurred,
-    allowed: NDArray[Any],
-    stamp: NDArray[Any],
-    rules: Rules,
-    probe: Probe,
-    track: Track,
-    known: Track,
-) -> int:
+def _walk(ground: Ground, rules: Rules, probe: Probe, track: Track, known: Track) -> int:
     """Follow the crest from the probe; fills the track and returns how many of its points count.
 
     Stops where the crest ends or turns off, leaves ``allowed``, or runs along one that was walked before (``stamp`` =
     its point in ``known`` + 1; the walk's own points are stamped negative meanwhile).
     """
+    field, allowed, stamp = ground
     p, spacing = probe.place, field.spacing
     reach = BESIDE * min(spacing[0], spacing[1], spacing[2])
     count = swung = 0
@@ -185,19 +188,12 @@ def _start(field: Blurred, rules: Rules, probe: Probe, i: int, j: int, k: int) -
 
 
 @door
-def tracklets(
-    field: Blurred,
-    allowed: NDArray[Any],
-    stamp: NDArray[Any],
-    seeds: NDArray[Any],
-    rules: Rules,
-    longest: int,
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
+def tracklets(ground: Ground, seeds: NDArray[Any], rules: Rules, longest: int) -> tuple[Track, NDArray[Any]]:
     """Crests through the seeds (flat box indices, strongest first), each walked both ways.
 
-    stamp : int32 zeros on the box, working memory.  longest : most points of a walk.  Returns points (n, 3), tangents
-    (n, 3), crest values (n,), and the first point of every tracklet (m + 1,).
+    longest : most points of a walk.  Returns the points of all, and the first point of every tracklet (m + 1,).
     """
+    field, _, stamp = ground
     found, first, probe = _room(1024), np.zeros(64, np.int64), new_probe()
     seed, ahead, back = _room(1), _room(longest), _room(longest)
     count = tracks = 0
@@ -206,9 +202,9 @@ def tracklets(
         if _taken(stamp, i, j, k) or not _start(field, rules, probe, i, j, k):
             continue
         seed.points[0], seed.tangents[0], seed.values[0] = probe.place, probe.tangent, probe.jet[0]
-        na = _walk(field, allowed, stamp, rules, probe, ahead, found)
+        na = _walk(ground, rules, probe, ahead, found)
         probe.place[:], probe.tangent[:] = seed.points[0], -seed.tangents[0]
-        nb = _walk(field, allowed, stamp, rules, probe, back, found)
+        nb = _walk(ground, rules, probe, back, found)
         while count + na + nb + 1 > found.values.shape[0]:
             found = Track(grown(found.points), grown(found.tangents), grown(found.values))
         begin = count
@@ -224,4 +220,4 @@ def tracklets(
             first = grown(first)
         first[tracks] = count
     points, tangents, values = found
-    return points[:count], tangents[:count], values[:count], first[: tracks + 1]
+    return Track(points[:count], tangents[:count], values[:count]), first[: tracks + 1]

@@ -112,16 +112,9 @@ def active_voxels(
 
 
 @door
-def render(
-    slot: NDArray[Any],
-    spacing: NDArray[Any],
-    count: int,
-    curve: NDArray[Any],
-    weight: NDArray[Any],
-    blob: Blob,
-) -> NDArray[Any]:
-    """The model's grey (count,) at the voxels numbered in ``slot``; ``weight`` is amplitude times arc weight."""
-    out = np.zeros(count)
+def render(slot: NDArray[Any], spacing: NDArray[Any], count: int, line: Line, blob: Blob) -> NDArray[Any]:
+    """The grey (count,) above the offset that the model gives the voxels numbered in ``slot``."""
+    out, curve, weight = np.zeros(count), line.curve, line.amplitude * line.samples.measure * line.speed
     sigma, radius, _ = blob
     norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
     for m in range(curve.shape[0]):
