@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import clamped, door, kernel, nodes_near, unravelled
+from pipeline.arrays.lattice import clamped, entry_point, kernel, nodes_near, unravelled
 
 REACH = 3.0
 """Half width of the Gaussian's window in sigmas."""
@@ -87,7 +87,7 @@ def jet(field: Blurred, p: NDArray[Any], w: NDArray[Any], out: NDArray[Any]) -> 
         out[9] += a * fyz
 
 
-@door
+@entry_point
 def jets_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     """Value and gradient (n, 4) of the blurred lattice at points (n, 3)."""
     w, out = np.empty((3, 3, WIDEST)), np.empty(10)
@@ -122,7 +122,7 @@ def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -
     return total
 
 
-@door
+@entry_point
 def smooth_voxels(grey: NDArray[Any], taps: NDArray[Any], voxels: NDArray[Any]) -> NDArray[Any]:
     """The separable kernel ``taps`` at flat indices of a box, float32."""
     out = np.empty(voxels.shape[0], np.float32)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from solver._compile import on_disk
 
 HOW: dict[str, Any] = {"no_cfunc_wrapper": True}
-door = on_disk(**HOW)
+entry_point = on_disk(**HOW)
 """Compiles what Python calls: kept on disk until a source behind it changes."""
 kernel = njit(**HOW)
-"""Compiles what other kernels call: into the doors."""
+"""Compiles what other kernels call: into the entry points."""
 
 
 @kernel

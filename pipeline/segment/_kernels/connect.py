@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, grown, kernel, unravelled
+from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, INNER, SHIFT, SIDE, scratch, smooth_tile
 
 FULL = 255
@@ -133,7 +133,7 @@ def _seed(s: Search, seeds: NDArray[Any], n: int, work: NDArray[Any]) -> int:
     return int(cell)
 
 
-@door
+@entry_point
 def flood(s: Search, seeds: NDArray[Any], threshold: int) -> NDArray[Any]:
     """Voxels whose strength of connectedness is at least ``threshold``: an alpha cut needs no queue.
 
@@ -208,7 +208,7 @@ def _once(s: Search, entries: NDArray[Any], strength: NDArray[Any]) -> tuple[NDA
     return _flat(s, entries[:count]), found[:count]
 
 
-@door
+@entry_point
 def strengths(
     s: Search, seeds: NDArray[Any], threshold: int, strength: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:

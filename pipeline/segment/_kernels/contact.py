@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, grown, kernel, steps_around, unravelled
+from pipeline.arrays.lattice import entry_point, grown, kernel, steps_around, unravelled
 
 
 class Inner(NamedTuple):
@@ -47,7 +47,7 @@ def _covered(
     return covered
 
 
-@door
+@entry_point
 def thickness(voxels: Inner, depth: NDArray[Any], spacing: NDArray[Any]) -> NDArray[Any]:
     """Local thickness (n,): the radius of the largest inscribed ball that covers a voxel (Hildebrand, Ruegsegger 1997).
 
@@ -94,7 +94,7 @@ def _spread(voxels: Inner, allowed: NDArray[Any], steps: NDArray[Any], queue: ND
     return count
 
 
-@door
+@entry_point
 def along_cores(voxels: Inner, core: NDArray[Any]) -> Cores:
     """The connected parts of the voxels that are marked as ``core`` (n,)."""
     size = voxels.flat.shape[0]
@@ -113,7 +113,7 @@ def along_cores(voxels: Inner, core: NDArray[Any]) -> Cores:
     return Cores(part, steps)
 
 
-@door
+@entry_point
 def nearest_core(voxels: Inner, core: NDArray[Any]) -> NDArray[Any]:
     """For every voxel the core voxel (position) that reaches it first, layer by layer; -1 where none does."""
     inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
@@ -136,7 +136,7 @@ def nearest_core(voxels: Inner, core: NDArray[Any]) -> NDArray[Any]:
     return owner
 
 
-@door
+@entry_point
 def meetings(voxels: Inner, owner: NDArray[Any], cores: Cores, reach: NDArray[Any]) -> NDArray[Any]:
     """Faces (m, 3) between voxels of different parts, or far along one part: voxel, and the core voxels of both sides.
 
@@ -161,7 +161,7 @@ def meetings(voxels: Inner, owner: NDArray[Any], cores: Cores, reach: NDArray[An
     return found[:count]
 
 
-@door
+@entry_point
 def runs_on(voxels: Inner, cores: Cores, voxel: int, window: int, least: int) -> bool:
     """Whether the part goes on by ``least`` steps both ways from a core voxel, within ``window`` voxels of it."""
     (ids, inner), (part, steps) = voxels, cores

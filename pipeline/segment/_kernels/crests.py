@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.jets import Blurred
-from pipeline.arrays.lattice import door, unravelled
+from pipeline.arrays.lattice import entry_point, unravelled
 from pipeline.arrays.ridges import new_probe, ridge_step, to_ridge
 
 ROUNDS = 6
@@ -18,7 +18,7 @@ FURTHEST = 1.8
 """Voxels that a point may move to its crest: further off lies another one."""
 
 
-@door
+@entry_point
 def crests(
     field: Blurred, voxels: NDArray[Any], outside: float, sharp: float
 ) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, grown, kernel, unravelled
+from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
 
 QUEUED = 2
 """Mark in ``inside``, for as long as feet are handed on, of a voxel that has one to hand on."""
@@ -46,7 +46,7 @@ def _takes(
     return bool(far <= most or inside & 1)
 
 
-@door
+@entry_point
 def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float) -> int:
     """Hand closest points on from ``voxels``, which have one: to all of the inside, and outside as far as ``outer`` mm.
 
@@ -82,7 +82,7 @@ def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float
     return int(visits)
 
 
-@door
+@entry_point
 def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]) -> NDArray[Any]:
     """Voxels beside the surface whose foot was not found and whose neighbours' are two voxels off and more.
 
@@ -124,7 +124,7 @@ def _from_foot(x: float, y: float, z: float, p: NDArray[Any], n: NDArray[Any], b
     return float(min(abs(near), far))
 
 
-@door
+@entry_point
 def distances(
     box: Owned, wall: tuple[NDArray[Any], NDArray[Any], NDArray[Any]], outer: float, out: NDArray[Any]
 ) -> None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, kernel, nodes_near
+from pipeline.arrays.lattice import entry_point, kernel, nodes_near
 
 
-@door
+@entry_point
 def cones(
     start: NDArray[Any], end: NDArray[Any], r0: NDArray[Any], r1: NDArray[Any], spacing: NDArray[Any], outer: float,
     distance: NDArray[Any],
@@ -88,7 +88,7 @@ def _dot(a: NDArray[Any], b: NDArray[Any]) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@door
+@entry_point
 def splat_triangles(
     corners: NDArray[Any], spacing: NDArray[Any], reach: float, owner: NDArray[Any], foot: NDArray[Any]
 ) -> NDArray[Any]:
@@ -129,7 +129,7 @@ def splat_triangles(
     return found[:count]
 
 
-@door
+@entry_point
 def enclosed(corners: NDArray[Any], spacing: NDArray[Any], inside: NDArray[Any]) -> None:
     """Set ``inside`` (uint8 zeros) where a ray along the last axis has crossed the mesh an odd number of times.
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.jets import smoothed
-from pipeline.arrays.lattice import clamped, door, grown, kernel, steps_around, unravelled
+from pipeline.arrays.lattice import clamped, entry_point, grown, kernel, steps_around, unravelled
 from pipeline.segment._kernels.spline import hessian, value_gradient
 from pipeline.segment._kernels.tiles import INNER, SHIFT, SIDE, scratch, smooth_tile
 
@@ -37,7 +37,7 @@ class Wall(NamedTuple):
     steepness: NDArray[Any]
 
 
-@door
+@entry_point
 def dilate(mask: NDArray[Any], order: NDArray[Any], layers: int, first: int) -> None:
     """Mark ``layers`` (PAD at most) 26-neighbour layers around the voxels ``order`` with ``first``, ``first + 1``..."""
     flat, steps = mask.reshape(-1), steps_around(mask.shape, 1)
@@ -61,7 +61,7 @@ def _common(first: int, start: int, volume: int, box: int) -> tuple[int, int]:
     return max(first, -start), min(first + SIDE, volume - start, box)
 
 
-@door
+@entry_point
 def smooth_lattice(
     volume: NDArray[Any],
     corner: NDArray[Any],
@@ -98,7 +98,7 @@ def smooth_lattice(
                             lattice[i, j, k] = rows[i - i0, j - j0, k - k0]
 
 
-@door
+@entry_point
 def surface_voxels(
     state: NDArray[Any],
     lattice: NDArray[Any],
@@ -157,7 +157,7 @@ def _closest(
     return True, px, py, pz
 
 
-@door
+@entry_point
 def feet(
     lattice: NDArray[Any], level: float, spacing: NDArray[Any], voxels: NDArray[Any], inside: NDArray[Any]
 ) -> Wall:
@@ -190,7 +190,7 @@ def feet(
     return wall
 
 
-@door
+@entry_point
 def mean_around(
     owner: NDArray[Any], voxels: NDArray[Any], values: NDArray[Any], valid: NDArray[Any], reach: int
 ) -> NDArray[Any]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, grown, kernel
+from pipeline.arrays.lattice import entry_point, grown, kernel
 
 
 class WallModel(NamedTuple):
@@ -37,7 +37,7 @@ def _profile(table: NDArray[Any], step: float, distance: float) -> float:
     return float(table[n] + (at - n) * (table[n + 1] - table[n]))
 
 
-@door
+@entry_point
 def modelled(wall: WallModel, out: NDArray[Any]) -> None:
     """The modelled grey on the runs of ``out``."""
     distance, runs, table, step = wall
@@ -46,7 +46,7 @@ def modelled(wall: WallModel, out: NDArray[Any]) -> None:
             out[i, j, k] = _profile(table, step, distance[i, j, k])
 
 
-@door
+@entry_point
 def residual(scan: NDArray[Any], corner: NDArray[Any], wall: WallModel, out: NDArray[Any]) -> None:
     """scan - model on the runs of ``out`` (int16 or float32)."""
     distance, runs, table, step = wall
@@ -56,7 +56,7 @@ def residual(scan: NDArray[Any], corner: NDArray[Any], wall: WallModel, out: NDA
             out[i, j, k] = scan[a, b, k + c] - _profile(table, step, distance[i, j, k])
 
 
-@door
+@entry_point
 def denoised(
     rough: NDArray[Any], wall: WallModel, taps: NDArray[Any], limit: float, variance: float, out: NDArray[Any]
 ) -> None:
@@ -88,7 +88,7 @@ def denoised(
             out[i, j, k] = _profile(table, step, distance[i, j, k]) + rest
 
 
-@door
+@entry_point
 def subtract(
     frame: NDArray[Any], background: NDArray[Any], corner: NDArray[Any], runs: NDArray[Any], out: NDArray[Any]
 ) -> int:
@@ -102,7 +102,7 @@ def subtract(
     return read
 
 
-@door
+@entry_point
 def above(grey: NDArray[Any], allowed: NDArray[Any], runs: NDArray[Any], level: float) -> NDArray[Any]:
     """Flat indices of the voxels on ``runs`` that are allowed and brighter than ``level``."""
     _, nj, nk = grey.shape

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door
+from pipeline.arrays.lattice import entry_point
 
 
-@door
+@entry_point
 def factorise(matrix: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], bool]:
     """Lower factor L (n, n) with L L^T = matrix, the first column of every row, and whether it went well."""
     n = matrix.shape[0]
@@ -39,7 +39,7 @@ def factorise(matrix: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], bool]:
     return lower, first, True
 
 
-@door
+@entry_point
 def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """x with L L^T x = right (n,)."""
     n = right.shape[0]
@@ -56,7 +56,7 @@ def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) ->
     return x
 
 
-@door
+@entry_point
 def inverse(lower: NDArray[Any], first: NDArray[Any]) -> NDArray[Any]:
     """The inverse of L L^T, column by column."""
     n = lower.shape[0]

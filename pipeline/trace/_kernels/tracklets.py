@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.jets import Blurred
-from pipeline.arrays.lattice import door, grown, kernel, unravelled
+from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
 from pipeline.arrays.ridges import Probe, new_probe, to_ridge
 
 LAG = 12
@@ -187,7 +187,7 @@ def _start(field: Blurred, rules: Rules, probe: Probe, i: int, j: int, k: int) -
     return not (probe.jet[0] < rules.high or middle > -rules.sharp or moved > (1.8 * min(hx, hy, hz)) ** 2)
 
 
-@door
+@entry_point
 def tracklets(ground: Ground, seeds: NDArray[Any], rules: Rules, longest: int) -> tuple[Track, NDArray[Any]]:
     """Crests through the seeds (flat box indices, strongest first), each walked both ways.
 

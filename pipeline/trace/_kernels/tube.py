@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.lattice import door, grown, kernel, nodes_near, unravelled
+from pipeline.arrays.lattice import entry_point, grown, kernel, nodes_near, unravelled
 
 BLOCKS = 14
 """Control points that one voxel may see: 5 for one strand, 10 for two in contact, with room for a third."""
@@ -85,7 +85,7 @@ class Equations(NamedTuple):
     square: float
 
 
-@door
+@entry_point
 def active_voxels(
     slot: NDArray[Any], spacing: NDArray[Any], curve: NDArray[Any], radius: float
 ) -> NDArray[Any]:
@@ -111,7 +111,7 @@ def active_voxels(
     return found[:count]
 
 
-@door
+@entry_point
 def render(slot: NDArray[Any], spacing: NDArray[Any], count: int, line: Line, blob: Blob) -> NDArray[Any]:
     """The grey (count,) above the offset that the model gives the voxels numbered in ``slot``."""
     out, curve, weight = np.zeros(count), line.curve, line.amplitude * line.samples.measure * line.speed
@@ -221,7 +221,7 @@ def _row(rows: _Rows, s: int, controls: int, tints: int, column: NDArray[Any], r
     return n + 2
 
 
-@door
+@entry_point
 def normal_equations(
     grey: NDArray[Any], spacing: NDArray[Any], claim: Claim, line: Line, blob: Blob, controls: int, tints: int
 ) -> Equations:
