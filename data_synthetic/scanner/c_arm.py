@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from data_synthetic.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid
 
 Array = NDArray[np.float64]
 Volume = NDArray[np.float32]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from data_synthetic._tube_kernels import Index, Tables, union_distance
-from data_synthetic.scan_grid import ScanGrid
-from data_synthetic.tubes import Anatomy
+from data_synthetic._compile import on_disk
+from data_synthetic.anatomy._kernels import Index, Tables, union_distance
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.geometry.scan_grid import ScanGrid
 
 Array = NDArray[np.float64]
 Volume = NDArray[np.float32]
@@ -25,7 +25,7 @@ RING_POINTS, RINGS = 16, 4
 """Points over the wire's cross-section, rings of equal area."""
 
 
-@njit(cache=True)
+@on_disk()
 def mark_balls(centres: Array, radii: Array, spacing: Array, mask: NDArray[np.bool_]) -> None:
     """Set mask where a voxel centre lies within radii (n,) mm of centres (n, 3) given in index coordinates."""
     for n in range(len(centres)):
@@ -44,7 +44,7 @@ def mark_balls(centres: Array, radii: Array, spacing: Array, mask: NDArray[np.bo
                         mask[i, j, k] = True
 
 
-@njit(cache=True)
+@on_disk()
 def fill_coverage(
     index: Index, origin: Array, axes: Array, reach: float, sub: int, tables: Tables, out: Volume
 ) -> None:
@@ -152,7 +152,7 @@ def _disc(radius_mm: float) -> Array:
     return np.column_stack([(ring[:, None] * np.cos(angle)).ravel(), (ring[:, None] * np.sin(angle)).ravel()])
 
 
-@njit(cache=True)
+@on_disk()
 def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
     """Add weighted points (n, 3), in voxels, blurred by a Gaussian (sd per axis) and integrated over every voxel."""
     reach = np.ceil(CUT * sigma + 0.5).astype(np.int64)

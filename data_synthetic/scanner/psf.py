@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from data_synthetic.scan_grid import ScanGrid
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.geometry.scan_grid import ScanGrid
 from data_synthetic.scanner.coverage import CUT, bone_coverage, lumen_coverage, splat, wire_particles
-from data_synthetic.tubes import Anatomy
 
 Array = NDArray[np.float64]
 Volume = NDArray[np.float32]

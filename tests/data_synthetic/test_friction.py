@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from data_synthetic import shapes
-from data_synthetic.rod import edge_lengths, relax, shape_from_points
-from data_synthetic.rod_friction import ELASTIC_SLIP_MM, Held, Sliders
-from data_synthetic.tubes import Anatomy
-from data_synthetic.wire import TrueWire
-from data_synthetic.wire_truth import Insertion, _advance, _rod, replay
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.rod.friction import ELASTIC_SLIP_MM, Held, Sliders
+from data_synthetic.rod.replay import Insertion, _advance, _rod, replay
+from data_synthetic.rod.rod import edge_lengths, relax, shape_from_points
+from data_synthetic.rod.wire import TrueWire
 
 X, Y, Z = np.eye(3)
 LOAD_N, SOFT_N_MM2 = 0.5, 0.01

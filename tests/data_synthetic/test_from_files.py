@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from data_synthetic import shapes
-from data_synthetic.background import background_study
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.centrelines import read_tree
+from data_synthetic.anatomy.from_tree import smooth_tube, way_through
+from data_synthetic.anatomy.iso_wall import iso_wall
+from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.catalogue import build, from_anatomy
-from data_synthetic.iso_wall import iso_wall
-from data_synthetic.scan_grid import centred_grid
+from data_synthetic.catalogue.own_background import background_study
+from data_synthetic.geometry.scan_grid import centred_grid
 from data_synthetic.scanner.coverage import lumen_coverage
-from data_synthetic.shapes.centrelines import read_tree
-from data_synthetic.shapes.from_tree import smooth_tube, way_through
-from data_synthetic.tubes import Anatomy, ball
-from data_synthetic.volume_files import to_image
+from data_synthetic.write.volumes import to_image
 
 Z = np.linspace(0.0, 45.0, 25)
 TRUNK = np.column_stack([3 * np.sin(Z / 15), 0.02 * Z**2, Z])

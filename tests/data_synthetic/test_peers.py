@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data_synthetic.rod import Rod, make_rod, relax, shape_from_points
-from data_synthetic.shapes import straight
-from data_synthetic.wire import TrueWire
+from data_synthetic.anatomy.shapes import straight
+from data_synthetic.rod.rod import Rod, make_rod, relax, shape_from_points
+from data_synthetic.rod.wire import TrueWire
 
 Array = NDArray[np.float64]
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore")]

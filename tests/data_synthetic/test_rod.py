@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data_synthetic import shapes
-from data_synthetic.rod import Equilibrium, Rod, edge_lengths, make_rod, relax, shape_from_points
-from data_synthetic.tubes import Anatomy
-from data_synthetic.wire import TrueWire, cell_means
-from data_synthetic.wire_truth import Insertion, TrueFrame, replay
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.rod.replay import Insertion, TrueFrame, replay
+from data_synthetic.rod.rod import Equilibrium, Rod, edge_lengths, make_rod, relax, shape_from_points
+from data_synthetic.rod.wire import TrueWire, cell_means
 
 Array = NDArray[np.float64]
 LENGTH, STIFFNESS = 100.0, 10.0

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from data_synthetic.scan_grid import ScanGrid, centred_grid
+from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
+from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
 from data_synthetic.scanner import Greys, PsfScanner
 from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
-from data_synthetic.tubes import Anatomy, ball, sweep
 from tests.naive.tubes import inside_share
 
 QUIET = Greys(noise=0.0, drift=0.0)

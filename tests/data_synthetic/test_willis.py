@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from data_synthetic.shapes import WillisPlan, circle_of_willis
-from data_synthetic.shapes.willis import DIAMETERS_MM
-from data_synthetic.tubes import Anatomy, Tube
+from data_synthetic.anatomy.tubes import Anatomy, Tube
+from data_synthetic.anatomy.willis import DIAMETERS_MM, WillisPlan, circle_of_willis
 
 SEEDS = 60
 

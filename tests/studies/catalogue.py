@@ -17,7 +17,7 @@ from time import process_time
 import pandas as pd
 
 from data_synthetic import catalogue
-from data_synthetic.scene import Scene
+from data_synthetic.catalogue.scene import Scene
 from data_synthetic.write import write_study
 from pipeline.case import STAGES
 from pipeline.cli import main as wireval

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from data_synthetic import catalogue, coverage
-from data_synthetic.scene import Scene, Study
+from data_synthetic import catalogue
+from data_synthetic.catalogue.scene import Scene, Study
 from tests.studies import catalogue as small
+from tests.studies import coverage
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "data_synthetic" / "CATALOGUE.md"

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data_synthetic import catalogue
-from data_synthetic.background import background_setup, read_scan
-from data_synthetic.scene import Setup
-from data_synthetic.study import planned_insertion
-from data_synthetic.vessel_way import vessel_threshold
-from data_synthetic.wire_truth import TrueFrame, replay
+from data_synthetic.anatomy.vessel_way import vessel_threshold
+from data_synthetic.catalogue.own_background import background_setup, read_scan
+from data_synthetic.catalogue.scene import Setup
+from data_synthetic.catalogue.study import planned_insertion
+from data_synthetic.rod.replay import TrueFrame, replay
 
 Array = NDArray[np.float64]
 ALLOWED_MM = 0.01
