@@ -7,11 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from data_synthetic.anatomy.tubes import frozen_array
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array, Index
 
 LONGEST_EDGE_MM = 5.0
 """Longer SWC edges join trees that are not joined in the body (BraVa opens the circle of Willis); they are cut."""
@@ -26,7 +23,7 @@ class Tree:
 
     points_mm: Array
     radii_mm: Array
-    edges: NDArray[np.int64]
+    edges: Index
     meant: slice = field(default_factory=lambda: slice(None))
 
 
@@ -62,7 +59,7 @@ def _read_swc(path: Path) -> Tree:
     return _without_repeats(points, radii, edges[keep])
 
 
-def _without_repeats(points: Array, radii: Array, edges: NDArray[np.int64]) -> Tree:
+def _without_repeats(points: Array, radii: Array, edges: Index) -> Tree:
     """Merge points that coincide (BraVa repeats branch points), keeping the larger radius."""
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
     inverse = inverse.ravel()
@@ -70,7 +67,7 @@ def _without_repeats(points: Array, radii: Array, edges: NDArray[np.int64]) -> T
     np.maximum.at(radius, inverse, radii)
     merged = np.sort(inverse[edges], axis=1)
     merged = np.unique(merged[merged[:, 0] != merged[:, 1]], axis=0)
-    return Tree(frozen_array(unique), frozen_array(radius), merged)
+    return Tree(unique, radius, merged)
 
 
 def _read_curve(path: Path) -> Tree:
@@ -86,7 +83,7 @@ def _read_curve(path: Path) -> Tree:
         msg = f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
         raise ValueError(msg)
     chain = np.column_stack([np.arange(len(points) - 1), np.arange(1, len(points))])
-    return Tree(frozen_array(points), frozen_array(radii), chain)
+    return Tree(points, np.array(radii, dtype=np.float64), chain)
 
 
 def _joined(trees: list[Tree]) -> Tree:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
@@ -12,9 +10,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from data_synthetic.anatomy.centrelines import Tree
 from data_synthetic.anatomy.tubes import Anatomy, Tube, sweep
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from data_synthetic.geometry.vectors import Array, Index, arc_lengths, at_arc
 
 STEP_MM = 0.5
 SMOOTHING_MM = 2.0
@@ -31,16 +27,8 @@ TIGHTEST = 0.85
 """Largest product of radius and curvature of a smoothed tube; above one it would fold into itself."""
 
 
-@dataclass(frozen=True, eq=False)
-class Way:
-    """An anatomy whose first tube, ``way``, is the one that the wire is meant to take, and that tube's length."""
-
-    anatomy: Anatomy
-    length_mm: float
-
-
-def way_through(tree: Tree) -> Way:
-    """The way from the widest end of a tree along its widest long path, and the branches near it."""
+def way_through(tree: Tree) -> Anatomy:
+    """The way from the widest end of a tree along its widest long path as the first tube, then the branches near it."""
     path = _widest_path(tree)
     tube = smooth_tube("way", tree.points_mm[path], tree.radii_mm[path])
     middle = tube.points_mm.mean(axis=0)
@@ -48,17 +36,16 @@ def way_through(tree: Tree) -> Way:
     others = []
     for k, chain in enumerate(_chains(tree, path)):
         near = np.linalg.norm(tree.points_mm[chain] - middle, axis=1) < reach
-        if not near.any() or _length(tree.points_mm[chain]) < 2.0 * STEP_MM:
-            continue
-        others.append(_branch(f"branch{k}", tree, chain, path, tube))
-    return Way(Anatomy((tube, *others)), tube.length_mm)
+        if near.any() and _length(tree, chain) >= 2.0 * STEP_MM:
+            others.append(_branch(f"branch{k}", tree, chain, path, tube))
+    return Anatomy((tube, *others))
 
 
 def smooth_tube(name: str, points: Array, radii: Array, smoothing_mm: float = SMOOTHING_MM) -> Tube:
     """Resample and smooth a jagged centreline, ends kept, as far as needed for a tube that does not fold."""
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    arc = arc_lengths(points)
     places = np.linspace(0.0, arc[-1], max(4, round(arc[-1] / STEP_MM) + 1))
-    jagged = np.column_stack([np.interp(places, arc, points[:, a]) for a in range(3)])
+    jagged = at_arc(places, arc, points)
     radius = np.maximum(gaussian_filter1d(np.interp(places, arc, radii), 3.0 / STEP_MM, mode="nearest"), 0.45)
     for sigma in smoothing_mm * 1.4 ** np.arange(6):
         curve = _smooth(jagged, sigma / STEP_MM)
@@ -80,20 +67,17 @@ def _smooth(points: Array, sigma: float) -> Array:
     return np.asarray(chord + smoothed[len(points) - 1 : 2 * len(points) - 1])
 
 
-def _length(points: Array) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-
-
-def _graph(tree: Tree) -> coo_array:
-    n = len(tree.points_mm)
-    length = np.linalg.norm(tree.points_mm[tree.edges[:, 0]] - tree.points_mm[tree.edges[:, 1]], axis=1)
-    return coo_array((length, (tree.edges[:, 0], tree.edges[:, 1])), shape=(n, n))
+def _length(tree: Tree, path: Index) -> float:
+    """Length in mm of a path through the tree."""
+    return float(np.linalg.norm(np.diff(tree.points_mm[path], axis=0), axis=1).sum())
 
 
 def _widest_path(tree: Tree) -> Index:
     """Indices of the path to be taken: from a wide end, at least half of LONGEST_WAY_MM, its narrowest place widest."""
-    graph = _graph(tree)
-    degree = np.bincount(tree.edges.ravel(), minlength=len(tree.points_mm))
+    n, (a, b) = len(tree.points_mm), tree.edges.T
+    length = np.linalg.norm(tree.points_mm[a] - tree.points_mm[b], axis=1)
+    graph = coo_array((length, (a, b)), shape=(n, n))
+    degree = np.bincount(tree.edges.ravel(), minlength=n)
     _, part = connected_components(graph, directed=False)
     best: tuple[float, Index] = (-np.inf, np.zeros(0, dtype=np.int64))
     parts, sizes = np.unique(part[tree.meant], return_counts=True)
@@ -102,15 +86,12 @@ def _widest_path(tree: Tree) -> Index:
         if len(ends) < 2:
             continue
         root = ends[np.argmax(tree.radii_mm[ends])]
-        distance, before = dijkstra(graph, directed=False, indices=root, return_predecessors=True)
+        before = dijkstra(graph, directed=False, indices=root, return_predecessors=True)[1]
         for end in ends:
-            path = (
-                _usable(tree, _walk(before, int(root), int(end))) if np.isfinite(distance[end]) else best[1]
-            )
-            score = min(_length(tree.points_mm[path]), LONGEST_WAY_MM) if len(path) > 3 else -np.inf
-            score += 5.0 * float(tree.radii_mm[path].min()) if len(path) > 3 else 0.0
-            if score > best[0]:
-                best = (score, path)
+            path = _usable(tree, _walk(before, int(root), int(end)))
+            if len(path) > 3:
+                score = min(_length(tree, path), LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
+                best = max(best, (score, path), key=lambda found: found[0])
     if len(best[1]) < 4:
         msg = f"anatomy: got no path with radii from {WIDEST_MM} down to {NARROWEST_MM} mm; check the file's units (mm)"
         raise ValueError(msg)
@@ -118,7 +99,8 @@ def _widest_path(tree: Tree) -> Index:
 
 
 def _walk(before: NDArray[np.int32], root: int, end: int) -> Index:
-    path = [int(end)]
+    """The shortest path from root to end; ``before`` holds each point's predecessor on the way from the root."""
+    path = [end]
     while path[-1] != root:
         path.append(int(before[path[-1]]))
     return np.array(path[::-1], dtype=np.int64)
@@ -131,10 +113,7 @@ def _usable(tree: Tree, path: Index) -> Index:
     narrow = np.flatnonzero(radius[first:] < NARROWEST_MM)
     last = first + (int(narrow[0]) if len(narrow) else len(path) - first)
     kept = path[first:last]
-    if len(kept) < 2:
-        return kept
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tree.points_mm[kept], axis=0), axis=1))])
-    return kept[arc <= LONGEST_WAY_MM]
+    return kept[arc_lengths(tree.points_mm[kept]) <= LONGEST_WAY_MM] if len(kept) else kept
 
 
 def _chains(tree: Tree, path: Index) -> list[Index]:

@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, spline_filter
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from data_synthetic._compile import on_disk
-from data_synthetic.geometry.scan_grid import ScanGrid
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume, voxels_near
+from data_synthetic.geometry.vectors import Array, Index
 
 BAND_MM = 1.5
 """Distances are exact up to here and cut beyond: a wire touches at less than its radius."""
@@ -44,25 +42,20 @@ class IsoWall:
         return value, np.asarray((slope / self.grid.spacing_mm) @ self.grid.direction.T)
 
 
-def iso_wall(values: NDArray[np.float32], grid: ScanGrid, threshold: float) -> IsoWall:
+def iso_wall(values: Volume, grid: ScanGrid, threshold: float) -> IsoWall:
     """The wall where smoothed ``values`` cross ``threshold``; larger values are inside."""
     smooth = gaussian_filter(values, SMOOTHING_VOXELS)
     corners, faces, _, _ = marching_cubes(smooth, threshold)
     triangles = (corners * grid.spacing_mm)[faces]
-    fine = ScanGrid(
-        (2 * grid.shape[0] - 1, 2 * grid.shape[1] - 1, 2 * grid.shape[2] - 1),
-        0.5 * grid.spacing_mm,
-        grid.origin_mm,
-        grid.direction,
-    )
     inside = _doubled(smooth) > threshold
+    fine = ScanGrid(inside.shape, 0.5 * grid.spacing_mm, grid.origin_mm, grid.direction)
     distance = np.full(fine.shape, BAND_MM)
     near, places = _near_surface(triangles, fine)
     distance[tuple(near.T)] = np.minimum(_to_triangles(places, triangles), BAND_MM)
     return IsoWall(fine, spline_filter(np.where(inside, -distance, distance), order=3, mode="mirror"))
 
 
-def _doubled(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _doubled(values: Volume) -> Volume:
     """Linear interpolation at half voxels."""
     for axis in range(3):
         moved = np.moveaxis(values, axis, 0)
@@ -72,30 +65,27 @@ def _doubled(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values
 
 
-def _near_surface(triangles: Array, fine: ScanGrid) -> tuple[NDArray[np.int64], Array]:
+def _near_surface(triangles: Array, fine: ScanGrid) -> tuple[Index, Array]:
     """Nodes (n, 3) within the band of the surface, and their places in the grid's own mm (no origin, no turn)."""
-    from data_synthetic.scanner.coverage import mark_balls
-
-    mask = np.zeros(fine.shape, dtype=bool)
     centres = triangles.mean(axis=1)
     # one ball per cell of half the band is enough to cover the band
     _, first = np.unique((centres / (0.5 * BAND_MM)).astype(np.int64), axis=0, return_index=True)
-    reach = np.full(len(first), 1.9 * BAND_MM)
-    mark_balls(centres[first] / fine.spacing_mm, reach, fine.spacing_mm, mask)
-    near = np.argwhere(mask)
+    near = voxels_near(centres[first] / fine.spacing_mm, np.full(len(first), 1.9 * BAND_MM), fine)
     return near, near * fine.spacing_mm
 
 
 def _to_triangles(points: Array, triangles: Array) -> Array:
     """Distance (n,) of points (n, 3) to the nearest of triangles (m, 3, 3)."""
-    candidates = cKDTree(triangles.mean(axis=1)).query(points, k=NEAREST_TRIANGLES)[1]
+    candidates = np.asarray(
+        cKDTree(triangles.mean(axis=1)).query(points, k=NEAREST_TRIANGLES)[1], dtype=np.int64
+    )
     out = np.empty(len(points))
-    triangle_distance(points, triangles, np.ascontiguousarray(candidates), out)
+    triangle_distance(points, triangles, candidates, out)
     return out
 
 
 @on_disk()
-def triangle_distance(points: Array, triangles: Array, candidates: NDArray[np.int64], out: Array) -> None:
+def triangle_distance(points: Array, triangles: Array, candidates: Index, out: Array) -> None:
     """Least distance to the candidate triangles (n, k): to the plane inside, to the edges outside."""
     for n in range(len(points)):
         best = 1e300

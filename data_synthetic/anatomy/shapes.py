@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array
 
 INLET_MM = 12.0
 """Straight vessel below the origin, so that the entry lies well inside it."""

@@ -9,22 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from data_synthetic.anatomy import _kernels as kernels
-
-Array = NDArray[np.float64]
-
-
-def frozen_array(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
-    """A contiguous read-only copy."""
-    array = np.array(values, dtype=dtype, order="C")
-    array.flags.writeable = False
-    return array
+from data_synthetic.geometry.vectors import Array, arc_lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +33,11 @@ class Tube:
     slopes: Array
     step_mm: float
     blend_mm: float = 0.6
+
+    def __post_init__(self) -> None:
+        """Nobody writes into a tube."""
+        for array in (self.points_mm, self.tangents, self.radii_mm, self.slopes):
+            array.flags.writeable = False
 
     @property
     def length_mm(self) -> float:
@@ -66,39 +62,24 @@ def sweep(
     if len(control) < 2 or control.shape[1] != 3 or np.any(radius <= 0):
         msg = f"tube {name}: got points {control.shape} and radii from {radius.min():g} mm; give (n >= 2, 3) and > 0"
         raise ValueError(msg)
-    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(control, axis=0), axis=1))])
+    chord = arc_lengths(control)
     curve = CubicSpline(chord, control, bc_type="natural" if len(control) > 2 else "not-a-knot")
     fine = np.linspace(0.0, chord[-1], max(200, int(chord[-1] / 0.01)))
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1))])
+    arc = arc_lengths(curve(fine))
     count = max(2, round(arc[-1] / step_mm) + 1)
     grid = np.linspace(0.0, arc[-1], count)
     parameter = np.interp(grid, arc, fine)
     derivative = curve(parameter, 1)
     tangents = derivative / np.linalg.norm(derivative, axis=1, keepdims=True)
     profile = PchipInterpolator(np.interp(chord, fine, arc), radius)
-    return Tube(
-        name,
-        frozen_array(curve(parameter)),
-        frozen_array(tangents),
-        frozen_array(profile(grid)),
-        frozen_array(profile(grid, 1)),
-        float(arc[-1] / (count - 1)),
-        blend_mm,
-    )
+    step = float(arc[-1] / (count - 1))
+    return Tube(name, curve(parameter), tangents, profile(grid), profile(grid, 1), step, blend_mm)
 
 
 def ball(name: str, centre_mm: ArrayLike, radius_mm: float, *, blend_mm: float = 0.6) -> Tube:
     """A sac: a tube of one sample."""
-    centre = frozen_array(np.reshape(np.asarray(centre_mm, dtype=np.float64), (1, 3)))
-    return Tube(
-        name,
-        centre,
-        frozen_array(np.zeros((1, 3))),
-        frozen_array([radius_mm]),
-        frozen_array([0.0]),
-        1.0,
-        blend_mm,
-    )
+    centre = np.array(centre_mm, dtype=np.float64).reshape(1, 3)
+    return Tube(name, centre, np.zeros((1, 3)), np.array([radius_mm]), np.zeros(1), 1.0, blend_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +87,7 @@ class Anatomy:
     """A smooth union of tubes. ``distance`` is negative inside, mm."""
 
     tubes: tuple[Tube, ...]
-    tables: kernels.Tables = field(init=False, repr=False)
+    tables: kernels.TubeTables = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Lay the tubes out as flat tables for the kernels."""
@@ -120,7 +101,7 @@ class Anatomy:
         """Signed distance (n,) and its gradient (n, 3)."""
         points = np.ascontiguousarray(np.atleast_2d(np.asarray(points_mm, dtype=np.float64)))
         values, gradients = np.empty(len(points)), np.empty((len(points), 3))
-        kernels.distances(points, *self.tables, values, gradients)
+        kernels.distances(points, self.tables, values, gradients)
         return values, gradients
 
     def tube(self, name: str) -> Tube:
@@ -128,20 +109,19 @@ class Anatomy:
         return next(t for t in self.tubes if t.name == name)
 
 
-def _tables(tubes: Sequence[Tube]) -> kernels.Tables:
-    starts = np.concatenate([[0], np.cumsum([len(t.points_mm) for t in tubes])]).astype(np.int64)
-    blocks = [_bounding_balls(t) for t in tubes]
-    block_starts = np.concatenate([[0], np.cumsum([len(b) for b in blocks])]).astype(np.int64)
-    return (
-        np.concatenate([t.points_mm for t in tubes]),
-        np.concatenate([t.tangents for t in tubes]),
-        np.concatenate([t.radii_mm for t in tubes]),
-        np.concatenate([t.slopes for t in tubes]),
-        starts,
-        np.array([t.step_mm for t in tubes]),
-        np.array([t.blend_mm for t in tubes]),
-        np.concatenate(blocks),
-        block_starts,
+def _tables(tubes: Sequence[Tube]) -> kernels.TubeTables:
+    """The tubes as the kernels take them."""
+    balls = [_bounding_balls(t) for t in tubes]
+    return kernels.TubeTables(
+        points=np.concatenate([t.points_mm for t in tubes]),
+        tangents=np.concatenate([t.tangents for t in tubes]),
+        radii=np.concatenate([t.radii_mm for t in tubes]),
+        slopes=np.concatenate([t.slopes for t in tubes]),
+        starts=np.cumsum([0, *(len(t.points_mm) for t in tubes)]),
+        steps=np.array([t.step_mm for t in tubes]),
+        blends=np.array([t.blend_mm for t in tubes]),
+        balls=np.concatenate(balls),
+        block_starts=np.cumsum([0, *(len(b) for b in balls)]),
     )
 
 

@@ -2,46 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, convolve, distance_transform_edt, label
+from scipy.ndimage import binary_dilation, convolve, distance_transform_edt, label, maximum_filter
 from skimage.graph import MCP_Geometric
 from skimage.morphology import skeletonize
 
 from data_synthetic.anatomy.from_tree import smooth_tube
 from data_synthetic.anatomy.tubes import Tube
-from data_synthetic.geometry.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array, Index, arc_lengths
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 BEFORE_MM, AFTER_MM = 75.0, 20.0
 """The way begins this far before the widest place (an aneurysm, where there is one) and ends this far after it."""
 
-
-WIDE_ENOUGH = 0.8
-"""Share of the widest end's radius from which an end may be the inlet."""
-
-
-@dataclass(frozen=True, eq=False)
-class VesselWay:
-    """The vessel's voxels (dilated by two), the way as a tube, and the index of its widest place."""
-
-    vessel: NDArray[np.bool_]
-    way: Tube
-    widest_mm: Array
+WIDE_ENOUGH, NEAR_VOXELS = 0.8, 6
+"""Share of the widest end's radius from which an end may be the inlet, and how near to an end its radius is taken."""
 
 
-def vessel_threshold(values: NDArray[np.float32]) -> float:
+def vessel_threshold(values: Volume) -> float:
     """Half the grey value of the vessel: the median of what is brighter than a quarter of the brightest."""
     top = float(np.percentile(values, 99.9))
     return 0.5 * float(np.median(values[values > 0.25 * top]))
 
 
-def find_way(values: NDArray[np.float32], grid: ScanGrid, threshold: float) -> VesselWay:
-    """The largest bright component, its widest end as inlet, and the path that stays longest with its widest place."""
+def find_way(values: Volume, grid: ScanGrid, threshold: float) -> tuple[Mask, Tube]:
+    """The voxels of the vessel, dilated by two, and the way as a tube.
+
+    The vessel is the largest bright component; the way starts at its widest end and stays longest with the path to its
+    widest place.
+    """
     parts, _ = label(values > threshold)
     sizes = np.bincount(parts.ravel())
     sizes[0] = 0
@@ -50,32 +42,23 @@ def find_way(values: NDArray[np.float32], grid: ScanGrid, threshold: float) -> V
     ends = _ends(vessel)
     widest = np.array(np.unravel_index(int(np.argmax(inside)), inside.shape))
     away = np.linalg.norm((ends - widest) * grid.spacing_mm, axis=1)
-    width = _width_near(ends, inside) * (away > 2 * inside.max())
+    # largest inscribed radius near each end: an end's own voxel is always at the wall
+    width = maximum_filter(inside, 2 * NEAR_VOXELS + 1, mode="constant")[tuple(ends.T)]
+    width *= away > 2 * inside.max()
     # skeletons have spurs: of the widest ends the furthest is the inlet
     inlet = ends[int(np.argmax(away * (width > WIDE_ENOUGH * width.max())))]
     cost = np.where(vessel, 1.0 / (0.05 + inside / inside.max()) ** 3, -1.0)
     search = MCP_Geometric(cost, sampling=tuple(grid.spacing_mm.tolist()))
     search.find_costs([tuple(inlet.tolist())])
     path, neck = _past(search, ends, widest, inside, grid)
-    return VesselWay(
-        binary_dilation(vessel, iterations=2), _cut(path, neck, inside, grid), grid.to_mm(widest)
-    )
+    return binary_dilation(vessel, iterations=2), _cut(path, neck, inside, grid)
 
 
-def _ends(vessel: NDArray[np.bool_]) -> Index:
+def _ends(vessel: Mask) -> Index:
     """End points (n, 3) of the skeleton."""
     skeleton = skeletonize(vessel) > 0
     neighbours = convolve(skeleton.astype(np.uint8), np.ones((3, 3, 3), dtype=np.uint8), mode="constant")
     return np.argwhere(skeleton & (neighbours == 2))
-
-
-def _width_near(ends: Index, inside: Array, reach: int = 6) -> Array:
-    """Largest inscribed radius within ``reach`` voxels of each end: an end's own voxel is always at the wall."""
-    widths = []
-    for end in ends:
-        box = tuple(slice(max(0, int(c) - reach), int(c) + reach + 1) for c in end)
-        widths.append(float(inside[box].max()))
-    return np.array(widths)
 
 
 def _past(
@@ -101,7 +84,7 @@ def _past(
 def _cut(path: Index, neck: int, inside: Array, grid: ScanGrid) -> Tube:
     """The stretch of the path about the neck, smoothed."""
     points = grid.to_mm(path)
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    arc = arc_lengths(points)
     first = int(np.searchsorted(arc, max(arc[neck] - BEFORE_MM, 6.0)))
     radius = inside[tuple(path.T)]
     last = int(np.searchsorted(arc, min(arc[neck] + AFTER_MM, arc[-1] - 2.0)))

@@ -8,14 +8,12 @@ P1 2.14 (length 5), P2 2.10, basilar length 29. Where no spread is given, 15 % i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from data_synthetic.anatomy.tubes import Anatomy, Tube, ball, sweep
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array
 
 DIAMETERS_MM = {
     "cavernous": (5.0, 0.6),
@@ -114,7 +112,6 @@ class WillisPlan:
     stenosis: float = 0.0
     missing: tuple[str, ...] = ()
     tortuous_vertebrals: bool = False
-    extra: tuple[Tube, ...] = field(default=())
 
 
 def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -> Anatomy:
@@ -128,7 +125,6 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     tubes.append(sweep("ACoA", ANTERIOR_COMMUNICATING, radius["ACoA"]))
     tubes.append(sweep("basilar", BASILAR, np.linspace(1.1, 1.0, len(BASILAR)) * radius["basilar"]))
     tubes += _aneurysm(plan, tubes[0], radius)
-    tubes += plan.extra
     return Anatomy(tuple(t for t in tubes if t.name not in plan.missing))
 
 

@@ -1,20 +1,40 @@
-"""The catalogue of named scenes: every one is here because something goes wrong without it."""
+"""The catalogue of named scenes: every one is here because something goes wrong without it.
+
+A new scene is one function in ``plain``, ``hard`` or ``willis``, below the decorator ``scene``.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from data_synthetic.catalogue.own_anatomy import scene_from_file
-from data_synthetic.catalogue.own_background import background_study
-from data_synthetic.catalogue.scene import Scene, Study
-from data_synthetic.catalogue.scenes import SCENES
-from data_synthetic.catalogue.study import ScannerFactory, conebeam_scanner, make_study, psf_scanner
+from data_synthetic.catalogue import hard, plain, willis
+from data_synthetic.catalogue.limits import Wanted
+from data_synthetic.catalogue.own_anatomy import from_anatomy
+from data_synthetic.catalogue.own_background import background_scene
+from data_synthetic.catalogue.scene import NamedScene, ScannerFactory
+from data_synthetic.catalogue.study import Study, conebeam_scanner, make_study, psf_scanner
+
+__all__ = [
+    "SCANNERS",
+    "Wanted",
+    "background_scene",
+    "build",
+    "describe",
+    "from_anatomy",
+    "from_background",
+    "names",
+]
 
 SCANNERS: dict[str, ScannerFactory] = {"psf": psf_scanner, "conebeam": conebeam_scanner}
 """What turns a phantom into grey values."""
 
-_BY_NAME = {scene.name: scene for scene in SCENES}
+_BY_NAME = {
+    scene.name: scene
+    for module in (plain, hard, willis)
+    for scene in vars(module).values()
+    if isinstance(scene, NamedScene)
+}
 
 
 def names() -> tuple[str, ...]:
@@ -22,7 +42,7 @@ def names() -> tuple[str, ...]:
     return tuple(_BY_NAME)
 
 
-def describe(name: str) -> Scene:
+def describe(name: str) -> NamedScene:
     """The scene of that name; KeyError with the allowed names otherwise."""
     if name not in _BY_NAME:
         msg = f"synthetic scene: got {name!r}; allowed: {', '.join(_BY_NAME)}; choose one of these"
@@ -30,18 +50,13 @@ def describe(name: str) -> Scene:
     return _BY_NAME[name]
 
 
-def from_anatomy(path: str | Path) -> Scene:
-    """A scene through the vessels of an .swc tree or a Slicer .mrk.json curve with radii; ``build`` takes it."""
-    return scene_from_file(path)
-
-
-def from_background(path: str | Path, **wanted: Any) -> Study:
-    """A study in the real voxels of a scan; ``wanted``: frames, voxel_mm, seed, truth_step_mm."""
-    return background_study(path, **wanted)
+def from_background(path: str | Path, *, voxel_mm: float | None = None, **wanted: Any) -> Study:
+    """A study in the real voxels of a scan; ``wanted``: frames, seed, truth_step_mm."""
+    return build(background_scene(path, voxel_mm), **wanted)
 
 
 def build(
-    name: str | Scene,
+    name: str | NamedScene,
     *,
     frames: int | None = None,
     size: int | None = None,
@@ -50,7 +65,7 @@ def build(
     scanner: str = "psf",
     truth_step_mm: float | None = None,
 ) -> Study:
-    """A study in memory.
+    """A study in memory; ValueError where a number cannot be meant.
 
     name : of a scene, or a scene.     frames, size : default to the scene's own.
     voxel_mm : defaults to the scene's field of view over ``size``.     scanner : one of SCANNERS.
@@ -60,12 +75,9 @@ def build(
     if scanner not in SCANNERS:
         msg = f"synthetic scene {name}: scanner: got {scanner!r}; allowed: {', '.join(SCANNERS)}; choose one"
         raise ValueError(msg)
-    return make_study(
-        describe(name) if isinstance(name, str) else name,
-        frames=frames,
-        size=size,
-        voxel_mm=voxel_mm,
-        seed=seed,
-        truth_step_mm=truth_step_mm,
-        scanner=SCANNERS[scanner],
-    )
+    wanted = Wanted(frames, size, voxel_mm, seed)
+    problems = wanted.problems()
+    if problems:
+        raise ValueError("; ".join(problems))
+    scene = describe(name) if isinstance(name, str) else name
+    return make_study(scene, SCANNERS[scanner], wanted, truth_step_mm)

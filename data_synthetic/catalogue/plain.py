@@ -8,148 +8,102 @@ import numpy as np
 
 from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.catalogue.scene import Scene, Setup, enter, spread
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.catalogue.scene import Setup, scene, spread
 
 ENTRY_ARC_MM = 4.0
 """The entry lies this far inside the vessel's beginning, clear of its rounded end."""
 
+ALONG_VOXELS = 5.0
+"""Voxels across a vessel that runs along them: each slice shows the same partial volumes, none shows better ones."""
+
 
 def plain_setup(
-    anatomy: Anatomy,
-    frames: int,
-    last_mm: float,
-    *,
-    roll_deg: float = 0.0,
-    wire: TrueWire | None = None,
-    first_mm: float = 8.0,
+    anatomy: Anatomy, frames: int, last_mm: float, *, roll_deg: float = 0.0, first_mm: float = 8.0
 ) -> Setup:
     """Enter the first tube, push to ``last_mm`` with one roll."""
-    entry, direction = enter(anatomy.tubes[0], ENTRY_ARC_MM)
-    points = np.concatenate([t.points_mm for t in anatomy.tubes])
-    return Setup(
-        anatomy,
-        entry,
-        direction,
-        spread(first_mm, last_mm, frames),
-        (roll_deg,) * frames,
-        0.5 * (points.min(axis=0) + points.max(axis=0)),
-        wire=wire or TrueWire(),
-    )
+    points = anatomy.tables.points
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    depths, rolls = spread(first_mm, last_mm, frames), (roll_deg,) * frames
+    return Setup(anatomy, anatomy.tubes[0], ENTRY_ARC_MM, depths, rolls, middle)
 
 
-def _straight(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("straight", tries="simulate compare report", fov_mm=57.6, size=192, voxels_across=ALONG_VOXELS)
+def straight(_rng: np.random.Generator, frames: int) -> Setup:
+    """a curved tip in a straight vessel: contact without any turn"""
     return plain_setup(shapes.straight(), frames, 36.0)
 
 
-def _bend(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("bend", tries="segment trace simulate compare report", voxels_across=4.0)
+def bend(_rng: np.random.Generator, frames: int) -> Setup:
+    """one bend in one plane: bending and wall alone decide"""
     return plain_setup(shapes.bend(), frames, 38.0)
 
 
-def _s_curve(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("s-curve", tries="simulate")
+def s_curve(_rng: np.random.Generator, frames: int) -> Setup:
+    """two opposite bends: the wire cuts both corners"""
     return plain_setup(shapes.s_curve(), frames, 36.0)
 
 
-def _helix(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("helix", tries="trace simulate")
+def helix(_rng: np.random.Generator, frames: int) -> Setup:
+    """a curve that no plane holds: roll and torsion of the path matter"""
     return plain_setup(shapes.helix(), frames, 50.0, roll_deg=90.0)
 
 
-def _fork_right(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("rough-wall", tries="simulate")
+def rough_wall(rng: np.random.Generator, frames: int) -> Setup:
+    """the same helix with friction: the wire is left nearly a millimetre from where it would slide to"""
+    return replace(helix.plan(rng, frames), friction=0.1)
+
+
+@scene("bifurcation", tries="segment simulate compare")
+def bifurcation(_rng: np.random.Generator, frames: int) -> Setup:
+    """the tip takes the branch that it points at"""
     return plain_setup(shapes.bifurcation(), frames, 30.0)
 
 
-def _fork_left(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("bifurcation-left", tries="simulate compare")
+def bifurcation_left(_rng: np.random.Generator, frames: int) -> Setup:
+    """the same fork, rolled by half a turn: the other branch"""
     return plain_setup(shapes.bifurcation(), frames, 30.0, roll_deg=180.0)
 
 
-def _rolled(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("rolled", tries="simulate")
+def rolled(_rng: np.random.Generator, frames: int) -> Setup:
+    """rolled by 150 degrees while it is pushed: the path of the roll is part of the truth"""
     setup = plain_setup(shapes.bend(angle_deg=60.0), frames, 30.0, first_mm=20.0)
     return replace(setup, rolls_deg=spread(0.0, 150.0, frames))
 
 
-def _short(_rng: np.random.Generator, frames: int) -> Setup:
+@scene(
+    "short-wire", tries="trace simulate compare", fov_mm=36.0, size=120, frames=4, voxels_across=ALONG_VOXELS
+)
+def short_wire(_rng: np.random.Generator, frames: int) -> Setup:
+    """a wire shorter than three segments: nothing may need more joints than there are"""
     return plain_setup(shapes.straight(length_mm=20.0), frames, 4.0, first_mm=1.6)
 
 
-def _stenosis(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("stenosis", tries="segment simulate")
+def stenosis(_rng: np.random.Generator, frames: int) -> Setup:
+    """a lumen hardly wider than the wire: the wall decides everything"""
     return plain_setup(shapes.stenosed(), frames, 30.0)
 
 
-def _neck(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("aneurysm-neck", tries="segment simulate")
+def aneurysm_neck(_rng: np.random.Generator, frames: int) -> Setup:
+    """past the neck of a sidewall aneurysm: the wall gives way to one side"""
     # the hook points away from the neck: towards it, it would fall in
     return plain_setup(shapes.side_aneurysm(), frames, 36.0)
 
 
-def _loop(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("aneurysm-loop", tries="trace simulate")
+def aneurysm_loop(_rng: np.random.Generator, frames: int) -> Setup:
+    """pushed on into a wide sac: the wire curls and touches where it will"""
     return plain_setup(shapes.end_aneurysm(), frames, 38.0, first_mm=14.0)
 
 
-def _kissing(_rng: np.random.Generator, frames: int) -> Setup:
+@scene("kissing-vessels", tries="segment simulate")
+def kissing_vessels(_rng: np.random.Generator, frames: int) -> Setup:
+    """two vessels that share a wall in the image: the wire must stay in its own"""
     return plain_setup(shapes.kissing(), frames, 36.0)
-
-
-def _rough(rng: np.random.Generator, frames: int) -> Setup:
-    return replace(_helix(rng, frames), friction=0.1)
-
-
-PLAIN = (
-    Scene("straight", "a curved tip in a straight vessel: contact without any turn", 57.6, 192, 6, _straight),
-    Scene("bend", "one bend in one plane: bending and wall alone decide", 48.0, 160, 6, _bend),
-    Scene("s-curve", "two opposite bends: the wire cuts both corners", 48.0, 160, 6, _s_curve),
-    Scene("helix", "a curve that no plane holds: roll and torsion of the path matter", 48.0, 160, 6, _helix),
-    Scene(
-        "rough-wall",
-        "the same helix with friction: the wire is left nearly a millimetre from where it would slide to",
-        48.0,
-        160,
-        6,
-        _rough,
-    ),
-    Scene("bifurcation", "the tip takes the branch that it points at", 48.0, 160, 6, _fork_right),
-    Scene(
-        "bifurcation-left", "the same fork, rolled by half a turn: the other branch", 48.0, 160, 6, _fork_left
-    ),
-    Scene(
-        "rolled",
-        "rolled by 150 degrees while it is pushed: the path of the roll is part of the truth",
-        48.0,
-        160,
-        6,
-        _rolled,
-    ),
-    Scene(
-        "short-wire",
-        "a wire shorter than three segments: nothing may need more joints than there are",
-        36.0,
-        120,
-        4,
-        _short,
-    ),
-    Scene(
-        "stenosis", "a lumen hardly wider than the wire: the wall decides everything", 48.0, 160, 6, _stenosis
-    ),
-    Scene(
-        "aneurysm-neck",
-        "past the neck of a sidewall aneurysm: the wall gives way to one side",
-        48.0,
-        160,
-        6,
-        _neck,
-    ),
-    Scene(
-        "aneurysm-loop",
-        "pushed on into a wide sac: the wire curls and touches where it will",
-        48.0,
-        160,
-        6,
-        _loop,
-    ),
-    Scene(
-        "kissing-vessels",
-        "two vessels that share a wall in the image: the wire must stay in its own",
-        48.0,
-        160,
-        6,
-        _kissing,
-    ),
-)

@@ -1,8 +1,8 @@
-"""A named situation, and the study that comes out of it."""
+"""A named situation, and what it is made of before anything is computed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -11,28 +11,30 @@ from numpy.typing import NDArray
 
 from data_synthetic.anatomy.tubes import Anatomy, Tube
 from data_synthetic.geometry.scan_grid import ScanGrid
-from data_synthetic.rod.contact import Wall
-from data_synthetic.rod.replay import TrueFrame
+from data_synthetic.geometry.vectors import Array
+from data_synthetic.rod.replay import TrueInsertion
+from data_synthetic.rod.rod import Wall
 from data_synthetic.rod.wire import TrueWire
 from data_synthetic.scanner import Greys
 
-Array = NDArray[np.float64]
+Scan = NDArray[np.int16]
 Wires = Sequence[tuple[Array, float]]
 
 
 class Scanner(Protocol):
     """Turns wires (points (n, 3), radius) into one volume."""
 
-    def scan(self, wires: Wires, seed: Sequence[int]) -> NDArray[np.int16]:
+    def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
         """One volume, indexed x, y, z."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a scene is made of, before anything is computed.
+    """What a scene is made of.
 
-    depths_mm, rolls_deg : one per frame.     stiffness_N_mm2 : of the wall; 2 is that of a 2 MPa silicone.
+    tube, entry_arc_mm : the tube that is entered, how far from its beginning.     depths_mm, rolls_deg : one per frame.
+    centre_mm : middle of the scan.     stiffness_N_mm2 : of the wall; 2 is that of a 2 MPa silicone.
     bone_gap_mm : what bone keeps from the lumen.     spacing_ratio : voxel edges relative to the voxel size.
     axes : direction matrix of the scan.     visible : which frames show the wire.     others : more wires, always.
     motion_mm : (frames, 3) shift of the phantom against the reference scan.     wall : when it is not the anatomy.
@@ -40,8 +42,8 @@ class Setup:
     """
 
     anatomy: Anatomy
-    entry_mm: Array
-    direction: Array
+    tube: Tube
+    entry_arc_mm: float
     depths_mm: tuple[float, ...]
     rolls_deg: tuple[float, ...]
     centre_mm: Array
@@ -59,23 +61,65 @@ class Setup:
     wall: Wall | None = None
     friction: float = 0.0
 
+    @property
+    def ahead(self) -> slice:
+        """The samples of the tube from the entry on."""
+        return slice(min(round(self.entry_arc_mm / self.tube.step_mm), len(self.tube.points_mm) - 1), None)
+
+    @property
+    def entry_mm(self) -> Array:
+        """Where the wire enters."""
+        return np.array(self.tube.points_mm[self.ahead][0])
+
+    @property
+    def direction(self) -> Array:
+        """Unit vector along which the wire enters."""
+        return np.array(self.tube.tangents[self.ahead][0])
+
+    def insertion(self) -> TrueInsertion:
+        """What the true wire goes through."""
+        return TrueInsertion(
+            self.wire,
+            self.wall or self.anatomy,
+            self.stiffness_N_mm2,
+            self.entry_mm,
+            self.direction,
+            self.material_axis,
+            friction=self.friction,
+        )
+
+
+ScannerFactory = Callable[[Setup, ScanGrid], Scanner]
+Plan = Callable[[np.random.Generator, int], Setup]
+
 
 @dataclass(frozen=True)
-class Scene:
-    """A name, one line of why, natural sizes, and how to set it up from a seeded generator and a number of frames.
+class NamedScene:
+    """A name, one line of why, natural sizes, and how to plan it from a seeded generator and a number of frames.
 
-    fov_mm : edge of the field of view, so that a smaller ``size`` means larger voxels of the same scene.
-    expected : the status of every frame that the pipeline should end in (its identifier), or one per frame;
-    a bar separates what is equally right.
+    tries : stages of the pipeline that it was made to try.     fov_mm : edge of the field of view, so that a smaller
+    ``size`` means larger voxels of the same scene.     voxels_across : the lumen that is entered must be as wide as
+    this many voxels to be segmented.     expected : the status of every frame that the pipeline should end in (its
+    identifier), or one per frame; a bar separates what is equally right.
+    steer : chooses roll and depths where the plan leaves them open.     scan : a real scan brings its own voxels.
     """
 
     name: str
     why: str
-    fov_mm: float
-    size: int
-    frames: int
-    setup: Callable[[np.random.Generator, int], Setup]
+    plan: Plan
+    tries: tuple[str, ...] = ()
+    fov_mm: float = 48.0
+    size: int = 160
+    frames: int = 6
+    voxels_across: float = 4.6
     expected: str | Callable[[int], Sequence[str]] = "ok"
+    steer: Callable[[Setup], Setup] | None = None
+    scan: tuple[ScanGrid, ScannerFactory] | None = None
+
+    def setup(self, rng: np.random.Generator, frames: int) -> Setup:
+        """The scene with everything chosen that has to be known before the truth is computed."""
+        planned = self.plan(rng, frames)
+        return planned if self.steer is None else self.steer(planned)
 
     def expected_statuses(self, frames: int) -> tuple[str, ...]:
         """One identifier per frame."""
@@ -84,38 +128,12 @@ class Scene:
         return tuple(self.expected(frames))
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """Scans with truth, in memory. ``frames()`` makes one volume at a time; ``reference`` is the scan without wire.
+def scene(name: str, tries: str, **properties: Any) -> Callable[[Plan], NamedScene]:
+    """Makes the function below it the plan of a scene, and that function's docstring the scene's ``why``.
 
-    manifest : the [[case]] table, [wires] and [case.wall] as nested dicts.     truth : one TrueFrame per frame,
-    in the phantom as the reference shows it (a moved phantom carries its wire along).
+    tries : as in NamedScene, one text.     properties : the rest of NamedScene's.
     """
-
-    name: str
-    why: str
-    grid: ScanGrid
-    reference: NDArray[np.int16]
-    truth: tuple[TrueFrame, ...]
-    expected: tuple[str, ...]
-    manifest: Mapping[str, Any]
-    quality: Mapping[str, float]
-    setup: Setup
-    make_frame: Callable[[int], NDArray[np.int16]] = field(repr=False)
-
-    def frame(self, number: int) -> NDArray[np.int16]:
-        """One frame, indexed x, y, z; the same every time."""
-        return self.make_frame(number)
-
-    def frames(self) -> Iterator[NDArray[np.int16]]:
-        """All frames, one at a time."""
-        return (self.make_frame(i) for i in range(len(self.truth)))
-
-
-def enter(tube: Tube, arc_mm: float) -> tuple[Array, Array]:
-    """Point and unit direction on a tube's centreline, ``arc_mm`` from its beginning."""
-    i = min(round(arc_mm / tube.step_mm), len(tube.points_mm) - 1)
-    return np.array(tube.points_mm[i]), np.array(tube.tangents[i])
+    return lambda plan: NamedScene(name, plan.__doc__ or "", plan, tuple(tries.split()), **properties)
 
 
 def spread(first_mm: float, last_mm: float, frames: int) -> tuple[float, ...]:

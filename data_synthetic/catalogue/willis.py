@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
 from data_synthetic.anatomy.willis import WillisPlan, circle_of_willis
-from data_synthetic.catalogue.scene import Scene, Setup, enter, spread
+from data_synthetic.catalogue.scene import Setup, scene, spread
 
 CENTRE_MM = np.array([0.0, -2.0, -2.0])
 
 SIPHON_MM = np.array([-14.0, -8.0, -14.0])
-CLOSE_MM = 52.8
+CLOSE: dict[str, Any] = {"fov_mm": 52.8, "size": 176}
 """A field of view about one carotid, for scenes that are run small."""
 
 ENTRY_ARC_MM = 17.0
@@ -35,98 +36,49 @@ def skull_base() -> Anatomy:
 
 
 def willis_setup(
-    rng: np.random.Generator, frames: int, plan: WillisPlan, roll_deg: float, past_mm: float
+    rng: np.random.Generator, frames: int, plan: WillisPlan, past_mm: float, roll_deg: float = ROLL_DEG
 ) -> Setup:
     """Enter the right carotid and push ``past_mm`` beyond its terminus."""
     anatomy = circle_of_willis(rng, plan)
     carotid = anatomy.tube("right.ICA")
-    entry, direction = enter(carotid, ENTRY_ARC_MM)
-    last = carotid.length_mm - ENTRY_ARC_MM + past_mm
-    return Setup(
-        anatomy,
-        entry,
-        direction,
-        spread(10.0, last, frames),
-        (roll_deg,) * frames,
-        CENTRE_MM,
-        bone=skull_base(),
-    )
+    depths = spread(10.0, carotid.length_mm - ENTRY_ARC_MM + past_mm, frames)
+    rolls = (roll_deg,) * frames
+    return Setup(anatomy, carotid, ENTRY_ARC_MM, depths, rolls, CENTRE_MM, bone=skull_base())
 
 
-def _terminus(rng: np.random.Generator, frames: int) -> Setup:
-    return willis_setup(rng, frames, WillisPlan(), ROLL_DEG, 6.0)
+@scene(
+    "circle-of-willis", tries="load segment trace simulate compare report", fov_mm=76.8, size=256, frames=30
+)
+def terminus(rng: np.random.Generator, frames: int) -> Setup:
+    """a whole circle of Willis: through the siphon into an aneurysm of the carotid terminus"""
+    return willis_setup(rng, frames, WillisPlan(), 6.0)
 
 
-def _siphon(rng: np.random.Generator, frames: int) -> Setup:
-    setup = willis_setup(rng, frames, WillisPlan(aneurysm="none"), ROLL_DEG, -4.0)
-    alone = Anatomy((setup.anatomy.tube("right.ICA"),))
-    return replace(setup, anatomy=alone, centre_mm=SIPHON_MM)
+@scene("siphon", tries="simulate compare", **CLOSE)
+def siphon(rng: np.random.Generator, frames: int) -> Setup:
+    """the carotid siphon alone: the tightest turns of the way, nothing else to go wrong"""
+    setup = willis_setup(rng, frames, WillisPlan(aneurysm="none"), -4.0)
+    return replace(setup, anatomy=Anatomy((setup.tube,)), centre_mm=SIPHON_MM)
 
 
-def _incomplete(rng: np.random.Generator, frames: int) -> Setup:
+@scene("incomplete-circle", tries="segment simulate", **CLOSE)
+def incomplete_circle(rng: np.random.Generator, frames: int) -> Setup:
+    """a circle with missing vessels and a sidewall aneurysm in the siphon"""
     plan = WillisPlan(aneurysm="sidewall", sac_mm=3.0, missing=("right.PCoA", "left.A1", "left.P1"))
-    return replace(willis_setup(rng, frames, plan, ROLL_DEG, -6.0), centre_mm=SIPHON_MM)
+    return replace(willis_setup(rng, frames, plan, -6.0), centre_mm=SIPHON_MM)
 
 
-def _acoa(rng: np.random.Generator, frames: int) -> Setup:
+@scene("acoa-aneurysm", tries="simulate compare", **CLOSE)
+def acoa_aneurysm(rng: np.random.Generator, frames: int) -> Setup:
+    """around the sharp turn into A1: stored energy is let go in a snap"""
     # past the snaps at 50, 53, 62 and 68 mm: short of the last one, a hair's breadth decides where the tip is
-    setup = willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 0.0, 15.0)
+    setup = willis_setup(rng, frames, WillisPlan(aneurysm="acoa", sac_mm=3.0), 15.0, roll_deg=0.0)
     return replace(setup, centre_mm=np.array([-12.0, -9.0, -9.0]))
 
 
-def _vertebral(rng: np.random.Generator, frames: int) -> Setup:
+@scene("tortuous-vertebral", tries="segment simulate", voxels_across=3.6, **CLOSE)
+def tortuous_vertebral(rng: np.random.Generator, frames: int) -> Setup:
+    """up a winding vertebral artery into the basilar: another way in"""
     anatomy = circle_of_willis(rng, WillisPlan(aneurysm="none", tortuous_vertebrals=True))
-    entry, direction = enter(anatomy.tube("right.vertebral"), 14.0)
-    return Setup(
-        anatomy,
-        entry,
-        direction,
-        spread(8.0, 36.0, frames),
-        (0.0,) * frames,
-        np.array([-2.0, 6.0, -18.0]),
-        bone=skull_base(),
-    )
-
-
-WILLIS = (
-    Scene(
-        "circle-of-willis",
-        "a whole circle of Willis: through the siphon into an aneurysm of the carotid terminus",
-        76.8,
-        256,
-        30,
-        _terminus,
-    ),
-    Scene(
-        "siphon",
-        "the carotid siphon alone: the tightest turns of the way, nothing else to go wrong",
-        CLOSE_MM,
-        176,
-        6,
-        _siphon,
-    ),
-    Scene(
-        "incomplete-circle",
-        "a circle with missing vessels and a sidewall aneurysm in the siphon",
-        CLOSE_MM,
-        176,
-        6,
-        _incomplete,
-    ),
-    Scene(
-        "acoa-aneurysm",
-        "around the sharp turn into A1: stored energy is let go in a snap",
-        CLOSE_MM,
-        176,
-        6,
-        _acoa,
-    ),
-    Scene(
-        "tortuous-vertebral",
-        "up a winding vertebral artery into the basilar: another way in",
-        CLOSE_MM,
-        176,
-        6,
-        _vertebral,
-    ),
-)
+    vertebral, depths, rolls = anatomy.tube("right.vertebral"), spread(8.0, 36.0, frames), (0.0,) * frames
+    return Setup(anatomy, vertebral, 14.0, depths, rolls, np.array([-2.0, 6.0, -18.0]), bone=skull_base())

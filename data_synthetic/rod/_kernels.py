@@ -1,4 +1,4 @@
-"""Compiled bending, twist and stretch of a discrete Kirchhoff rod: arrays and scalars in, arrays out.
+"""Compiled bending, twist and stretch of a discrete Kirchhoff rod: arrays and numbers in, arrays out.
 
 Bergou, Wardetzky, Robinson, Audoly, Grinspun, "Discrete elastic rods", ACM Trans. Graph. 27 (2008) 63, with the
 time-parallel frames of Bergou et al., ACM Trans. Graph. 29 (2010) 116. Unknowns are node positions and edge
@@ -8,146 +8,140 @@ edge j >= 1 ends in node j. Unknowns are interleaved: angle of edge j at 4(j-1),
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
 
 from data_synthetic._compile import on_disk
-from data_synthetic._tolerances import HESSIAN_STEP
+from data_synthetic.geometry.vectors import Array
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 BANDS = 11
 """Rows of the lower band matrix: a vertex couples three nodes and two angles, 4 unknowns apart."""
 
+HESSIAN_STEP = 1e-6
+"""Relative step of the central difference of the exact gradient; its error is about 1e-10 of the stiffness."""
+
+
+class Elastic(NamedTuple):
+    """A rod of n edges in its present shape; vertex v lies between edges v and v + 1.
+
+    introducer : direction (3,) of edge 0.     tangents, directors (n + 1, 3) : of every edge, edge 0 first.
+    bend, rest, twist (n,) : EI / cell, rest curvature x cell, GJ / cell of every vertex.
+    axial : EA in N.     lengths (n,) : of the edges at rest, mm.
+    """
+
+    introducer: Array
+    tangents: Array
+    directors: Array
+    bend: Array
+    rest: Array
+    twist: Array
+    axial: float
+    lengths: Array
+
 
 @on_disk()
-def dot(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> float:
+def dot(a: Vector, b: Vector) -> float:
     """Scalar product."""
-    return ax * bx + ay * by + az * bz
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @on_disk()
-def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Vector:
+def cross(a: Vector, b: Vector) -> Vector:
     """Vector product."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @on_disk()
-def transport(
-    mx: float, my: float, mz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
-) -> Vector:
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@on_disk()
+def row(values: Array, i: int) -> Vector:
+    """Row i of an array (n, 3)."""
+    return values[i, 0], values[i, 1], values[i, 2]
+
+
+@on_disk()
+def transport(m: Vector, a: Vector, b: Vector) -> Vector:
     """Vector m, normal to unit a, carried by the smallest rotation that takes unit a to unit b."""
-    f = dot(mx, my, mz, bx, by, bz) / (1.0 + dot(ax, ay, az, bx, by, bz))
-    return mx - f * (ax + bx), my - f * (ay + by), mz - f * (az + bz)
+    f = dot(m, b) / (1.0 + dot(a, b))
+    return m[0] - f * (a[0] + b[0]), m[1] - f * (a[1] + b[1]), m[2] - f * (a[2] + b[2])
 
 
 @on_disk()
-def moved_director(q: Array, k: int, t: Array, m: Array) -> tuple[float, ...]:
-    """Length, tangent and director 1 of an edge at ``q[k:k+3]`` turned by ``q[k+3]`` from tangent t, director m."""
+def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[float, Vector, Vector]:
+    """Length, tangent and director 1 of the edge ``q[k:k+3]``, turned by ``q[k+3]`` from its tangent and director."""
     x, y, z = q[k], q[k + 1], q[k + 2]
     length = np.sqrt(x * x + y * y + z * z)
-    x, y, z = x / length, y / length, z / length
-    ax, ay, az = transport(m[0], m[1], m[2], t[0], t[1], t[2], x, y, z)
-    bx, by, bz = cross(x, y, z, ax, ay, az)
+    t = (x / length, y / length, z / length)
+    a = transport(director, tangent, t)
+    b = cross(t, a)
     c, s = np.cos(q[k + 3]), np.sin(q[k + 3])
-    return length, x, y, z, c * ax + s * bx, c * ay + s * by, c * az + s * bz
+    return length, t, (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2])
 
 
 @on_disk()
-def vertex(
-    q: Array,
-    te0: Array,
-    me0: Array,
-    tf0: Array,
-    mf0: Array,
-    bend: float,
-    rest: float,
-    twist: float,
-    g: Array,
-    want_gradient: bool,
-) -> float:
-    """Energy of one vertex and its gradient g (8,) for q = (edge before, its angle, edge after, its angle).
-
-    bend = EI / cell, rest = rest curvature x cell, twist = GJ / cell.
-    """
-    le, ex, ey, ez, ax, ay, az = moved_director(q, 0, te0, me0)
-    lf, fx, fy, fz, bx, by, bz = moved_director(q, 4, tf0, mf0)
-    chi = 1.0 + dot(ex, ey, ez, fx, fy, fz)
-    kx, ky, kz = cross(ex, ey, ez, fx, fy, fz)
-    kx, ky, kz = 2.0 * kx / chi, 2.0 * ky / chi, 2.0 * kz / chi
-    cx, cy, cz = cross(ex, ey, ez, ax, ay, az)
-    dx, dy, dz = cross(fx, fy, fz, bx, by, bz)
-    k1 = 0.5 * dot(kx, ky, kz, cx + dx, cy + dy, cz + dz)
-    k2 = -0.5 * dot(kx, ky, kz, ax + bx, ay + by, az + bz)
-    ux, uy, uz = transport(ax, ay, az, ex, ey, ez, fx, fy, fz)
-    wx, wy, wz = cross(ux, uy, uz, bx, by, bz)
-    tau = np.arctan2(dot(wx, wy, wz, fx, fy, fz), dot(ux, uy, uz, bx, by, bz))
+def vertex(q: Array, v: int, rod: Elastic, g: Array, want_gradient: bool) -> float:
+    """Energy of vertex v and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
+    le, e, a = moved_edge(q, 0, row(rod.tangents, v), row(rod.directors, v))
+    lf, f, b = moved_edge(q, 4, row(rod.tangents, v + 1), row(rod.directors, v + 1))
+    chi = 1.0 + dot(e, f)
+    k = cross(e, f)
+    k = (2.0 * k[0] / chi, 2.0 * k[1] / chi, 2.0 * k[2] / chi)
+    c, d = cross(e, a), cross(f, b)
+    k1 = 0.5 * dot(k, plus(c, d))
+    k2 = -0.5 * dot(k, plus(a, b))
+    u = transport(a, e, f)
+    w = cross(u, b)
+    tau = np.arctan2(dot(w, f), dot(u, b))
+    bend, rest, twist = rod.bend[v], rod.rest[v], rod.twist[v]
     energy: float = 0.5 * bend * ((k1 - rest) ** 2 + k2 * k2) + 0.5 * twist * tau * tau
     if not want_gradient:
         return energy
     p1, p2, pt = bend * (k1 - rest), bend * k2, twist * tau
-    sx, sy, sz = (ex + fx) / chi, (ey + fy) / chi, (ez + fz) / chi
-    ax_, ay_, az_ = (ax + bx) / chi, (ay + by) / chi, (az + bz) / chi
-    cx_, cy_, cz_ = (cx + dx) / chi, (cy + dy) / chi, (cz + dz) / chi
     # p1 * director 2 - p2 * director 1 gathers both curvatures into one vector
-    vx, vy, vz = p1 * cx_ - p2 * ax_, p1 * cy_ - p2 * ay_, p1 * cz_ - p2 * az_
+    ab, cd = plus(a, b), plus(c, d)
+    both = (
+        p1 * (cd[0] / chi) - p2 * (ab[0] / chi),
+        p1 * (cd[1] / chi) - p2 * (ab[1] / chi),
+        p1 * (cd[2] / chi) - p2 * (ab[2] / chi),
+    )
     stretch = p1 * k1 + p2 * k2
-    hx, hy, hz = cross(fx, fy, fz, vx, vy, vz)
-    g[0] = (hx - stretch * sx + 0.5 * pt * kx) / le
-    g[1] = (hy - stretch * sy + 0.5 * pt * ky) / le
-    g[2] = (hz - stretch * sz + 0.5 * pt * kz) / le
-    hx, hy, hz = cross(ex, ey, ez, vx, vy, vz)
-    g[4] = (-hx - stretch * sx + 0.5 * pt * kx) / lf
-    g[5] = (-hy - stretch * sy + 0.5 * pt * ky) / lf
-    g[6] = (-hz - stretch * sz + 0.5 * pt * kz) / lf
-    g[3] = -0.5 * (p1 * dot(kx, ky, kz, ax, ay, az) + p2 * dot(kx, ky, kz, cx, cy, cz)) - pt
-    g[7] = -0.5 * (p1 * dot(kx, ky, kz, bx, by, bz) + p2 * dot(kx, ky, kz, dx, dy, dz)) + pt
+    before, after = cross(f, both), cross(e, both)
+    for i in range(3):
+        mean = (e[i] + f[i]) / chi
+        g[i] = (before[i] - stretch * mean + 0.5 * pt * k[i]) / le
+        g[4 + i] = (-after[i] - stretch * mean + 0.5 * pt * k[i]) / lf
+    g[3] = -0.5 * (p1 * dot(k, a) + p2 * dot(k, c)) - pt
+    g[7] = -0.5 * (p1 * dot(k, b) + p2 * dot(k, d)) + pt
     return energy
 
 
 @on_disk()
-def load_vertex(points: Array, angles: Array, edge0: Array, v: int, q: Array) -> None:
+def load_vertex(points: Array, angles: Array, introducer: Array, v: int, q: Array) -> None:
     """Fill q with the edges and angles around vertex v."""
     for a in range(3):
-        q[a] = edge0[a] if v == 0 else points[v, a] - points[v - 1, a]
+        q[a] = introducer[a] if v == 0 else points[v, a] - points[v - 1, a]
         q[4 + a] = points[v + 1, a] - points[v, a]
     q[3] = 0.0 if v == 0 else angles[v - 1]
     q[7] = angles[v]
 
 
 @on_disk()
-def elastic_energy(
-    points: Array,
-    angles: Array,
-    edge0: Array,
-    tangents: Array,
-    directors: Array,
-    bend: Array,
-    rest: Array,
-    twist: Array,
-    axial: float,
-    lengths: Array,
-) -> float:
-    """Stored energy, N mm. angles (n,) are increments from the directors (n + 1, 3)."""
+def elastic_energy(points: Array, angles: Array, rod: Elastic) -> float:
+    """Stored energy, N mm, of nodes (n + 1, 3); angles (n,) are increments from the directors."""
     q, g = np.zeros(8), np.zeros(8)
     total: float = 0.0
-    for v in range(len(bend)):
-        load_vertex(points, angles, edge0, v, q)
-        total += vertex(
-            q,
-            tangents[v],
-            directors[v],
-            tangents[v + 1],
-            directors[v + 1],
-            bend[v],
-            rest[v],
-            twist[v],
-            g,
-            False,
-        )
+    for v in range(len(rod.bend)):
+        load_vertex(points, angles, rod.introducer, v, q)
+        total += vertex(q, v, rod, g, False)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
-        total += 0.5 * axial / lengths[v] * (length - lengths[v]) ** 2
+        total += 0.5 * rod.axial / rod.lengths[v] * (length - rod.lengths[v]) ** 2
     return total
 
 
@@ -176,82 +170,72 @@ def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
 
 
 @on_disk()
-def elastic_system(
-    points: Array,
-    angles: Array,
-    edge0: Array,
-    tangents: Array,
-    directors: Array,
-    bend: Array,
-    rest: Array,
-    twist: Array,
-    axial: float,
-    lengths: Array,
-    gradient: Array,
-    bands: Array,
-) -> None:
-    """Gradient (4n,) and lower-band Hessian (11, 4n); the Hessian by central differences of the exact gradient."""
-    q, g, gp, gm, h = np.zeros(8), np.zeros(8), np.zeros(8), np.zeros(8), np.zeros((8, 8))
+def bend_and_twist(q: Array, v: int, rod: Elastic, g: Array, h: Array) -> None:
+    """Fill gradient g (8,) and Hessian h (8, 8) of vertex v; h by central differences of the exact gradient."""
+    gp, gm = np.zeros(8), np.zeros(8)
+    vertex(q, v, rod, g, True)
+    for a in range(8):
+        step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * rod.lengths[v]
+        kept = q[a]
+        q[a] = kept + step
+        vertex(q, v, rod, gp, True)
+        q[a] = kept - step
+        vertex(q, v, rod, gm, True)
+        q[a] = kept
+        for b in range(8):
+            h[b, a] = 0.5 * (gp[b] - gm[b]) / step
+    for a in range(8):
+        for b in range(a):
+            h[a, b] = h[b, a] = 0.5 * (h[a, b] + h[b, a])
+
+
+@on_disk()
+def elastic_system(points: Array, angles: Array, rod: Elastic, gradient: Array, bands: Array) -> None:
+    """Fill gradient (4n,) and lower-band Hessian (11, 4n) of the stored energy."""
+    q, g, h = np.zeros(8), np.zeros(8), np.zeros((8, 8))
     gradient[:] = 0.0
     bands[:] = 0.0
-    for v in range(len(bend)):
-        load_vertex(points, angles, edge0, v, q)
-        te, me, tf, mf = tangents[v], directors[v], tangents[v + 1], directors[v + 1]
-        vertex(q, te, me, tf, mf, bend[v], rest[v], twist[v], g, True)
-        for a in range(8):
-            step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * lengths[v]
-            kept = q[a]
-            q[a] = kept + step
-            vertex(q, te, me, tf, mf, bend[v], rest[v], twist[v], gp, True)
-            q[a] = kept - step
-            vertex(q, te, me, tf, mf, bend[v], rest[v], twist[v], gm, True)
-            q[a] = kept
-            for b in range(8):
-                h[b, a] = 0.5 * (gp[b] - gm[b]) / step
-        for a in range(8):
-            for b in range(a):
-                h[a, b] = h[b, a] = 0.5 * (h[a, b] + h[b, a])
+    for v in range(len(rod.bend)):
+        load_vertex(points, angles, rod.introducer, v, q)
+        bend_and_twist(q, v, rod, g, h)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
-        strain = 1.0 - lengths[v] / length
+        strain = 1.0 - rod.lengths[v] / length
+        stiffness = rod.axial / rod.lengths[v]
         for a in range(3):
-            g[4 + a] += axial / lengths[v] * strain * q[4 + a]
-            h[4 + a, 4 + a] += axial / lengths[v] * strain
+            g[4 + a] += stiffness * strain * q[4 + a]
+            h[4 + a, 4 + a] += stiffness * strain
             for b in range(3):
-                h[4 + a, 4 + b] += (
-                    axial / lengths[v] * (1.0 - strain) * q[4 + a] * q[4 + b] / (length * length)
-                )
+                h[4 + a, 4 + b] += stiffness * (1.0 - strain) * q[4 + a] * q[4 + b] / (length * length)
         scatter(v, g, h, gradient, bands)
 
 
 @on_disk()
-def update_directors(points: Array, angles: Array, edge0: Array, tangents: Array, directors: Array) -> None:
-    """Directors after the move, in place; made orthonormal again, so that rounding cannot pile up."""
+def set_edge(tangents: Array, directors: Array, j: int, t: Vector, a: Vector) -> None:
+    """Tangent t and director a of edge j, made orthonormal again, so that rounding cannot pile up."""
+    along = dot(a, t)
+    a = (a[0] - along * t[0], a[1] - along * t[1], a[2] - along * t[2])
+    norm = np.sqrt(dot(a, a))
+    for i in range(3):
+        tangents[j, i], directors[j, i] = t[i], a[i] / norm
+
+
+@on_disk()
+def update_directors(
+    points: Array, angles: Array, introducer: Array, tangents: Array, directors: Array
+) -> None:
+    """Tangents and directors (n + 1, 3) after a move of the nodes and a turn of the edges, in place."""
     q = np.zeros(8)
     for v in range(len(angles)):
-        load_vertex(points, angles, edge0, v, q)
-        _, x, y, z, ax, ay, az = moved_director(q, 4, tangents[v + 1], directors[v + 1])
-        along = dot(ax, ay, az, x, y, z)
-        ax, ay, az = ax - along * x, ay - along * y, az - along * z
-        norm = np.sqrt(dot(ax, ay, az, ax, ay, az))
-        tangents[v + 1, 0], tangents[v + 1, 1], tangents[v + 1, 2] = x, y, z
-        directors[v + 1, 0], directors[v + 1, 1], directors[v + 1, 2] = ax / norm, ay / norm, az / norm
+        load_vertex(points, angles, introducer, v, q)
+        _, t, a = moved_edge(q, 4, row(tangents, v + 1), row(directors, v + 1))
+        set_edge(tangents, directors, v + 1, t, a)
 
 
 @on_disk()
 def twist_free(points: Array, tangents: Array, directors: Array) -> None:
     """Tangents and directors of every edge carried without twist from edge 0, in place."""
-    for v in range(len(points) - 1):
-        x, y, z = (
-            points[v + 1, 0] - points[v, 0],
-            points[v + 1, 1] - points[v, 1],
-            points[v + 1, 2] - points[v, 2],
-        )
-        norm = np.sqrt(x * x + y * y + z * z)
-        x, y, z = x / norm, y / norm, z / norm
-        d, t = directors[v], tangents[v]
-        ax, ay, az = transport(d[0], d[1], d[2], t[0], t[1], t[2], x, y, z)
-        along = dot(ax, ay, az, x, y, z)
-        ax, ay, az = ax - along * x, ay - along * y, az - along * z
-        norm = np.sqrt(dot(ax, ay, az, ax, ay, az))
-        tangents[v + 1, 0], tangents[v + 1, 1], tangents[v + 1, 2] = x, y, z
-        directors[v + 1, 0], directors[v + 1, 1], directors[v + 1, 2] = ax / norm, ay / norm, az / norm
+    q, angles = np.zeros(8), np.zeros(len(points) - 1)
+    for v in range(len(angles)):
+        load_vertex(points, angles, tangents[0], v, q)
+        _, t, a = moved_edge(q, 4, row(tangents, v), row(directors, v))
+        set_edge(tangents, directors, v + 1, t, a)

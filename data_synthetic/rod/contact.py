@@ -6,16 +6,10 @@ as that, the wall's energy would depend on where the nodes happen to lie, and th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
-
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from data_synthetic.rod.rod import Rod
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.rod.rod import Rod, Wall
 
 PLACES, WEIGHTS = (
     0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True)
@@ -29,19 +23,9 @@ CURVATURE_STEP_MM = 1e-4
 """Step of the central difference of the wall's gradient; its Hessian is only needed to a few digits."""
 
 
-class Wall(Protocol):
-    """Anything that gives a signed distance (n,) and its gradient (n, 3) at points (n, 3), negative inside."""
-
-    def distance_and_gradient(self, points_mm: Array) -> tuple[Array, Array]:
-        """Signed distance and gradient."""
-        ...
-
-
 def wall_energy(rod: Rod, wall: Wall, points: Array) -> float:
     """Half k d squared per mm of wire, N mm."""
     edges = _near(rod, wall, points)
-    if not len(edges):
-        return 0.0
     depth = np.maximum(wall.distance_and_gradient(_samples(points, edges))[0] + rod.radius_mm, 0.0)
     weight = np.repeat(rod.lengths[edges], len(PLACES)) * np.tile(WEIGHTS, len(edges))
     return 0.5 * rod.stiffness_N_mm2 * float(weight @ depth**2)
@@ -51,8 +35,6 @@ def add_wall(rod: Rod, wall: Wall, points: Array, gradient: Array, bands: Array)
     """Add the wall's gradient and Hessian k w (n n' + d grad grad phi); returns its force on every node (n + 1, 3)."""
     force = np.zeros_like(points)
     edges = _near(rod, wall, points)
-    if not len(edges):
-        return force
     samples = _samples(points, edges)
     phi, normal = wall.distance_and_gradient(samples)
     touching = np.flatnonzero(phi + rod.radius_mm > 0)
@@ -67,9 +49,8 @@ def add_wall(rod: Rod, wall: Wall, points: Array, gradient: Array, bands: Array)
     for end, share in shares.items():
         np.add.at(force, edge + end, -share[:, None] * push)
     gradient.reshape(-1, 4)[:, 1:] -= force[1:]
-    block = np.einsum("na,nb->nab", normal, normal) + depth[:, None, None] * _curvature(
-        wall, samples[touching]
-    )
+    block = depth[:, None, None] * _curvature(wall, samples[touching])
+    block += np.einsum("na,nb->nab", normal, normal)
     block *= weight[:, None, None]
     for low, high in ((0, 0), (1, 1), (0, 1)):
         _scatter(bands, edge + low, edge + high, block * (shares[low] * shares[high])[:, None, None])
@@ -84,6 +65,7 @@ def _near(rod: Rod, wall: Wall, points: Array) -> Index:
 
 
 def _samples(points: Array, edges: Index) -> Array:
+    """The Gauss points (4 m, 3) of edges (m,)."""
     start, along = points[edges], points[edges + 1] - points[edges]
     return np.asarray((start[:, None] + PLACES[None, :, None] * along[:, None]).reshape(-1, 3))
 

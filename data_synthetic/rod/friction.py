@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from data_synthetic.rod.rod import Equilibrium, Rod, Shape, relax
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array
+from data_synthetic.rod.relax import Equilibrium, relax
+from data_synthetic.rod.rod import Rod, Shape
 
 ELASTIC_SLIP_MM = 2e-3
 """A slider gives by this much before it slips: a fifth of the truth's own accuracy of 0.01 mm."""
@@ -64,37 +63,32 @@ class Sliders:
                 bands[a - b, node + 1 + b] += block[1:, a, b]
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """A wire at rest under friction, the anchors it was relaxed with, and the largest change of the last round, N."""
-
-    equilibrium: Equilibrium
-    anchor: Array
-    unsettled_N: float
-
-    def offsets(self, coefficient: float) -> Array:
-        """Vectors (n + 1, 3) from anchor to node left when all slipping is done; zero where nothing presses."""
-        stretch = _sliders(coefficient, self.equilibrium.contact_N, self.anchor).stretch(
-            self.equilibrium.shape.points
-        )
-        size = np.linalg.norm(stretch, axis=1)
-        pressed = np.linalg.norm(self.equilibrium.contact_N, axis=1) > 0
-        kept = np.where(pressed, np.minimum(1.0, ELASTIC_SLIP_MM / np.maximum(size, 1e-300)), 0.0)
-        return np.asarray(kept[:, None] * stretch)
-
-
-def relax_held(
+def relax_with_friction(
     rod: Rod, start: Shape, anchor: Array, contact_N: Array, coefficient: float, force_N: float
-) -> Held:
-    """Relax under sliders; ``contact_N`` (n + 1, 3) is the first guess of the wall's forces."""
-    shape, contact, effort, change = start, contact_N, 0, np.inf
+) -> Equilibrium:
+    """Relax from ``start`` to ``force_N`` while friction holds every node by its anchor (n + 1, 3).
+
+    contact_N (n + 1, 3) : a first guess of the wall's forces.     coefficient : Coulomb's; 0 is plain ``relax``.
+    """
+    if not coefficient:
+        return relax(rod, start, force_N)
+    shape, contact, effort = start, contact_N, 0
     for _ in range(ROUNDS):
         state = relax(replace(rod, sliders=_sliders(coefficient, contact, anchor)), shape, force_N)
         change = coefficient * float(np.linalg.norm(state.contact_N - contact, axis=1).max())
         shape, contact, effort = state.shape, state.contact_N, effort + state.iterations
         if change < force_N:
             break
-    return Held(replace(state, iterations=effort), anchor, change)
+    return replace(state, iterations=effort, anchor=anchor)
+
+
+def held_back(state: Equilibrium, coefficient: float) -> Array:
+    """Vectors (n + 1, 3) from anchor to node left when all slipping is done; zero where nothing presses."""
+    stretch = _sliders(coefficient, state.contact_N, state.anchor).stretch(state.shape.points)
+    size = np.linalg.norm(stretch, axis=1)
+    pressed = np.linalg.norm(state.contact_N, axis=1) > 0
+    kept = np.where(pressed, np.minimum(1.0, ELASTIC_SLIP_MM / np.maximum(size, 1e-300)), 0.0)
+    return np.asarray(kept[:, None] * stretch)
 
 
 def by_tip(values: Array, count: int) -> Array:
@@ -106,5 +100,6 @@ def by_tip(values: Array, count: int) -> Array:
 
 
 def _sliders(coefficient: float, contact_N: Array, anchor: Array) -> Sliders:
+    """The sliders under given forces of the wall."""
     load = np.linalg.norm(contact_N, axis=1)
     return Sliders(coefficient * load, contact_N / np.maximum(load, 1e-300)[:, None], anchor)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from data_synthetic.rod.replay import Insertion, TrueFrame, replay
-
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array, arc_lengths
+from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
 
 ROLLS_DEG = (0.0, 90.0, 180.0, 270.0, 30.0, 120.0, 210.0, 300.0, 60.0, 150.0, 240.0, 330.0)
 COARSE_MM = 0.8
@@ -23,7 +21,7 @@ DEEPEST_MM = 0.25
 
 
 def steer(
-    insertion: Insertion, way_mm: Array, depths_mm: tuple[float, ...], corridor_mm: float
+    insertion: TrueInsertion, way_mm: Array, depths_mm: tuple[float, ...], corridor_mm: float
 ) -> tuple[float, float]:
     """The roll in degrees that leads furthest along a way (n, 3), and the depth to which the tip stayed on it.
 
@@ -44,16 +42,12 @@ def steer(
     return best
 
 
-def _on_the_way(insertion: Insertion, frame: TrueFrame, way_mm: Array, corridor_mm: float) -> bool:
+def _on_the_way(insertion: TrueInsertion, frame: TrueFrame, way_mm: Array, corridor_mm: float) -> bool:
     """Near the way, about as far along it as the wire is long (it may bulge, so 0.7), not stuck, no wild snap."""
     away = np.linalg.norm(way_mm - frame.points_mm[-1], axis=1)
     foot = int(np.argmin(away))
-    along = float(np.linalg.norm(np.diff(way_mm[: foot + 1], axis=0), axis=1).sum())
-    if (
-        away[foot] > corridor_mm
-        or along < 0.7 * frame.depth_mm - corridor_mm
-        or frame.jump_mm > LARGEST_JUMP_MM
-    ):
+    short = arc_lengths(way_mm)[foot] < 0.7 * frame.depth_mm - corridor_mm
+    if away[foot] > corridor_mm or short or frame.jump_mm > LARGEST_JUMP_MM:
         return False
     if insertion.wall is None:
         return True

@@ -13,11 +13,11 @@ import numpy as np
 
 from data_synthetic._compile import hash_of
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.rod.replay import Insertion, TrueFrame, replay
+from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
 
 
 def cached_replay(
-    insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]
+    insertion: TrueInsertion, depths_mm: Sequence[float], roll_deg: Sequence[float]
 ) -> tuple[TrueFrame, ...]:
     """``replay``, or what it gave before for the same input and the same code. Any fault of the cache is a miss."""
     if not isinstance(insertion.wall, Anatomy):
@@ -33,7 +33,7 @@ def cached_replay(
     return frames
 
 
-def _key(insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> str:
+def _key(insertion: TrueInsertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> str:
     """Hash of the code behind ``replay`` and of everything that it is called with."""
     digest = hashlib.sha256(hash_of(Path(replay.__code__.co_filename)).encode())
     given: dict[str, Any] = {**vars(insertion), "depths_mm": depths_mm, "roll_deg": roll_deg}

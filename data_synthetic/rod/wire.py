@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from data_synthetic.geometry.vectors import Array, ends_of
+
 Profile = tuple[tuple[float, float], ...]
 
 
@@ -35,7 +35,7 @@ def cell_means(profile: Sequence[tuple[float, float]], low: Array, high: Array) 
     """Mean of a piecewise linear profile over cells [low, high] (n,), jumps (repeated knots) integrated exactly."""
     knots = np.array(profile, dtype=np.float64)
     place, value = knots[:, 0], knots[:, 1]
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(place))])
+    integral = ends_of(0.5 * (value[1:] + value[:-1]) * np.diff(place))
 
     def antiderivative(s: Array) -> Array:
         inside = np.clip(s, place[0], place[-1])

@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from data_synthetic.geometry.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array
 
-Array = NDArray[np.float64]
-Volume = NDArray[np.float32]
+ABSENT = (
+    "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
+)
+"""What is said where RTK is missing."""
 
 MARGIN = 1.16
 """The detector sees the volume's width and a sixth more: what lies further out is cut off, as a head is."""
@@ -145,8 +148,7 @@ def _toolkit() -> tuple[Any, Any]:
 
             _ = itk.Image, RTK.ThreeDCircularProjectionGeometry
     except ImportError as problem:
-        msg = "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
-        raise ImportError(msg) from problem
+        raise ImportError(ABSENT) from problem
     return itk, RTK
 
 

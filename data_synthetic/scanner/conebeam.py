@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.geometry.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array
 from data_synthetic.scanner.c_arm import Arc, CArm
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
+from data_synthetic.scanner.particles import splat, wire_particles
 from data_synthetic.scanner.psf import Greys
-
-Array = NDArray[np.float64]
-Volume = NDArray[np.float32]
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""

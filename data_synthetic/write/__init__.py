@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from data_synthetic.write.earlier import earlier_files, in_the_way
 from data_synthetic.write.study_files import write_study
 from data_synthetic.write.volumes import FORMATS
 
-__all__ = ["FORMATS", "write_study"]
+__all__ = ["FORMATS", "earlier_files", "in_the_way", "write_study"]

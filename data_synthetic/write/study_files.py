@@ -1,4 +1,4 @@
-"""A study as files that any other tool can read: volumes, manifest.toml, truth.json."""
+"""The files of a study: its volumes, what is known of it as truth.json, and the manifest by which it is run."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from data_synthetic.catalogue.scene import Study
-from data_synthetic.write.volumes import FORMATS, VolumeWriter, volume_writer
+from data_synthetic.catalogue.study import Study
+from data_synthetic.write.earlier import MANIFEST, TRUTH, in_the_way, remove_earlier
+from data_synthetic.write.volumes import FORMATS, frames_name, reference_name, write_volume
 
 Progress = Callable[[int, int], None]
 
@@ -17,30 +18,35 @@ Progress = Callable[[int, int], None]
 def write_study(
     study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None
 ) -> Path:
-    """Write reference, frames, manifest.toml and truth.json into ``folder``; returns the manifest's path.
+    """Write reference, frames, truth.json and manifest.toml into ``folder``; returns the manifest's path.
 
     format : one of FORMATS.     progress : called with (frames done, frames in all).
+    An earlier study in the folder is removed first; ValueError where something else lies in the way.
     """
+    folder, frames = Path(folder), len(study.truth)
     if format not in FORMATS:
         msg = (
             f"synthetic study {study.name}: format: got {format!r}; allowed: {', '.join(FORMATS)}; choose one"
         )
         raise ValueError(msg)
-    folder = Path(folder)
+    problems = in_the_way(folder, format, frames)
+    if problems:
+        raise ValueError("; ".join(problems))
+    remove_earlier(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    writer = volume_writer(folder, format, study.grid)
-    writer.reference(study.reference)
+    write_volume(folder, format, None, study.reference, study.grid)
     for i, frame in enumerate(study.frames()):
-        writer.frame(i, frame)
+        write_volume(folder, format, i, frame, study.grid)
         if progress is not None:
-            progress(i + 1, len(study.truth))
-    _write_truth(study, folder / "truth.json")
-    manifest = folder / "manifest.toml"
-    manifest.write_text(manifest_text(study, writer), encoding="utf-8")
+            progress(i + 1, frames)
+    (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
+    manifest = folder / MANIFEST
+    manifest.write_text(manifest_text(study, format), encoding="utf-8")
     return manifest
 
 
-def _write_truth(study: Study, path: Path) -> None:
+def truth_record(study: Study) -> dict[str, Any]:
+    """What truth.json holds. points_mm lie in the phantom as the reference scan shows it."""
     frames = [
         {
             "insertion_mm": round(f.depth_mm, 6),
@@ -52,10 +58,10 @@ def _write_truth(study: Study, path: Path) -> None:
         for f in study.truth
     ]
     if study.setup.motion_mm is not None:
-        # points_mm lie in the phantom as the reference scan shows it; in the frame's own scan they are shifted by this
         for frame, shift in zip(frames, study.setup.motion_mm, strict=True):
+            # in the frame's own scan the points are shifted by this
             frame["phantom_shift_mm"] = [round(float(s), 6) for s in shift]
-    record = {
+    return {
         "scene": study.name,
         "why": study.why,
         "entry_mm": study.setup.entry_mm.round(6).tolist(),
@@ -64,14 +70,17 @@ def _write_truth(study: Study, path: Path) -> None:
         "quality": dict(study.quality),
         "frames": frames,
     }
-    path.write_text(json.dumps(record), encoding="utf-8")
 
 
-def manifest_text(study: Study, writer: VolumeWriter) -> str:
+def manifest_text(study: Study, format: str) -> str:
     """The manifest of a study as TOML."""
     case = dict(study.manifest["case"])
     wall = case.pop("wall")
-    case |= {"reference": writer.reference_name, "frames": writer.frames_name, "truth": "truth.json"}
+    case |= {
+        "reference": reference_name(format),
+        "frames": frames_name(format, len(study.truth)),
+        "truth": TRUTH,
+    }
     lines = [f"# {study.why}", "schema = 1", ""]
     for name, wire in study.manifest["wires"].items():
         lines += [f"[wires.{name}]", *_table(wire), ""]
@@ -84,9 +93,7 @@ def _table(values: Mapping[str, Any]) -> list[str]:
 
 
 def toml_value(value: Any) -> str:
-    """A number, text, flag or nested list as TOML."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
+    """A number, text or nested list as TOML."""
     if isinstance(value, str):
         return json.dumps(value)
     if isinstance(value, Sequence):

@@ -13,7 +13,7 @@ import SimpleITK as sitk
 from PIL import Image
 
 from data_synthetic import catalogue
-from data_synthetic.catalogue.scene import Study
+from data_synthetic.catalogue.study import Study
 from data_synthetic.write import FORMATS, write_study
 from tests.studies import catalogue_page, coverage
 

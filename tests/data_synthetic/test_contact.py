@@ -20,7 +20,7 @@ SAC = Anatomy((ball("sac", [0.0, 0.0, 0.0], 3.0),))
 
 def rod_across(step_mm: float) -> tuple[Rod, Array]:
     """A straight wire that leaves a ball: its last part is pressed."""
-    rod = make_rod(TrueWire(), -2.0 * Z, Z, X, 5.5, step_mm, wall=SAC, stiffness_N_mm2=2.0)
+    rod = replace(make_rod(TrueWire(), Z, X, 5.5, step_mm), wall=SAC, stiffness_N_mm2=2.0)
     arc = np.concatenate([[0.0], np.cumsum(rod.lengths)])
     return rod, -2.0 * Z + arc[:, None] * Z
 

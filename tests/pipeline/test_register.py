@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from data_synthetic import catalogue
-from data_synthetic.catalogue.scene import Study
-from data_synthetic.catalogue.study import psf_scanner
+from data_synthetic.catalogue.study import Study, psf_scanner
 from pipeline.config import LoadConfig, TraceConfig
 from pipeline.frame import Frame
 from pipeline.in_place import place_of, record, said

@@ -2,39 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from data_synthetic import catalogue
 
 STAGES = ("load", "segment", "trace", "simulate", "compare", "report")
 
-TRIED: Mapping[str, tuple[str, ...]] = {
-    "straight": ("simulate", "compare", "report"),
-    "bend": ("segment", "trace", "simulate", "compare", "report"),
-    "s-curve": ("simulate",),
-    "helix": ("trace", "simulate"),
-    "rough-wall": ("simulate",),
-    "bifurcation": ("segment", "simulate", "compare"),
-    "bifurcation-left": ("simulate", "compare"),
-    "rolled": ("simulate",),
-    "short-wire": ("trace", "simulate", "compare"),
-    "stenosis": ("segment", "simulate"),
-    "aneurysm-neck": ("segment", "simulate"),
-    "aneurysm-loop": ("trace", "simulate"),
-    "kissing-vessels": ("segment", "simulate"),
-    "bone-wall": ("segment", "trace"),
-    "missing-wire": ("trace", "report"),
-    "two-wires": ("trace", "report"),
-    "introducer": ("trace", "compare"),
-    "moved-phantom": ("segment", "trace", "report"),
-    "anisotropic": ("load", "segment", "trace"),
-    "oblique": ("load", "segment", "trace", "compare"),
-    "low-dose": ("segment", "trace"),
-    "washed-out": ("segment", "trace"),
-    "circle-of-willis": ("load", "segment", "trace", "simulate", "compare", "report"),
-    "siphon": ("simulate", "compare"),
-    "incomplete-circle": ("segment", "simulate"),
-    "acoa-aneurysm": ("simulate", "compare"),
-    "tortuous-vertebral": ("segment", "simulate"),
-}
+TRIED = {name: catalogue.describe(name).tries for name in catalogue.names()}
 """Stages that a scene was made to try; every scene runs through all of them."""
 
 
