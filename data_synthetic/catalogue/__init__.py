@@ -13,7 +13,9 @@ from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.own_anatomy import from_anatomy
 from data_synthetic.catalogue.own_background import background_scene
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory
-from data_synthetic.catalogue.study import Study, conebeam_scanner, make_study, psf_scanner
+from data_synthetic.catalogue.study import Study, make_study
+from data_synthetic.scanner import PsfScanner
+from data_synthetic.scanner.conebeam import ConeBeamScanner
 
 __all__ = [
     "SCANNERS",
@@ -26,8 +28,8 @@ __all__ = [
     "names",
 ]
 
-SCANNERS: dict[str, ScannerFactory] = {"psf": psf_scanner, "conebeam": conebeam_scanner}
-"""What turns a phantom into grey values."""
+SCANNERS: dict[str, ScannerFactory] = {"psf": PsfScanner.of, "conebeam": ConeBeamScanner.of}
+"""What turns a phantom into grey values: the ideal scanner, and 3D rotational X-ray (needs the extra [conebeam])."""
 
 _BY_NAME = {
     scene.name: scene

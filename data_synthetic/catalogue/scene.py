@@ -3,56 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from data_synthetic.anatomy.tubes import Anatomy, Tube
+from data_synthetic.anatomy.tubes import Tube
 from data_synthetic.geometry.scan_grid import ScanGrid
 from data_synthetic.geometry.vectors import Array
 from data_synthetic.rod.replay import TrueInsertion
 from data_synthetic.rod.rod import Wall
 from data_synthetic.rod.wire import TrueWire
-from data_synthetic.scanner import Greys
+from data_synthetic.scanner import Phantom, PsfScanner
+from data_synthetic.scanner.conebeam import ConeBeamScanner
+from data_synthetic.scanner.phantom import Wires
 
-Scan = NDArray[np.int16]
-Wires = Sequence[tuple[Array, float]]
-
-
-class Scanner(Protocol):
-    """Turns wires (points (n, 3), radius) into one volume."""
-
-    def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
-        """One volume, indexed x, y, z."""
-        ...
+Scanner = PsfScanner | ConeBeamScanner
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
-    """What a scene is made of.
+class Setup(Phantom):
+    """What a scene is made of: a phantom, and what is done in it.
 
     tube, entry_arc_mm : the tube that is entered, how far from its beginning.     depths_mm, rolls_deg : one per frame.
     centre_mm : middle of the scan.     stiffness_N_mm2 : of the wall; 2 is that of a 2 MPa silicone.
-    bone_gap_mm : what bone keeps from the lumen.     spacing_ratio : voxel edges relative to the voxel size.
+    spacing_ratio : voxel edges relative to the voxel size.
     axes : direction matrix of the scan.     visible : which frames show the wire.     others : more wires, always.
     motion_mm : (frames, 3) shift of the phantom against the reference scan.     wall : when it is not the anatomy.
     friction : Coulomb's coefficient of wire and wall.
     """
 
-    anatomy: Anatomy
     tube: Tube
     entry_arc_mm: float
     depths_mm: tuple[float, ...]
     rolls_deg: tuple[float, ...]
     centre_mm: Array
+    _: KW_ONLY
     material_axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
     wire: TrueWire = field(default_factory=TrueWire)
     stiffness_N_mm2: float = 2.0
-    bone: Anatomy | None = None
-    bone_gap_mm: float = 1.2
-    greys: Greys = field(default_factory=Greys)
     spacing_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
     axes: Array | None = None
     visible: tuple[bool, ...] | None = None

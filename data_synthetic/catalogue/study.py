@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from data_synthetic.catalogue.limits import Wanted
-from data_synthetic.catalogue.scene import NamedScene, Scan, Scanner, ScannerFactory, Setup, Wires
+from data_synthetic.catalogue.scene import NamedScene, ScannerFactory, Setup
 from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
 from data_synthetic.geometry.vectors import normal_to, rotate, unit
 from data_synthetic.rod.replay import TrueFrame
 from data_synthetic.rod.truth import converged_truth
-from data_synthetic.scanner import PsfScanner
+from data_synthetic.scanner.phantom import Scan, Wires
 
 ENTRY_ERROR_VOXELS = 0.5
 """How far the manifest's entry is from the true one: what pointing at a scan achieves."""
@@ -49,18 +49,6 @@ class Study:
     def frames(self) -> Iterator[Scan]:
         """All frames, one at a time."""
         return (self.frame(i) for i in range(len(self.truth)))
-
-
-def psf_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
-    """The default scanner."""
-    return PsfScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, setup.greys)
-
-
-def conebeam_scanner(setup: Setup, grid: ScanGrid) -> Scanner:
-    """3D rotational X-ray; needs the extra [conebeam]."""
-    from data_synthetic.scanner.conebeam import ConeBeamScanner
-
-    return ConeBeamScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, greys=setup.greys)
 
 
 def make_study(

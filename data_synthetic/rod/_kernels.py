@@ -20,26 +20,35 @@ Vector = tuple[float, float, float]
 BANDS = 11
 """Rows of the lower band matrix: a vertex couples three nodes and two angles, 4 unknowns apart."""
 
+LOCAL = np.eye(8, BANDS, 4) - np.eye(8, BANDS)
+LOCAL[[3, 7]] = np.eye(BANDS)[[3, 7]]
+"""Edges and angles (8,) about a vertex from its unknowns (11,): node v - 1, angle, node v, angle, node v + 1."""
+
 HESSIAN_STEP = 1e-6
 """Relative step of the central difference of the exact gradient; its error is about 1e-10 of the stiffness."""
 
 
 class Elastic(NamedTuple):
-    """A rod of n edges in its present shape; vertex v lies between edges v and v + 1.
+    """What stays of a rod of n edges while it relaxes; vertex v lies between edges v and v + 1.
 
-    introducer : direction (3,) of edge 0.     tangents, directors (n + 1, 3) : of every edge, edge 0 first.
+    introducer : direction (3,) of edge 0.     lengths (n,) : of the edges at rest, mm.     axial : EA in N.
     bend, rest, twist (n,) : EI / cell, rest curvature x cell, GJ / cell of every vertex.
-    axial : EA in N.     lengths (n,) : of the edges at rest, mm.
     """
 
     introducer: Array
-    tangents: Array
-    directors: Array
+    lengths: Array
     bend: Array
     rest: Array
     twist: Array
     axial: float
-    lengths: Array
+
+
+class Shape(NamedTuple):
+    """Nodes (n + 1, 3), tangents and directors (n + 1, 3) of the introducer and the n edges."""
+
+    points: Array
+    tangents: Array
+    directors: Array
 
 
 @on_disk()
@@ -86,10 +95,10 @@ def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[flo
 
 
 @on_disk()
-def vertex(q: Array, v: int, rod: Elastic, g: Array, want_gradient: bool) -> float:
+def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient: bool) -> float:
     """Energy of vertex v and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
-    le, e, a = moved_edge(q, 0, row(rod.tangents, v), row(rod.directors, v))
-    lf, f, b = moved_edge(q, 4, row(rod.tangents, v + 1), row(rod.directors, v + 1))
+    le, e, a = moved_edge(q, 0, row(shape.tangents, v), row(shape.directors, v))
+    lf, f, b = moved_edge(q, 4, row(shape.tangents, v + 1), row(shape.directors, v + 1))
     chi = 1.0 + dot(e, f)
     k = cross(e, f)
     k = (2.0 * k[0] / chi, 2.0 * k[1] / chi, 2.0 * k[2] / chi)
@@ -133,13 +142,13 @@ def load_vertex(points: Array, angles: Array, introducer: Array, v: int, q: Arra
 
 
 @on_disk()
-def elastic_energy(points: Array, angles: Array, rod: Elastic) -> float:
-    """Stored energy, N mm, of nodes (n + 1, 3); angles (n,) are increments from the directors."""
+def elastic_energy(points: Array, angles: Array, shape: Shape, rod: Elastic) -> float:
+    """Stored energy, N mm, of nodes (n + 1, 3); angles (n,) are increments from the directors of a shape."""
     q, g = np.zeros(8), np.zeros(8)
     total: float = 0.0
     for v in range(len(rod.bend)):
         load_vertex(points, angles, rod.introducer, v, q)
-        total += vertex(q, v, rod, g, False)
+        total += vertex(q, v, shape, rod, g, False)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
         total += 0.5 * rod.axial / rod.lengths[v] * (length - rod.lengths[v]) ** 2
     return total
@@ -148,39 +157,27 @@ def elastic_energy(points: Array, angles: Array, rod: Elastic) -> float:
 @on_disk()
 def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
     """Add the local gradient (8,) and Hessian (8, 8) of vertex v to the system."""
-    # unknowns of the vertex: node v-1, angle e, node v, angle f, node v+1; local edges are their differences
-    column = np.empty(11, np.int64)
-    for a in range(3):
-        column[a], column[4 + a], column[8 + a] = 4 * (v - 2) + 1 + a, 4 * (v - 1) + 1 + a, 4 * v + 1 + a
-    column[3], column[7] = 4 * (v - 1), 4 * v
-    jac = np.zeros((8, 11))
-    for a in range(3):
-        jac[a, a], jac[a, 4 + a] = -1.0, 1.0
-        jac[4 + a, 4 + a], jac[4 + a, 8 + a] = -1.0, 1.0
-    jac[3, 3], jac[7, 7] = 1.0, 1.0
-    full = jac.T @ h @ jac
-    for i in range(11):
-        if column[i] < 0:
-            continue
+    full = LOCAL.T @ h @ LOCAL
+    first = 4 * v - 7  # unknown of node v - 1; those of the clamp are negative
+    for i in range(max(0, -first), BANDS):
         for a in range(8):
-            gradient[column[i]] += jac[a, i] * g[a]
-        for j in range(i + 1):
-            if column[j] >= 0:
-                bands[abs(column[i] - column[j]), min(column[i], column[j])] += full[i, j]
+            gradient[first + i] += LOCAL[a, i] * g[a]
+        for j in range(max(0, -first), i + 1):
+            bands[i - j, first + j] += full[i, j]
 
 
 @on_disk()
-def bend_and_twist(q: Array, v: int, rod: Elastic, g: Array, h: Array) -> None:
+def bend_and_twist(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, h: Array) -> None:
     """Fill gradient g (8,) and Hessian h (8, 8) of vertex v; h by central differences of the exact gradient."""
     gp, gm = np.zeros(8), np.zeros(8)
-    vertex(q, v, rod, g, True)
+    vertex(q, v, shape, rod, g, True)
     for a in range(8):
         step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * rod.lengths[v]
         kept = q[a]
         q[a] = kept + step
-        vertex(q, v, rod, gp, True)
+        vertex(q, v, shape, rod, gp, True)
         q[a] = kept - step
-        vertex(q, v, rod, gm, True)
+        vertex(q, v, shape, rod, gm, True)
         q[a] = kept
         for b in range(8):
             h[b, a] = 0.5 * (gp[b] - gm[b]) / step
@@ -190,14 +187,14 @@ def bend_and_twist(q: Array, v: int, rod: Elastic, g: Array, h: Array) -> None:
 
 
 @on_disk()
-def elastic_system(points: Array, angles: Array, rod: Elastic, gradient: Array, bands: Array) -> None:
+def elastic_system(shape: Shape, rod: Elastic, gradient: Array, bands: Array) -> None:
     """Fill gradient (4n,) and lower-band Hessian (11, 4n) of the stored energy."""
-    q, g, h = np.zeros(8), np.zeros(8), np.zeros((8, 8))
+    q, g, h, angles = np.zeros(8), np.zeros(8), np.zeros((8, 8)), np.zeros(len(rod.bend))
     gradient[:] = 0.0
     bands[:] = 0.0
     for v in range(len(rod.bend)):
-        load_vertex(points, angles, rod.introducer, v, q)
-        bend_and_twist(q, v, rod, g, h)
+        load_vertex(shape.points, angles, rod.introducer, v, q)
+        bend_and_twist(q, v, shape, rod, g, h)
         length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
         strain = 1.0 - rod.lengths[v] / length
         stiffness = rod.axial / rod.lengths[v]

@@ -9,8 +9,9 @@ from scipy.linalg import LinAlgError, solveh_banded
 
 from data_synthetic.geometry.vectors import Array
 from data_synthetic.rod import _kernels as kernels
+from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.contact import add_wall, wall_energy
-from data_synthetic.rod.rod import Rod, Shape
+from data_synthetic.rod.rod import Rod
 
 LONGEST_MOVE_MM = 0.15
 """Most that a node may move in one Newton step: below a wire radius, so that no step jumps a wall."""
@@ -55,23 +56,9 @@ def relax(rod: Rod, start: Shape, force_N: float, max_iterations: int = 400) -> 
     return Equilibrium(shape, residual, contact, energy, count, shape.points)
 
 
-def _elastic(rod: Rod, shape: Shape) -> kernels.Elastic:
-    """The rod in a shape, as the kernels take it."""
-    return kernels.Elastic(
-        rod.direction,
-        shape.tangents,
-        shape.directors,
-        rod.bend,
-        rod.rest,
-        rod.twist,
-        rod.axial,
-        rod.lengths,
-    )
-
-
 def _energy(rod: Rod, shape: Shape, points: Array, angles: Array) -> float:
     """Energy in N mm of nodes (n + 1, 3), angles (n,) counted from the directors of a shape."""
-    total = float(kernels.elastic_energy(points, angles, _elastic(rod, shape)))
+    total = float(kernels.elastic_energy(points, angles, shape, rod.elastic))
     if rod.wall is not None:
         total += wall_energy(rod, rod.wall, points)
     if rod.sliders is not None:
@@ -83,7 +70,7 @@ def _energy(rod: Rod, shape: Shape, points: Array, angles: Array) -> float:
 
 def _system(rod: Rod, shape: Shape, gradient: Array, bands: Array) -> Array:
     """Fill gradient and Hessian; returns the wall's force on every node (n + 1, 3)."""
-    kernels.elastic_system(shape.points, np.zeros(len(rod.lengths)), _elastic(rod, shape), gradient, bands)
+    kernels.elastic_system(shape, rod.elastic, gradient, bands)
     if rod.loads_N is not None:
         gradient.reshape(-1, 4)[:, 1:] -= rod.loads_N[1:]
     if rod.sliders is not None:
@@ -121,7 +108,7 @@ def _line_search(
         trial = _energy(rod, shape, points, angles)
         if trial <= energy + 1e-4 * share * slope + noise:
             tangents, directors = shape.tangents.copy(), shape.directors.copy()
-            kernels.update_directors(points, angles, rod.direction, tangents, directors)
+            kernels.update_directors(points, angles, rod.elastic.introducer, tangents, directors)
             return Shape(points, tangents, directors), trial, share
         share *= 0.5
     return None

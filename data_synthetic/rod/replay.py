@@ -15,9 +15,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from data_synthetic.geometry.vectors import Array, at_arc, ends_of, normal_to, rotate, unit
+from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.friction import by_tip, held_back, relax_with_friction
 from data_synthetic.rod.relax import Equilibrium, relax
-from data_synthetic.rod.rod import TIP_EDGES, Rod, Shape, Wall, edge_lengths, make_rod, shape_from_points
+from data_synthetic.rod.rod import TIP_EDGES, Rod, Wall, edge_lengths, make_rod, shape_from_points
 from data_synthetic.rod.wire import TrueWire
 
 ROLL_STEP_DEG = 5.0
@@ -107,7 +108,7 @@ def replay(
 def _begin(insertion: TrueInsertion, depth: float, roll: float) -> Equilibrium:
     """The first few edges, straight, relaxed."""
     rod = _rod(insertion, depth, roll)
-    points = insertion.entry_mm + ends_of(rod.lengths)[:, None] * rod.direction
+    points = insertion.entry_mm + ends_of(rod.lengths)[:, None] * rod.elastic.introducer
     return relax(rod, shape_from_points(rod, points), REPLAY_FORCE_N)
 
 
@@ -154,10 +155,11 @@ def _advance(
 
 def _slide(rod: Rod, shape: Shape, ends: Array, arcs: Array) -> Shape:
     """Nodes at new arc lengths on the present curve; beyond its tip straight on."""
-    curve = CubicSpline(ends, shape.points, bc_type=((1, rod.direction), (2, np.zeros(3))))
+    introducer = rod.elastic.introducer
+    curve = CubicSpline(ends, shape.points, bc_type=((1, introducer), (2, np.zeros(3))))
     inside = np.clip(arcs, 0.0, ends[-1])
     tip = unit(curve(ends[-1], 1))
-    straight = np.where(arcs[:, None] > 0, tip, rod.direction)  # before the entry it lies in the introducer
+    straight = np.where(arcs[:, None] > 0, tip, introducer)  # before the entry it lies in the introducer
     return shape_from_points(rod, curve(inside) + (arcs - inside)[:, None] * straight)
 
 

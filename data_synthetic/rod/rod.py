@@ -3,67 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from data_synthetic.anatomy.iso_wall import IsoWall
+from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry.vectors import Array, ends_of
-from data_synthetic.rod import _kernels as kernels
+from data_synthetic.rod._kernels import Elastic, Shape, twist_free
+from data_synthetic.rod.sliders import Sliders
 from data_synthetic.rod.wire import RIGID_TORSION_N_MM2, TrueWire, cell_means
 
 TIP_REFINEMENT, TIP_EDGES = 8, 2
 """The last two edges are cut into eight each, to resolve the run over which a pushed tip touches."""
 
 
-class Wall(Protocol):
-    """Anything that gives a signed distance (n,) and its gradient (n, 3) at points (n, 3), negative inside."""
-
-    def distance_and_gradient(self, points_mm: Array) -> tuple[Array, Array]:
-        """Signed distance and gradient."""
-        ...
-
-
-class NodeEnergy(Protocol):
-    """A further energy of the nodes: friction's sliders."""
-
-    def energy(self, points: Array) -> float:
-        """N mm."""
-        ...
-
-    def add(self, points: Array, gradient: Array, bands: Array) -> None:
-        """Add gradient (4n,) and lower-band Hessian."""
-        ...
+Wall = Anatomy | IsoWall
+"""What a wire is pushed against."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rod:
     """A wire cut into n edges with n + 1 nodes, node 0 at the entry: everything that stays while it relaxes.
 
-    direction, director (3,) : of the introducer.     lengths (n,) : of the edges, mm.
-    bend, rest, twist (n,), axial : as in ``kernels.Elastic``.     loads_N (n + 1, 3) : dead loads on the nodes.
+    director (3,) : of the introducer.     loads_N (n + 1, 3) : dead loads on the nodes.     sliders : friction's.
     """
 
-    direction: Array
+    elastic: Elastic
     director: Array
-    lengths: Array
-    bend: Array
-    rest: Array
-    twist: Array
-    axial: float
     radius_mm: float
     wall: Wall | None = None
     stiffness_N_mm2: float = 0.0
     loads_N: Array | None = None
-    sliders: NodeEnergy | None = None
+    sliders: Sliders | None = None
 
-
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """Nodes (n + 1, 3), tangents and directors (n + 1, 3) of the introducer and the n edges."""
-
-    points: Array
-    tangents: Array
-    directors: Array
+    @property
+    def lengths(self) -> Array:
+        """Of the edges (n,) at rest, mm."""
+        return self.elastic.lengths
 
 
 def edge_lengths(depth_mm: float, step_mm: float) -> Array:
@@ -88,13 +64,13 @@ def make_rod(wire: TrueWire, direction: Array, director: Array, depth_mm: float,
     bend = cell_means(wire.bending_N_mm2, *from_tip) / cells
     rest = cell_means(wire.rest_curvature_per_mm, *from_tip) * cells
     twist = min(wire.torsional_N_mm2, RIGID_TORSION_N_MM2) / cells
-    return Rod(direction, director, lengths, bend, rest, twist, wire.axial_N, wire.radius_mm)
+    return Rod(Elastic(direction, lengths, bend, rest, twist, wire.axial_N), director, wire.radius_mm)
 
 
 def shape_from_points(rod: Rod, points: Array) -> Shape:
     """The twist-free shape through given nodes."""
     points = np.ascontiguousarray(points)
     tangents, directors = np.empty_like(points), np.empty_like(points)
-    tangents[0], directors[0] = rod.direction, rod.director
-    kernels.twist_free(points, tangents, directors)
+    tangents[0], directors[0] = rod.elastic.introducer, rod.director
+    twist_free(points, tangents, directors)
     return Shape(points, tangents, directors)

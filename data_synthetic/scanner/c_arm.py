@@ -129,12 +129,9 @@ class CArm:
         return np.ascontiguousarray(itk.array_from_image(fdk.GetOutput()).transpose(2, 0, 1))
 
     def _detector_image(self, stack: Volume) -> Any:
-        itk, _ = _toolkit()
-        image = itk.image_from_array(np.ascontiguousarray(stack))
+        """An image of a stack, its middle on the central ray."""
         half = 0.5 * (self.arc.pixels - 1) * self.pixel_mm
-        image.SetSpacing([self.pixel_mm, self.pixel_mm, 1.0])
-        image.SetOrigin([-half, -half, 0.0])
-        return image
+        return _image(stack, np.array([self.pixel_mm, self.pixel_mm, 1.0]), np.array([-half, -half, 0.0]))
 
 
 def _toolkit() -> tuple[Any, Any]:
@@ -154,10 +151,13 @@ def _toolkit() -> tuple[Any, Any]:
 
 def _volume_image(values: Volume, spacing: Array, centre: Array) -> Any:
     """RTK turns about its second axis: x, y, z become its first, third and second."""
-    itk, _ = _toolkit()
-    image = itk.image_from_array(np.ascontiguousarray(values.transpose(1, 2, 0)))
-    order = [0, 2, 1]
     origin = centre - 0.5 * (np.array(values.shape) - 1) * spacing
-    image.SetSpacing([float(spacing[a]) for a in order])
-    image.SetOrigin([float(origin[a]) for a in order])
+    return _image(values.transpose(1, 2, 0), spacing[[0, 2, 1]], origin[[0, 2, 1]])
+
+
+def _image(values: Volume, spacing: Array, origin: Array) -> Any:
+    """An itk image of an array whose last axis is the image's first."""
+    image = _toolkit()[0].image_from_array(np.ascontiguousarray(values))
+    image.SetSpacing(spacing.tolist())
+    image.SetOrigin(origin.tolist())
     return image

@@ -47,28 +47,19 @@ def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
     """Add weighted points (n, 3), in voxels, blurred by a Gaussian (sd per axis) and integrated over every voxel."""
     reach = np.ceil(CUT * sigma + 0.5).astype(np.int64)
     profile = np.zeros((3, 2 * reach.max() + 1))
-    low = np.empty(3, np.int64)
+    low, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(len(index)):
-        inside = True
         for a in range(3):
             low[a] = int(np.rint(index[n, a])) - reach[a]
-            inside = inside and low[a] >= 0 and low[a] + 2 * reach[a] < out.shape[a]
+            first[a], last[a] = max(0, -low[a]), min(2 * reach[a] + 1, out.shape[a] - low[a])
             scale = 1.0 / (np.sqrt(2.0) * sigma[a])
             below = math.erf((low[a] - 0.5 - index[n, a]) * scale)
             for i in range(2 * reach[a] + 1):
                 above = math.erf((low[a] + i + 0.5 - index[n, a]) * scale)
                 profile[a, i] = 0.5 * (above - below)
                 below = above
-        for i in range(2 * reach[0] + 1):
-            x = low[0] + i
-            if not inside and (x < 0 or x >= out.shape[0]):
-                continue
-            for j in range(2 * reach[1] + 1):
-                y = low[1] + j
-                if not inside and (y < 0 or y >= out.shape[1]):
-                    continue
+        for i in range(first[0], last[0]):
+            for j in range(first[1], last[1]):
                 part = weights[n] * profile[0, i] * profile[1, j]
-                for k in range(2 * reach[2] + 1):
-                    z = low[2] + k
-                    if inside or (0 <= z < out.shape[2]):
-                        out[x, y, z] += part * profile[2, k]
+                for k in range(first[2], last[2]):
+                    out[low[0] + i, low[1] + j, low[2] + k] += part * profile[2, k]

@@ -6,39 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry.scan_grid import ScanGrid, Volume
 from data_synthetic.geometry.vectors import Array
 from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
 from data_synthetic.scanner.particles import CUT, splat, wire_particles
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
 
 WIRE_STEP_VOXELS = 0.1
 """Distance between the discs of points that fill the wire; blurred by 0.8 voxel, nothing of it is left to see."""
-
-
-@dataclass(frozen=True)
-class Greys:
-    """Grey values of the materials, noise and blur.
-
-    wire : with 0.36 mm of wire in 0.3 mm voxels 6000 gives a contrast-to-noise of 12.
-    noise : sd per voxel at a voxel of 0.3 mm. It goes with voxel^-2, as a thin wire's peak does, so that a small study
-    differs in sampling, not in contrast to noise.     correlation_voxels : sd of the noise's own smoothing.
-    psf_voxels : sd of the point spread.     drift : sd of a frame's gain.
-    washout : share of the contrast that is lost while a cone-beam scan turns; the ideal scanner sees the mean.
-    """
-
-    background: float = 100.0
-    contrast: float = 1000.0
-    bone: float = 1300.0
-    wire: float = 6000.0
-    noise: float = 100.0
-    psf_voxels: float = 0.8
-    correlation_voxels: float = 0.5
-    drift: float = 0.005
-    washout: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +28,20 @@ class PsfScanner:
     blurred: Volume
 
     @staticmethod
-    def of(anatomy: Anatomy, bone: Anatomy | None, gap_mm: float, grid: ScanGrid, greys: Greys) -> PsfScanner:
+    def of(phantom: Phantom, grid: ScanGrid) -> PsfScanner:
         """Voxelise the phantom once."""
-        sharp = lumen_coverage(anatomy, grid)
+        greys, sharp = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         sharp *= (1.0 - 0.5 * greys.washout) * (greys.contrast - greys.background)
         sharp += greys.background
-        if bone is not None:
-            share = bone_coverage(bone, anatomy, gap_mm, grid)
+        if phantom.bone is not None:
+            share = bone_coverage(phantom.bone, phantom.anatomy, phantom.bone_gap_mm, grid)
             # bone shares a voxel with tissue, never with lumen: the gap keeps them apart
             sharp += share * (greys.bone - sharp)
         blurred = gaussian_filter(sharp, _psf_voxels(grid, greys), truncate=CUT, mode="nearest")
         return PsfScanner(grid, greys, sharp, blurred)
 
-    def scan(self, wires: Sequence[tuple[Array, float]], seed: Sequence[int]) -> NDArray[np.int16]:
-        """One volume with wires (points (n, 3), radius), its noise drawn from ``seed``."""
+    def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
+        """One volume with wires, indexed x, y, z, its noise drawn from ``seed``."""
         rng = np.random.default_rng(list(seed))
         out = self._noise(rng)
         gain = 1.0 + self.greys.drift * float(rng.normal())

@@ -7,14 +7,7 @@ import json
 import tomllib
 from pathlib import Path
 
-from data_synthetic.write.volumes import (
-    FORMATS,
-    HDF5_FILE,
-    frame_name,
-    frames_name,
-    reference_name,
-    volume_files,
-)
+from data_synthetic.write.volumes import FORMATS, HDF5_FILE, manifest_names, volume_names
 
 MANIFEST, TRUTH = "manifest.toml", "truth.json"
 
@@ -27,33 +20,30 @@ def earlier_files(folder: Path) -> list[Path]:
     try:
         (case,) = tomllib.loads((folder / MANIFEST).read_text(encoding="utf-8"))["case"]
         frames = len(json.loads((folder / TRUTH).read_text(encoding="utf-8"))["frames"])
-        format = {reference_name(f): f for f in FORMATS}[case["reference"]]
-        if case["truth"] != TRUTH or case["frames"] != frames_name(format, frames):
-            return []
     except (OSError, ValueError, KeyError, TypeError):
         return []
-    return [*volume_files(folder, format, frames), folder / TRUTH, folder / MANIFEST]
+    named = {key: case.get(key) for key in ("reference", "frames", "truth")}
+    format = next((f for f in FORMATS if {**manifest_names(f, frames), "truth": TRUTH} == named), None)
+    if format is None:
+        return []
+    paths = [folder / HDF5_FILE] if format == "h5" else [folder / n for n in volume_names(format, frames)]
+    # a DICOM series is a folder of slices: those that are numbered as we number them
+    slices = [
+        p for path in paths for p in ([path] if path.is_file() else sorted(path.glob("[0-9]" * 4 + ".dcm")))
+    ]
+    return [*slices, folder / TRUTH, folder / MANIFEST]
 
 
 def in_the_way(folder: Path, format: str, frames: int) -> list[str]:
-    """A sentence for everything else in the folder that a study would overwrite or be read together with."""
+    """A sentence for what else in the folder a study would overwrite, or would be read together with."""
     if folder.is_file():
         return [f"{folder}: is a file; give a folder"]
-    ours = set(earlier_files(folder))
-    manifest = folder / MANIFEST
+    ours, manifest = set(earlier_files(folder)), folder / MANIFEST
     if manifest.exists() and manifest not in ours:
         return [f"{manifest}: is not a manifest that synth wrote; give another folder"]
-    if format == "h5":
-        kept = {folder / HDF5_FILE}
-        there = set()
-    elif format == "dicom":
-        kept = set()
-        there = {p for i in range(frames) for p in (folder / frame_name(format, i)).glob("*")}
-        there |= set((folder / reference_name(format)).glob("*"))
-    else:
-        kept = {folder / frame_name(format, i) for i in range(frames)}
-        there = set(folder.glob(f"frames/*.{format}"))
-    strange = sorted(there - kept - ours)
+    names = volume_names(format, frames)
+    there = {*folder.glob(f"frames/*.{format}"), *(p for name in names for p in folder.glob(f"{name}/*"))}
+    strange = sorted(there - ours - {folder / name for name in names})
     return (
         [f"{strange[0]}: would be read as a part of the study; remove it or give another folder"]
         if strange
@@ -65,8 +55,6 @@ def remove_earlier(folder: Path) -> None:
     """Remove the files of an earlier study, and the folders that this leaves empty."""
     for path in earlier_files(folder):
         path.unlink()
-        for parent in path.parents:
-            if parent == folder:
-                break
+        for parent in path.relative_to(folder).parents[:-1]:
             with contextlib.suppress(OSError):  # not empty
-                parent.rmdir()
+                (folder / parent).rmdir()

@@ -10,7 +10,7 @@ from typing import Any
 
 from data_synthetic.catalogue.study import Study
 from data_synthetic.write.earlier import MANIFEST, TRUTH, in_the_way, remove_earlier
-from data_synthetic.write.volumes import FORMATS, frames_name, reference_name, write_volume
+from data_synthetic.write.volumes import FORMATS, manifest_names, write_volume
 
 Progress = Callable[[int, int], None]
 
@@ -34,11 +34,11 @@ def write_study(
         raise ValueError("; ".join(problems))
     remove_earlier(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_volume(folder, format, None, study.reference, study.grid)
-    for i, frame in enumerate(study.frames()):
+    write_volume(folder, format, 0, study.reference, study.grid)
+    for i, frame in enumerate(study.frames(), 1):
         write_volume(folder, format, i, frame, study.grid)
         if progress is not None:
-            progress(i + 1, frames)
+            progress(i, frames)
     (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
     manifest = folder / MANIFEST
     manifest.write_text(manifest_text(study, format), encoding="utf-8")
@@ -76,11 +76,7 @@ def manifest_text(study: Study, format: str) -> str:
     """The manifest of a study as TOML."""
     case = dict(study.manifest["case"])
     wall = case.pop("wall")
-    case |= {
-        "reference": reference_name(format),
-        "frames": frames_name(format, len(study.truth)),
-        "truth": TRUTH,
-    }
+    case |= {**manifest_names(format, len(study.truth)), "truth": TRUTH}
     lines = [f"# {study.why}", "schema = 1", ""]
     for name, wire in study.manifest["wires"].items():
         lines += [f"[wires.{name}]", *_table(wire), ""]

@@ -16,51 +16,32 @@ FORMATS = ("mha", "nrrd", "nii.gz", "dicom", "h5")
 HDF5_FILE = "study.h5"
 
 
-def reference_name(format: str) -> str:
-    """The manifest's ``reference``."""
+def volume_names(format: str, frames: int) -> list[str]:
+    """The reference and the frames of a study: files, folders of DICOM slices, or data sets of one HDF5 file."""
     if format == "h5":
-        return f"{HDF5_FILE}#/reference"
-    return "reference" if format == "dicom" else f"reference.{format}"
+        return ["reference", *(f"frames/{i:03d}" for i in range(frames))]
+    ending = "" if format == "dicom" else f".{format}"
+    return [f"reference{ending}", *(f"frames/frame_{i:03d}{ending}" for i in range(frames))]
 
 
-def frames_name(format: str, frames: int) -> str | list[str]:
-    """The manifest's ``frames``."""
+def manifest_names(format: str, frames: int) -> dict[str, str | list[str]]:
+    """``reference`` and ``frames`` of the manifest."""
     if format == "h5":
-        return f"{HDF5_FILE}#/frames"
-    return [frame_name(format, i) for i in range(frames)] if format == "dicom" else f"frames/*.{format}"
+        return {"reference": f"{HDF5_FILE}#/reference", "frames": f"{HDF5_FILE}#/frames"}
+    reference, *names = volume_names(format, frames)
+    return {"reference": reference, "frames": names if format == "dicom" else f"frames/*.{format}"}
 
 
-def frame_name(format: str, number: int) -> str:
-    """One frame: a file or a folder of slices in the study's folder, or a data set in its HDF5 file."""
+def write_volume(folder: Path, format: str, number: int, scan: NDArray[np.int16], grid: ScanGrid) -> None:
+    """Write volume ``number`` of a study: 0 is the reference, which comes first, 1 the first frame."""
+    name = volume_names(format, number)[number]
     if format == "h5":
-        return f"frames/{number:03d}"
-    return f"frames/frame_{number:03d}" + ("" if format == "dicom" else f".{format}")
-
-
-def volume_files(folder: Path, format: str, frames: int) -> list[Path]:
-    """The files that hold the reference and so many frames, as far as they are there."""
-    if format == "h5":
-        paths = [folder / HDF5_FILE]
-    else:
-        paths = [folder / reference_name(format), *(folder / frame_name(format, i) for i in range(frames))]
-    if format == "dicom":
-        paths = sorted(slice for path in paths for slice in path.glob("[0-9][0-9][0-9][0-9].dcm"))
-    return [path for path in paths if path.is_file()]
-
-
-def write_volume(
-    folder: Path, format: str, number: int | None, scan: NDArray[np.int16], grid: ScanGrid
-) -> None:
-    """Write one frame, or the reference where ``number`` is None; the reference comes first."""
-    name = reference_name(format) if number is None else frame_name(format, number)
-    path = folder / name
-    if format == "h5":
-        _write_data_set(folder / HDF5_FILE, name.removeprefix(f"{HDF5_FILE}#/"), scan, grid)
+        _write_data_set(folder / HDF5_FILE, name, scan, grid)
     elif format == "dicom":
-        _write_slices(path, to_image(scan, grid), 1 if number is None else number + 2, grid)
+        _write_slices(folder / name, to_image(scan, grid), number + 1, grid)
     else:
-        path.parent.mkdir(exist_ok=True)
-        sitk.WriteImage(to_image(scan, grid), str(path), useCompression=False)
+        (folder / name).parent.mkdir(exist_ok=True)
+        sitk.WriteImage(to_image(scan, grid), str(folder / name), useCompression=False)
 
 
 def to_image(scan: NDArray[Any], grid: ScanGrid) -> Any:

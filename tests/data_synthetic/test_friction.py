@@ -9,10 +9,10 @@ import pytest
 
 from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.rod.friction import ELASTIC_SLIP_MM, Sliders
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.replay import TrueInsertion, _advance, _rod, replay
 from data_synthetic.rod.rod import edge_lengths, shape_from_points
+from data_synthetic.rod.sliders import ELASTIC_SLIP_MM, Sliders
 from data_synthetic.rod.wire import TrueWire
 
 X, Y, Z = np.eye(3)

@@ -80,7 +80,7 @@ def tube_force(ea: Any, step: float) -> Any:
 
 def truth(rod: Rod) -> Array:
     places = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    start = shape_from_points(rod, places[:, None] * rod.direction)
+    start = shape_from_points(rod, places[:, None] * rod.elastic.introducer)
     return relax(rod, start, 1e-8, 3000).shape.points
 
 

@@ -30,7 +30,7 @@ def cantilever(n: int, rest: float = 0.0, load_N: float = 0.0) -> Equilibrium:
 
 def straight_shape(rod: Rod) -> object:
     places = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    return shape_from_points(rod, places[:, None] * rod.direction)
+    return shape_from_points(rod, places[:, None] * rod.elastic.introducer)
 
 
 @pytest.mark.parametrize(
