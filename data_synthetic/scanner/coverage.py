@@ -16,11 +16,15 @@ SUBSAMPLES = 4
 
 @on_disk()
 def fill_coverage(
-    index: Index, origin: Array, axes: Array, reach: float, sub: int, tubes: TubeTables, out: Volume
+    index: Index, origin: Array, axes: Array, offsets: Array, reach: float, tubes: TubeTables, out: Volume
 ) -> None:
-    """Coverage of listed voxels (n, 3); axes (3, 3) are index steps in mm, reach is half a voxel's diagonal."""
-    # within a sub-cell the wall is taken as a plane: no grain where it is parallel to a face
-    cell = 2.0 * reach / np.sqrt(3.0) / sub
+    """Coverage (n,) of listed voxels (n, 3).
+
+    axes (3, 3) : index steps in mm.     offsets (m, 3) : of sub-voxels from a voxel's centre, mm.
+    reach : half a voxel's diagonal, mm.
+    """
+    # within a sub-voxel the wall is taken as a plane: no grain where it is parallel to a face
+    cell = 2.0 * reach / np.sqrt(3.0) / SUBSAMPLES
     for n in range(len(index)):
         p = origin + axes @ index[n].astype(np.float64)
         f = union_distance((p[0], p[1], p[2]), tubes)[0]
@@ -28,19 +32,10 @@ def fill_coverage(
             out[n] = 1.0 if f < 0 else 0.0
             continue
         inside = 0.0
-        for i in range(sub):
-            for j in range(sub):
-                for k in range(sub):
-                    q = p.copy()
-                    for a in range(3):
-                        q[a] += (
-                            axes[a, 0] * ((i + 0.5) / sub - 0.5)
-                            + axes[a, 1] * ((j + 0.5) / sub - 0.5)
-                            + axes[a, 2] * ((k + 0.5) / sub - 0.5)
-                        )
-                    f = union_distance((q[0], q[1], q[2]), tubes)[0]
-                    inside += min(max(0.5 - f / cell, 0.0), 1.0)
-        out[n] = inside / sub**3
+        for q in offsets:
+            f = union_distance((p[0] + q[0], p[1] + q[1], p[2] + q[2]), tubes)[0]
+            inside += min(max(0.5 - f / cell, 0.0), 1.0)
+        out[n] = inside / len(offsets)
 
 
 def near_tubes(anatomy: Anatomy, grid: ScanGrid, margin_mm: float) -> Index:
@@ -49,14 +44,17 @@ def near_tubes(anatomy: Anatomy, grid: ScanGrid, margin_mm: float) -> Index:
     return voxels_near(grid.to_index(anatomy.tables.points), radii, grid)
 
 
-def lumen_coverage(anatomy: Anatomy, grid: ScanGrid, sub: int = SUBSAMPLES) -> Volume:
-    """Share of every voxel inside the lumen, by ``sub`` cubed sub-cells where the wall crosses it."""
+def lumen_coverage(anatomy: Anatomy, grid: ScanGrid) -> Volume:
+    """Share of every voxel inside the lumen, by SUBSAMPLES cubed sub-cells where the wall crosses it."""
     reach = 0.5 * float(np.linalg.norm(grid.spacing_mm))
     # a smooth union lies outside its tubes by at most a sixth of the blend width
     blend = max(t.blend_mm for t in anatomy.tubes) / 6.0
     index = near_tubes(anatomy, grid, reach + blend)
-    share = np.empty(len(index), dtype=np.float32)
-    fill_coverage(index, grid.origin_mm, grid.direction * grid.spacing_mm, reach, sub, anatomy.tables, share)
+    share, axes = np.empty(len(index), dtype=np.float32), grid.direction * grid.spacing_mm
+    steps = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5
+    i, j, k = (step.reshape(-1, 1) for step in np.meshgrid(steps, steps, steps, indexing="ij"))
+    offsets = axes[:, 0] * i + axes[:, 1] * j + axes[:, 2] * k
+    fill_coverage(index, grid.origin_mm, axes, offsets, reach, anatomy.tables, share)
     out = np.zeros(grid.shape, dtype=np.float32)
     out[tuple(index.T)] = share
     return out
