@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter, spline_filter
+from scipy.ndimage import gaussian_filter, spline_filter, zoom
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
@@ -47,22 +47,13 @@ def iso_wall(values: Volume, grid: ScanGrid, threshold: float) -> IsoWall:
     smooth = gaussian_filter(values, SMOOTHING_VOXELS)
     corners, faces, _, _ = marching_cubes(smooth, threshold)
     triangles = (corners * grid.spacing_mm)[faces]
-    inside = _doubled(smooth) > threshold
+    # linear interpolation at half voxels
+    inside = zoom(smooth, [(2 * n - 1) / n for n in smooth.shape], order=1) > threshold
     fine = ScanGrid(inside.shape, 0.5 * grid.spacing_mm, grid.origin_mm, grid.direction)
     distance = np.full(fine.shape, BAND_MM)
     near, places = _near_surface(triangles, fine)
     distance[tuple(near.T)] = np.minimum(_to_triangles(places, triangles), BAND_MM)
     return IsoWall(fine, spline_filter(np.where(inside, -distance, distance), order=3, mode="mirror"))
-
-
-def _doubled(values: Volume) -> Volume:
-    """Linear interpolation at half voxels."""
-    for axis in range(3):
-        moved = np.moveaxis(values, axis, 0)
-        out = np.empty((2 * len(moved) - 1, *moved.shape[1:]), dtype=np.float32)
-        out[::2], out[1::2] = moved, 0.5 * (moved[1:] + moved[:-1])
-        values = np.moveaxis(out, 0, axis)
-    return values
 
 
 def _near_surface(triangles: Array, fine: ScanGrid) -> tuple[Index, Array]:

@@ -7,8 +7,8 @@ smooth minimum (C2, of compact support: nothing changes where two values differ 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,9 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from data_synthetic.anatomy import _kernels as kernels
 from data_synthetic.geometry.vectors import Array, arc_lengths
+
+STEP_MM = 0.25
+"""Arc length between samples of a tube, about: they divide it evenly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +48,7 @@ class Tube:
         return self.step_mm * (len(self.points_mm) - 1)
 
 
-def sweep(
-    name: str,
-    points_mm: ArrayLike,
-    radii_mm: ArrayLike,
-    *,
-    blend_mm: float = 0.6,
-    step_mm: float = 0.25,
-) -> Tube:
+def sweep(name: str, points_mm: ArrayLike, radii_mm: ArrayLike, *, blend_mm: float = 0.6) -> Tube:
     """A tube through control points (n, 3) with radii (n,) or a number; a C2 spline, resampled by arc length.
 
     Raises ValueError for fewer than two points or a radius that is not positive.
@@ -66,7 +62,7 @@ def sweep(
     curve = CubicSpline(chord, control, bc_type="natural" if len(control) > 2 else "not-a-knot")
     fine = np.linspace(0.0, chord[-1], max(200, int(chord[-1] / 0.01)))
     arc = arc_lengths(curve(fine))
-    count = max(2, round(arc[-1] / step_mm) + 1)
+    count = max(2, round(arc[-1] / STEP_MM) + 1)
     grid = np.linspace(0.0, arc[-1], count)
     parameter = np.interp(grid, arc, fine)
     derivative = curve(parameter, 1)
@@ -87,11 +83,22 @@ class Anatomy:
     """A smooth union of tubes. ``distance`` is negative inside, mm."""
 
     tubes: tuple[Tube, ...]
-    tables: kernels.TubeTables = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        """Lay the tubes out as flat tables for the kernels."""
-        object.__setattr__(self, "tables", _tables(self.tubes))
+    @cached_property
+    def tables(self) -> kernels.TubeTables:
+        """The tubes as the kernels take them."""
+        tubes, balls = self.tubes, [_bounding_balls(t) for t in self.tubes]
+        return kernels.TubeTables(
+            points=np.concatenate([t.points_mm for t in tubes]),
+            tangents=np.concatenate([t.tangents for t in tubes]),
+            radii=np.concatenate([t.radii_mm for t in tubes]),
+            slopes=np.concatenate([t.slopes for t in tubes]),
+            starts=np.cumsum([0, *(len(t.points_mm) for t in tubes)]),
+            steps=np.array([t.step_mm for t in tubes]),
+            blends=np.array([t.blend_mm for t in tubes]),
+            balls=np.concatenate(balls),
+            block_starts=np.cumsum([0, *(len(b) for b in balls)]),
+        )
 
     def distance(self, points_mm: ArrayLike) -> Array:
         """Signed distance (n,) in mm of points (n, 3)."""
@@ -107,22 +114,6 @@ class Anatomy:
     def tube(self, name: str) -> Tube:
         """The tube of that name."""
         return next(t for t in self.tubes if t.name == name)
-
-
-def _tables(tubes: Sequence[Tube]) -> kernels.TubeTables:
-    """The tubes as the kernels take them."""
-    balls = [_bounding_balls(t) for t in tubes]
-    return kernels.TubeTables(
-        points=np.concatenate([t.points_mm for t in tubes]),
-        tangents=np.concatenate([t.tangents for t in tubes]),
-        radii=np.concatenate([t.radii_mm for t in tubes]),
-        slopes=np.concatenate([t.slopes for t in tubes]),
-        starts=np.cumsum([0, *(len(t.points_mm) for t in tubes)]),
-        steps=np.array([t.step_mm for t in tubes]),
-        blends=np.array([t.blend_mm for t in tubes]),
-        balls=np.concatenate(balls),
-        block_starts=np.cumsum([0, *(len(b) for b in balls)]),
-    )
 
 
 def _bounding_balls(tube: Tube) -> Array:

@@ -49,15 +49,13 @@ class WillisPlan:
 
     aneurysm : "terminus", "acoa", "sidewall" or "none".     sac_mm : radius of the sac.     jitter_mm : sd of the
     control points, so that no two seeds share an anatomy.     spread : share of the published sd with which diameters
-    are drawn; half of it keeps a catalogue scene the same situation from seed to seed.     stenosis : share of the
-    cavernous radius taken away.
+    are drawn; half of it keeps a catalogue scene the same situation from seed to seed.
     """
 
     aneurysm: str = "terminus"
     sac_mm: float = 4.0
     jitter_mm: float = 0.3
     spread: float = 0.5
-    stenosis: float = 0.0
     missing: tuple[str, ...] = ()
     tortuous_vertebrals: bool = False
 
@@ -69,12 +67,14 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     points = _control_points()
     if plan.tortuous_vertebrals:
         points["vertebral"] += SWING_MM
+    wide, end = radius["cavernous"], radius["terminus"]
+    # petrous as the terminus widened, cavernous at its own size, tapering to the terminus
+    carotid = np.interp(np.arange(len(points["ICA"])), [0, 8, 10, 14], [0.9 * wide, wide, wide, end])
+    middle = np.r_[0.95 * end, np.full(len(points["M1"]) - 1, radius["M1"])]
+    radii: dict[str, float | Array] = {**radius, "ICA": carotid, "M1": middle}
     tubes: list[Tube] = []
     jitter = {name: rng.normal(0.0, plan.jitter_mm, (60, 3)) for name in ("right", "left")}
     for side, sign in (("right", 1.0), ("left", -1.0)):
-        carotid = _carotid_radii(radius, plan.stenosis if side == "right" else 0.0)
-        middle = np.r_[0.95 * radius["terminus"], np.full(len(points["M1"]) - 1, radius["M1"])]
-        radii: dict[str, float | Array] = {**radius, "ICA": carotid, "M1": middle}
         for name in BOTH_SIDES:
             # ends that meet others are not moved
             moved = points[name].copy()
@@ -98,14 +98,6 @@ def _control_points() -> dict[str, Array]:
 def _draw(rng: np.random.Generator, mean: float, sd: float, spread: float) -> float:
     """A diameter from a normal distribution, cut at SPREAD_LIMIT."""
     return mean + sd * float(np.clip(rng.normal(0.0, spread), -SPREAD_LIMIT, SPREAD_LIMIT))
-
-
-def _carotid_radii(radius: dict[str, float], stenosis: float) -> Array:
-    """Petrous as the terminus widened, cavernous at its own size, tapering to the terminus: one per control point."""
-    wide, end = radius["cavernous"], radius["terminus"]
-    radii = np.interp(np.arange(15), [0, 8, 10, 14], [0.9 * wide, wide, wide, end])
-    radii[7] *= 1.0 - stenosis
-    return radii
 
 
 def _aneurysm(plan: WillisPlan, carotid: Tube, acoa_mm: Array, radius: dict[str, float]) -> list[Tube]:

@@ -17,16 +17,7 @@ from data_synthetic.catalogue.study import Study, make_study
 from data_synthetic.scanner import PsfScanner
 from data_synthetic.scanner.conebeam import ConeBeamScanner
 
-__all__ = [
-    "SCANNERS",
-    "Wanted",
-    "background_scene",
-    "build",
-    "describe",
-    "from_anatomy",
-    "from_background",
-    "names",
-]
+__all__ = ["Wanted", "background_scene", "build", "describe", "from_anatomy", "from_background", "names"]
 
 SCANNERS: dict[str, ScannerFactory] = {"psf": PsfScanner.of, "conebeam": ConeBeamScanner.of}
 """What turns a phantom into grey values: the ideal scanner, and 3D rotational X-ray (needs the extra [conebeam])."""

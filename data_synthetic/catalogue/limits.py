@@ -39,16 +39,13 @@ class Wanted:
         found = []
         if scanner == "conebeam" and importlib.util.find_spec("itk") is None:
             found.append(ABSENT)
-        if self.frames is not None and self.frames < 1:
-            found.append(f"frames: got {self.frames}; allowed: 1 or more; leave it out for the scene's own")
+        # what a scene asks of its size is said where there is a scene
+        size = self.size if scene is None else None
+        for name, value, least in (("frames", self.frames, 1), ("size", size, 1), ("seed", self.seed, 0)):
+            if value is not None and value < least:
+                found.append(f"{name}: got {value}; allowed: {least} or more; leave it out for the default")
         if self.voxel_mm is not None and not 0 < self.voxel_mm < math.inf:
-            found.append(
-                f"voxel-mm: got {self.voxel_mm:g}; allowed: above 0; leave it out for the scene's own"
-            )
-        if self.seed < 0:
-            found.append(f"seed: got {self.seed}; allowed: 0 or more; leave it out for 0")
-        if scene is None and self.size is not None and self.size < 1:
-            found.append(f"size: got {self.size}; allowed: 1 or more; leave it out for the scene's own")
+            found.append(f"voxel-mm: got {self.voxel_mm:g}; allowed: above 0; leave it out for the default")
         # a real scan is as large as it is
         return found if found or scene is None or scene.scan is not None else self._too_small(scene)
 

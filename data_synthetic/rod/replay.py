@@ -36,11 +36,11 @@ class TrueInsertion:
     """What is done to the wire: where it enters, what it meets, and how finely that is computed.
 
     step_mm : node spacing.     advance_mm : insertion between two equilibria (defaults to the node spacing).
-    friction : Coulomb's coefficient at the wall; 0 computes nothing.     tip_load_N : a dead load, for closed forms.
+    friction : Coulomb's coefficient at the wall; 0 computes nothing.
     """
 
     wire: TrueWire
-    wall: Wall | None
+    wall: Wall
     stiffness_N_mm2: float
     entry_mm: Array
     direction: Array
@@ -48,7 +48,6 @@ class TrueInsertion:
     step_mm: float = 0.2
     advance_mm: float | None = None
     friction: float = 0.0
-    tip_load_N: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +129,7 @@ def _rod(insertion: TrueInsertion, depth: float, roll_deg: float) -> Rod:
     direction = unit(insertion.direction)
     director = rotate(normal_to(insertion.material_axis, direction), direction, np.radians(roll_deg))
     rod = make_rod(insertion.wire, direction, director, depth, insertion.step_mm)
-    loads = None
-    if insertion.tip_load_N is not None:
-        loads = np.zeros((len(rod.lengths) + 1, 3))
-        loads[-1] = insertion.tip_load_N
-    return replace(rod, wall=insertion.wall, stiffness_N_mm2=insertion.stiffness_N_mm2, loads_N=loads)
+    return replace(rod, wall=insertion.wall, stiffness_N_mm2=insertion.stiffness_N_mm2)
 
 
 def _advance(

@@ -49,7 +49,5 @@ def _on_the_way(insertion: TrueInsertion, frame: TrueFrame, way_mm: Array, corri
     short = arc_lengths(way_mm)[foot] < 0.7 * frame.depth_mm - corridor_mm
     if away[foot] > corridor_mm or short or frame.jump_mm > LARGEST_JUMP_MM:
         return False
-    if insertion.wall is None:
-        return True
     phi = insertion.wall.distance_and_gradient(frame.points_mm)[0]
     return bool(np.max(phi + insertion.wire.radius_mm) < DEEPEST_MM)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects
 
 from data_synthetic.geometry.scan_grid import ScanGrid, Volume
 from data_synthetic.geometry.vectors import Array
@@ -78,11 +79,11 @@ class CArm:
 
     def paths(self, share: Volume) -> Volume:
         """Path lengths (stack) in mm through shares of voxels of the grid; only the box that is filled is projected."""
-        filled = [np.flatnonzero(share.any(axis=tuple({0, 1, 2} - {a}))) for a in range(3)]
-        if not len(filled[0]):
+        filled = find_objects((share > 0).astype(np.int8))
+        if not filled:
             return np.zeros((self.arc.projections, self.arc.pixels, self.arc.pixels), dtype=np.float32)
-        low = np.array([max(f[0] - BORDER, 0) for f in filled])
-        high = np.minimum([f[-1] + 1 + BORDER for f in filled], share.shape)
+        low = np.array([max(f.start - BORDER, 0) for f in filled[0]])
+        high = np.minimum([f.stop + BORDER for f in filled[0]], share.shape)
         part = share[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
         centre = (0.5 * (low + high - 1) - 0.5 * (np.array(share.shape) - 1)) * self.grid.spacing_mm
         return self.line_integrals(part, self.grid.spacing_mm, centre)

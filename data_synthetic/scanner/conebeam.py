@@ -108,14 +108,10 @@ class ConeBeamScanner:
 
     def wire_paths(self, wires: Wires) -> Volume | np.float32:
         """Path lengths of wire in mm, from a grid of half voxels around it."""
-        if not wires:
-            return np.float32(0.0)
-        out = np.zeros_like(self.contrast)
-        for points, radius in wires:
-            out += self._wire_path(points, radius)
-        return out
+        return sum((self._wire_path(points, radius) for points, radius in wires), np.float32(0.0))
 
     def _wire_path(self, points: Array, radius: float) -> Volume:
+        """Path lengths of one wire."""
         grid = self.arm.grid
         fine = 0.5 * grid.spacing_mm
         middle = 0.5 * (np.array(grid.shape) - 1)

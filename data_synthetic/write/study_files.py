@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +25,8 @@ def write_study(
     """
     folder, frames = Path(folder), len(study.truth)
     if format not in FORMATS:
-        msg = (
-            f"synthetic study {study.name}: format: got {format!r}; allowed: {', '.join(FORMATS)}; choose one"
-        )
+        allowed = f"allowed: {', '.join(FORMATS)}; choose one"
+        msg = f"synthetic study {study.name}: format: got {format!r}; {allowed}"
         raise ValueError(msg)
     problems = in_the_way(folder, format, frames)
     if problems:
@@ -85,15 +84,5 @@ def manifest_text(study: Study, format: str) -> str:
 
 
 def _table(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {toml_value(value)}" for key, value in values.items()]
-
-
-def toml_value(value: Any) -> str:
-    """A number, text or nested list as TOML."""
-    if isinstance(value, str):
-        return json.dumps(value)
-    if isinstance(value, Sequence):
-        return f"[{', '.join(toml_value(v) for v in value)}]"
-    if isinstance(value, float) and not math.isfinite(value):
-        return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
-    return repr(value)
+    """Lines of TOML: numbers, texts and nested lists are written there as in JSON, but for an infinite number."""
+    return [f"{key} = {'inf' if value == math.inf else json.dumps(value)}" for key, value in values.items()]

@@ -9,9 +9,10 @@ import pytest
 
 from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.rod import replay as replaying
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.replay import TrueInsertion, _advance, _rod, replay
-from data_synthetic.rod.rod import edge_lengths, shape_from_points
+from data_synthetic.rod.rod import Rod, edge_lengths, shape_from_points
 from data_synthetic.rod.sliders import ELASTIC_SLIP_MM, Sliders
 from data_synthetic.rod.wire import TrueWire
 
@@ -26,16 +27,29 @@ def bend() -> Anatomy:
     return shapes.bend(turn_mm=TURN_MM)
 
 
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dead load on the tip of every wire."""
+
+    def with_load(insertion: TrueInsertion, depth: float, roll_deg: float) -> Rod:
+        rod = _rod(insertion, depth, roll_deg)
+        loads = np.zeros((len(rod.lengths) + 1, 3))
+        loads[-1] = LOAD_N * X
+        return replace(rod, loads_N=loads)
+
+    monkeypatch.setattr(replaying, "_rod", with_load)
+
+
 def soft_wire_around(bend: Anatomy, friction: float) -> TrueInsertion:
     """A wire as soft as a thread, drawn round the inner side of a bend of 90 degrees by a dead load."""
     wire = TrueWire(0.18, ((0.0, SOFT_N_MM2),), ((0.0, 0.0),))
     entry = np.array([INNER_MM, 0.0, -6.0])  # in line with the inner side, so that the clamp turns nothing
-    return TrueInsertion(wire, bend, 20.0, entry, Z, X, 0.4, 0.4, friction, LOAD_N * X)
+    return TrueInsertion(wire, bend, 20.0, entry, Z, X, 0.4, 0.4, friction)
 
 
 def laid_around(insertion: TrueInsertion) -> Equilibrium:
     """At rest without friction: straight up, round the inner side, straight on."""
-    rod = _rod(insertion, DEPTH_MM, 0.0)
+    rod = replaying._rod(insertion, DEPTH_MM, 0.0)
     arc = np.concatenate([[0.0], np.cumsum(rod.lengths)])
     turn = TURN_MM - INNER_MM
     angle = np.clip((arc - 6.0) / turn, 0.0, np.pi / 2)
@@ -62,6 +76,7 @@ def drawn_then_let_in(insertion: TrueInsertion) -> tuple[float, float]:
     return tensions[0], tensions[1]
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("friction", [0.1, 0.3])
 def test_capstan(bend: Anatomy, friction: float) -> None:
     """Euler: the tension behind a turn of theta is the load times exp(-mu theta) let in, exp(mu theta) drawn back."""
@@ -71,6 +86,7 @@ def test_capstan(bend: Anatomy, friction: float) -> None:
     assert drawn == pytest.approx(LOAD_N * turn, rel=0.01)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_without_friction_the_tension_is_the_load(bend: Anatomy) -> None:
     for tension in drawn_then_let_in(soft_wire_around(bend, 0.0)):
         assert tension == pytest.approx(LOAD_N, rel=2e-3)

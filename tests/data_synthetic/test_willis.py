@@ -59,8 +59,6 @@ def test_aneurysms_are_sacs_that_open_into_their_vessel(place: str) -> None:
     assert np.all(tree.distance(neck) < -0.4), "a way in"
 
 
-def test_a_stenosis_narrows_one_carotid_and_a_tortuous_vertebral_winds() -> None:
-    narrow = build(stenosis=0.6)
-    assert narrow.tube("right.ICA").radii_mm.min() < 0.6 * narrow.tube("left.ICA").radii_mm.min()
+def test_a_tortuous_vertebral_winds() -> None:
     plain, winding = (build(tortuous_vertebrals=t).tube("right.vertebral") for t in (False, True))
     assert turning_deg(winding) > turning_deg(plain) + 60
