@@ -32,7 +32,8 @@ def missing_wire(rng: np.random.Generator, frames: int) -> Setup:
     return replace(bend.plan(rng, frames), visible=tuple(i != frames // 2 for i in range(frames)))
 
 
-@scene("two-wires", tries="trace report", frames=5, expected="trace_ambiguous")
+# the wires have to be told from each other
+@scene("two-wires", tries="trace report", frames=5, voxels_across=8.5, expected="trace_ambiguous")
 def two_wires(_rng: np.random.Generator, frames: int) -> Setup:
     """a second wire left in the trunk: only one of them is meant"""
     setup = plain_setup(shapes.bifurcation(), frames, 30.0)

@@ -12,9 +12,9 @@ from data_synthetic.catalogue.scene import NamedScene, Setup
 from data_synthetic.geometry.vectors import arc_lengths
 from data_synthetic.scanner.c_arm import ABSENT
 
-BONE_WIRES = 2.0
+BONE_WIRES = 1.8
 """Wire diameters that a voxel beside bone may be wide. A wire's peak falls with the voxel's area, what bone leaves in
-the difference of two scans does not: a wire of 0.36 mm is traced with voxels of 0.7 mm, and lost from 0.75 mm on."""
+the difference of two scans does not: a wire of 0.36 mm is traced with voxels of 0.65 mm, and lost from 0.75 mm on."""
 
 
 @dataclass(frozen=True)

@@ -87,9 +87,10 @@ class NamedScene:
     """A name, one line of why, natural sizes, and how to plan it from a seeded generator and a number of frames.
 
     tries : stages of the pipeline that it was made to try.     fov_mm : edge of the field of view, so that a smaller
-    ``size`` means larger voxels of the same scene.     voxels_across : the lumen that is entered must be as wide as
-    this many voxels to be segmented.     expected : the status of every frame that the pipeline should end in (its
-    identifier), or one per frame; a bar separates what is equally right.
+    ``size`` means larger voxels of the same scene.     voxels_across : how many must fit across the lumen that is
+    entered; with five every lumen is segmented, with four and a half that of ``straight`` is not.
+    expected : the status of every frame that the pipeline should end in (its identifier), or one per frame; a bar
+    separates what is equally right.
     steer : chooses roll and depths where the plan leaves them open.     scan : a real scan brings its own voxels.
     """
 
@@ -100,7 +101,7 @@ class NamedScene:
     fov_mm: float = 48.0
     size: int = 160
     frames: int = 6
-    voxels_across: float = 4.6
+    voxels_across: float = 5.0
     expected: str | Callable[[int], Sequence[str]] = "ok"
     steer: Callable[[Setup], Setup] | None = None
     scan: tuple[ScanGrid, ScannerFactory] | None = None

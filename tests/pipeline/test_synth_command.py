@@ -36,7 +36,7 @@ def test_wrong_words(
         (["bend", "--size", "0"], "allowed for bend: 48 or more"),
         (["bend", "--size", "-1"], "allowed for bend: 48 or more"),
         (["straight", "--size", "64"], "allowed for straight: 72 or more"),
-        (["siphon", "--size", "64"], "allowed for siphon: 74 or more for voxels no wider than 2 wires"),
+        (["siphon", "--size", "64"], "allowed for siphon: 82 or more for voxels no wider than 1.8 wires"),
         (["bend", "--voxel-mm", "0"], "voxel-mm: got 0; allowed: above 0"),
         (["bend", "--voxel-mm", "-0.5"], "voxel-mm: got -0.5; allowed: above 0"),
         (["bend", "--voxel-mm", "nan"], "voxel-mm: got nan; allowed: above 0"),
@@ -61,7 +61,7 @@ def test_wrong_numbers_are_refused_before_any_truth_is_computed(
 def test_a_study_written_over_an_earlier_one_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["synth", "short-wire", "-o", str(tmp_path / "study"), "--size", "45"]
+    words = ["synth", "short-wire", "-o", str(tmp_path / "study"), "--size", "54"]
     for frames in ("3", "2"):
         assert main([*words, "--frames", frames]) == 0
     assert "an earlier study is replaced: its 6 files are removed" in capsys.readouterr().out
