@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from data_synthetic import catalogue
-from data_synthetic.shapes import WillisPlan, circle_of_willis
-from data_synthetic.tubes import Anatomy
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.anatomy.willis import WillisPlan, circle_of_willis
 from solver import Grid, GuideWire, VesselWall
 
 Array = NDArray[np.float64]
