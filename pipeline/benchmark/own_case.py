@@ -9,7 +9,7 @@ from pipeline.benchmark.scenes import BenchScene
 from pipeline.run.cache import Store, default_root
 from pipeline.run.progress import CaseProgress
 from pipeline.run.stages import CaseRun, run_stages
-from pipeline.simulate.replay import rolls
+from pipeline.simulate.replay import guide_wire, rolls
 from pipeline.study.config import Config
 from pipeline.study.manifest import Case, read_manifest
 
@@ -37,17 +37,13 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         raise NoScene(msg)
     return BenchScene(
         case.id,
-        "the user's own case",
         max(case.insertion_mm),
         step_mm=config.solver.step_mm,
         entry_mm=case.entry_mm,
         direction=case.entry_direction,
         material_axis=case.material_axis,
         roll_deg=rolls(case, len(case.insertion_mm), config.simulate)[-1],
-        radius_mm=case.wire.radius_mm,
-        stiffness=case.wire.bending_stiffness_N_mm2,
-        rest=case.wire.rest_curvature_per_mm,
-        torsion=case.wire.torsional_stiffness_N_mm2,
+        guide_wire=guide_wire(case.wire, config.solver, config.simulate),
         wall_stiffness=case.wall.stiffness_N_mm2,
         friction=case.wall.friction,
         ready=run.lumen.distance,

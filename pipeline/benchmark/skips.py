@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pipeline.benchmark import scenes
 from pipeline.benchmark.claim import Claim
-from pipeline.benchmark.clock import timed
-from pipeline.benchmark.insert import Setting, insert
+from pipeline.benchmark.insert import Setting, insert, timed
 from pipeline.benchmark.scenes import BenchScene
 from solver.relax import Settings
 
@@ -25,11 +25,11 @@ def skips() -> Iterator[Claim]:
     for name in on._fields:
         hull = MANY_LOOK_UPS if name in ("clearance", "cheap") else "offset"
         # only in a long sheath does what the tip meets die out before it comes to the base
-        scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(60.0), 0.5)
+        scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(), 0.5)
         wall, off = scene.wall(hull), on._replace(**{name: False})
         # wires are compared at a tolerance so tight that where an iteration stops does not show
         tight = Setting(segment, hull=hull, tolerance=1e-13)
-        with_skip, without = (insert(scene, tight, wall, s).joints_mm for s in (on, off))
+        with_skip, without = (insert(scene, tight, wall, s).last.joints_mm for s in (on, off))
         apart = float(np.abs(with_skip - without).max())
         aim = "at most 1e-6 (algebraic skips 1e-12)"
         where = f"skip {name} off ({scene.name}, hull {hull})"
@@ -41,7 +41,7 @@ def skips() -> Iterator[Claim]:
 def _slower(scene: BenchScene, setting: Setting, wall: Any, on: Any, off: Any) -> float:
     """Median time without over median time with a skip, in turns."""
     seconds = [
-        [timed(lambda s=switch: insert(scene, setting, wall, s), 1)[0] for switch in (on, off)]  # type: ignore[misc]
+        [timed(partial(insert, scene, setting, wall, switch), 1)[0] for switch in (on, off)]
         for _ in range(PAIRS)
     ]
     with_skip, without = np.median(seconds, axis=0)

@@ -1,20 +1,17 @@
-"""What a benchmark leaves: tidy tables, a page, and the settings to use, in words."""
+"""The page of a benchmark, made of the tables that its parts leave in the folder."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from pipeline.benchmark.claim import Claim
 from pipeline.run.provenance import collect
-from reports.bench import BENCH_COLUMNS, CLAIM_COLUMNS, ORDER_COLUMNS, recommended, render_bench
+from reports.bench import BENCH_COLUMNS, render_bench
 
 SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"
 CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
 STRESS_CSV, SCENES_CSV = "stress.csv", "stress_scenes.csv"
-TARGETS_MM = (0.1, 0.01)
 
 
 def machine() -> str:
@@ -38,25 +35,6 @@ def note() -> str:
     )
 
 
-def write_claims(found: Sequence[Claim], out: Path) -> None:
-    """claims.csv, a row a claim, and orders.csv, a row for each point that an order was fitted to."""
-    rows = [{column.name: getattr(c, column.name) for column in CLAIM_COLUMNS} for c in found]
-    pd.DataFrame(rows).to_csv(out / CLAIMS_CSV, index=False)
-    points = [
-        {
-            "against": c.against,
-            "size": size,
-            "error": error,
-            "unit": c.error_unit,
-            "order": c.value,
-            "aim": c.aim,
-        }
-        for c in found
-        for size, error in zip(c.sizes, c.errors, strict=True)
-    ]
-    pd.DataFrame(points, columns=[c.name for c in ORDER_COLUMNS]).to_csv(out / ORDERS_CSV, index=False)
-
-
 def write_page(out: Path) -> Path:
     """Join what lies in the folder into bench.csv and render it."""
     parts = [pd.read_csv(out / name) for name in (SOLVER_CSV, PEERS_CSV) if (out / name).exists()]
@@ -65,20 +43,3 @@ def write_page(out: Path) -> Path:
     table.to_csv(out / BENCH_CSV, index=False)
     others = [out / name if (out / name).exists() else None for name in (STRESS_CSV, CLAIMS_CSV, ORDERS_CSV)]
     return render_bench(out / BENCH_CSV, out, *others, note=note())
-
-
-def advice(rows: pd.DataFrame) -> Iterator[str]:
-    """The fastest setting of each scene within each target error, a line each."""
-    best = recommended(rows)
-    for target in TARGETS_MM:
-        for scene in dict.fromkeys(rows["scene"]):
-            mine = best[(best["scene"] == scene) & (best["target_mm"] == target)] if len(best) else best
-            if mine.empty:
-                yield f"{scene}: no setting reaches {target:g} mm"
-                continue
-            row = mine.iloc[0]
-            yield (
-                f"{scene}: for {target:g} mm use {row['method']}, segment {row['segment_mm']:g} mm, "
-                f"hull {row['hull']}, quadrature {row.get('quadrature', '-')}, tolerance {row['tolerance']:g}: "
-                f"{row['ms_per_mm']:.3g} ms per mm, {row['shape_error_mm']:.2g} mm"
-            )

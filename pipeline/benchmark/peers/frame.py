@@ -1,0 +1,158 @@
+"""What every rival is asked, what its file has to provide, and how its answer is timed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import process_time
+from typing import ClassVar
+
+import numpy as np
+
+from pipeline.benchmark import scenes
+from pipeline.benchmark.scenes import BenchScene
+from pipeline.model import Array
+from solver import VesselWall
+
+EI = scenes.STIFFNESS
+RADIUS_MM = scenes.RADIUS_MM
+EA_N = 4.0 * EI / RADIUS_MM**2
+"""Of a round wire of one material: with 1.2 kN, 1 mN stretch it by 1e-6, as good as the chain's not at all."""
+GJ = EI / 1.3
+"""Of the same material with a Poisson number of 0.3."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Scene A ("cantilever") or B ("bend") with the wire in ``n`` segments, pushed in by so many steps per mm."""
+
+    scene: str
+    n: int
+    per_mm: int = 1
+
+    @property
+    def set_up(self) -> BenchScene:
+        """Wire, wall and load."""
+        return scenes.cantilever() if self.scene == "cantilever" else scenes.bend()
+
+    def depths(self) -> list[float]:
+        """How much of the wire lies beyond the entry after each push; a free wire is bent at once."""
+        length = self.set_up.depth_mm
+        count = 1 if self.scene == "cantilever" else round(length) * self.per_mm
+        return [length * (i + 1) / count for i in range(count)]
+
+
+class NodalWall:
+    """A wall as a force on n + 1 nodes, and the time that asking it took.
+
+    A node stands for a segment of wire, the last one for half of one, the one at the clamp for none.
+    """
+
+    def __init__(self, wall: VesselWall, n: int, segment_mm: float) -> None:
+        self.wall, self.seconds = wall, 0.0
+        self.stiffness_N_mm = wall.stiffness_N_mm2 * np.full(n + 1, segment_mm)
+        self.stiffness_N_mm[[0, -1]] *= (0.0, 0.5)
+
+    def forces(self, points: Array) -> Array:
+        """Forces (n + 1, 3), N."""
+        return self.forces_and_stiffness(points)[0]
+
+    def forces_and_stiffness(self, points: Array) -> tuple[Array, Array]:
+        """Forces (n + 1, 3) and the derivative of minus the force by the place (n + 1, 3, 3), N/mm."""
+        start = process_time()
+        phi, gradient, hessian = self.wall.look_up(points)
+        depth = np.maximum(phi + RADIUS_MM, 0.0)
+        force = -(self.stiffness_N_mm * depth)[:, None] * gradient
+        touching = (self.stiffness_N_mm * (depth > 0))[:, None, None]
+        outer = gradient[:, :, None] * gradient[:, None, :]
+        matrix = touching * (outer + depth[:, None, None] * hessian)
+        self.seconds += process_time() - start
+        return force, matrix
+
+
+class RivalWire(ABC):
+    """A rival's wire in one task, built before the clock runs.
+
+    name : as the tables call it.     segments_a, segments_b : numbers of segments to try in scenes A and B.
+    per_mm : steps per mm to try in scene B with 60 segments.     repeats : of a task, whose median times count.
+    before_clamp : share of a segment that lies before the clamp.
+    status : what the simulator itself says of its answer.     note : how it was set up; "{steps}" stands for the
+    time steps that it took.
+    """
+
+    name: ClassVar[str]
+    segments_a: ClassVar[Sequence[int]] = ()
+    segments_b: ClassVar[Sequence[int]] = ()
+    per_mm: ClassVar[Sequence[int]] = (1,)
+    repeats: ClassVar[int] = 1
+    before_clamp: ClassVar[float] = 0.0
+    status = "converged"
+    note = ""
+
+    def __init__(self, task: Task) -> None:
+        """Take down what all need."""
+        scene, wall = task.set_up, task.set_up.wall()
+        self.task, self.length_mm, self.steps = task, scene.depth_mm, 0
+        self.segment_mm = scene.depth_mm / (task.n - self.before_clamp)
+        self.wall = None if wall is None else NodalWall(wall, task.n, self.segment_mm)
+        # of the wall at a node inside, N/mm
+        self.wall_N_mm = 0.0 if wall is None else wall.stiffness_N_mm2 * self.segment_mm
+        # where the clamp is before the first push: scene B's wire starts in the tube before the entry
+        self.start_mm = 0.0 if wall is None else -scene.depth_mm
+        # the longest stretch that nothing holds: in the tube about half the wire
+        self.free_mm = scene.depth_mm if wall is None else 0.5 * scene.depth_mm
+        self.load_N = np.zeros((task.n + 1, 3))
+        self.load_N[-1] = scene.load_N
+
+    def forces(self, points: Array) -> Array:
+        """Load or wall at the nodes, both (n + 1, 3), N and mm."""
+        return self.load_N if self.wall is None else self.wall.forces(points)
+
+    def rest(self, advance: Callable[[], Array], still_mm: float, most: int) -> None:
+        """Call ``advance`` until no node that it returns is further than this from where it was one call before."""
+        before = self.points()
+        for _ in range(most):
+            now = advance()
+            if np.abs(now - before).max() < still_mm:
+                return
+            before = now
+        msg = f"{self.name}: not at rest after {self.steps} steps"
+        raise RuntimeError(msg)
+
+    @abstractmethod
+    def push(self, depth_mm: float) -> None:
+        """Bring the wire to rest with so much of it beyond the entry."""
+
+    @abstractmethod
+    def points(self) -> Array:
+        """Nodes (m, 3) mm, the last one at the tip."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A rival's answer. points_mm (m, 3), the last one at the tip.     seconds (pushes,) of processor time.
+
+    callback : share of the time that was spent in the Python callback that is the wall.
+    """
+
+    name: str
+    note: str
+    status: str
+    points_mm: Array
+    seconds: Array
+    callback: float
+
+
+def measured(rival: type[RivalWire], task: Task, pushes: int | None = None) -> Measured:
+    """Build a rival's wire, push it in (so often, else all the way), and read it off."""
+    wire = rival(task)
+    seconds = []
+    for depth in task.depths()[:pushes]:
+        start = process_time()
+        wire.push(depth)
+        seconds.append(process_time() - start)
+    callback = float("nan") if wire.wall is None else wire.wall.seconds / sum(seconds)
+    each = f"{wire.steps} steps" if len(seconds) == 1 else f"{wire.steps / len(seconds):.0f} steps per push"
+    note = wire.note.format(steps=each)
+    return Measured(wire.name, note, wire.status, wire.points(), np.array(seconds), callback)

@@ -1,0 +1,161 @@
+"""The whole study: scenes in, tables out. Each row is on disk as soon as its scene has ended."""
+
+from __future__ import annotations
+
+import csv
+import io
+import multiprocessing
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import pandas as pd
+
+from pipeline.benchmark.isolate import Lost, alone
+from pipeline.benchmark.page import SCENES_CSV, STRESS_CSV
+from pipeline.benchmark.stress.axes import AXES, draw
+from pipeline.benchmark.stress.plan import SHOWN
+from pipeline.benchmark.stress.scene_run import Outcome, run_scene
+from solver import warm_up
+from solver._compile import hash_of
+
+SCENES, QUICK_SCENES = 5000, 200
+LIMIT_S = 60.0
+"""Processor time beyond which a scene hangs: the work of a depth is limited, the slowest scene takes some 15 s."""
+BUSY = 10.0
+"""A busy machine gives a process a tenth of a core; one that is silent for longer waits for something."""
+
+
+def run_isolated(
+    seed: int, indices: Iterable[int], jobs: int = 1, limit_s: float = LIMIT_S
+) -> Iterator[Outcome]:
+    """Outcomes of the scenes in the order of the indices, ``jobs`` of them at a time.
+
+    The seam to any other executor: ``_run_alone`` is an ordinary function of an index, and the worker that calls it
+    never dies of a scene. Kernels are compiled here, once, and loaded by each worker before its first scene.
+    """
+    warm_up(beside=True)
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), initializer=warm_up)
+    try:
+        yield from pool.map(partial(_run_alone, run_scene, limit_s, seed), indices)
+    finally:
+        # a study that is broken off does not run on to its end
+        pool.shutdown(cancel_futures=True)
+
+
+def _run_alone(run: Callable[[int, int], Outcome], limit_s: float, seed: int, index: int) -> Outcome:
+    """Run one scene in a fork of this process, whose kernels are warm; a crash or a hang is its outcome."""
+    answer = alone("fork", partial(run, seed, index), BUSY * limit_s, limit_s)
+    if isinstance(answer, Lost):
+        return Outcome(index, draw(seed, index).axes, answer.fault, answer.fault, answer.reason)
+    return answer
+
+
+def version() -> str:
+    """Ten hex digits of everything that decides how a scene ends: the solver's sources and the study's own."""
+    return hash_of(Path(__file__))[:10]
+
+
+def run_stress(
+    seed: int,
+    indices: Sequence[int],
+    jobs: int = 1,
+    say: Callable[[str], None] = lambda _: None,
+    path: Path | None = None,
+) -> pd.DataFrame:
+    """One row per scene: index, axes, outcome, fault, detail, iterations, residual, stretch, seconds, setting.
+
+    say : gets a line for every fault, and one for every 250 scenes with their rate.
+    path : a CSV file that gets each row as its scene ends; the rows of this seed and of the same sources that are
+    there already are kept and not run again.
+    """
+    sources, began = version(), perf_counter()
+    rows = _rows_at(path, seed, sources, indices)
+    known = {row["index"] for row in rows}
+    left = [index for index in indices if index not in known]
+    with path.open("w", newline="", encoding="utf-8") if path else io.StringIO() as file:
+        writer = csv.DictWriter(file, list(KINDS))
+        writer.writeheader()
+        writer.writerows(rows)
+        for number, done in enumerate(run_isolated(seed, left, jobs), 1):
+            rows.append(_row(seed, sources, done))
+            writer.writerow(rows[-1])
+            file.flush()
+            if done.fault:
+                say(f"scene {done.index}: {done.fault}: {done.detail}")
+            if number % 250 == 0:
+                rate = number / (perf_counter() - began)
+                say(f"scene {done.index} of {len(indices)}: {number} run now, {rate:.3g} a second")
+    return pd.DataFrame(rows).sort_values("index", ignore_index=True)
+
+
+def _row(seed: int, sources: str, done: Outcome) -> dict[str, Any]:
+    plan = draw(seed, done.index)
+    row = {**vars(done), "axes": " ".join(done.axes), **{name: getattr(plan, name) for name in SHOWN}}
+    return {**row, "axis": done.axes[0], "seed": seed, "version": sources}
+
+
+KINDS = {name: type(value) for name, value in _row(0, "", Outcome(0, ("",), "")).items()}
+"""The columns of the table of scenes, and what is in them."""
+
+
+def _rows_at(path: Path | None, seed: int, sources: str, indices: Collection[int]) -> list[dict[str, Any]]:
+    """Rows of this seed and version in a table; others are left out, and so is a last line that was cut off."""
+    if path is None or not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        # the version is the last column: a line without it is no whole line
+        mine = [r for r in csv.DictReader(file) if r.get("version") == sources and r.get("seed") == str(seed)]
+    rows = [{name: _typed(kind, row[name]) for name, kind in KINDS.items()} for row in mine]
+    wanted = set(indices)
+    return list({row["index"]: row for row in rows if row["index"] in wanted}.values())
+
+
+def _typed(kind: type, text: str) -> Any:
+    """A field of the table; a number that a scene does not have is an empty field, or says nan."""
+    return kind(text or "nan") if kind is float else kind(text)
+
+
+def measure_stress(out: Path, say: Callable[[str], None], seed: int, count: int) -> bool:
+    """Random scenes and their tables; False where one ended otherwise than it may."""
+    path = out / SCENES_CSV
+    rows = run_stress(seed, range(count), min(2, os.cpu_count() or 1), say, path)
+    rows.to_csv(path, index=False)
+    table = stress_table(rows)
+    table.to_csv(out / STRESS_CSV, index=False)
+    wide = table.pivot_table(index="axis", columns="outcome", values="count", fill_value=0, sort=False)
+    say(wide.astype(int).to_string())
+    whole = table[table["axis"] == "all"].drop(columns="axis")
+    say(whole.to_string(index=False, float_format=lambda v: f"{v:.3g}"))
+    faults = int((rows["fault"] != "").sum())
+    say(f"{count - faults} of {count} scenes ended as they may (seed {seed}), {faults} did not")
+    return faults == 0
+
+
+def stress_table(rows: pd.DataFrame) -> pd.DataFrame:
+    """Tidy: axis, outcome, count, iterations (median, largest), worst residual and stretch, seconds and slowest scene.
+
+    A scene counts at each of its axes; the axis "all" counts every scene once. A fault is an outcome of its own,
+    in capitals.
+    """
+    rows = rows.assign(outcome=rows["outcome"].where(rows["fault"] == "", rows["fault"].str.upper()))
+    each = rows.assign(axis=rows["axes"].str.split()).explode("axis")
+    both = pd.concat([rows.assign(axis="all"), each], ignore_index=True)
+    common = list(rows["outcome"].value_counts().index)
+    both = both.sort_values("outcome", key=lambda names: names.map(common.index), kind="stable")
+    both = both.sort_values("axis", key=lambda names: names.map(["all", *AXES].index), kind="stable")
+    grouped = both.groupby(["axis", "outcome"], sort=False)
+    table = grouped.agg(
+        count=("index", "size"),
+        iterations_median=("iterations", "median"),
+        iterations_max=("iterations", "max"),
+        worst_residual=("residual", "max"),
+        worst_stretch=("stretch", "max"),
+        seconds_max=("seconds", "max"),
+    ).reset_index()
+    slowest = both.loc[grouped["seconds"].idxmax(), ["axis", "outcome", "index"]]
+    return table.merge(slowest.rename(columns={"index": "slowest"}), on=["axis", "outcome"], how="left")
