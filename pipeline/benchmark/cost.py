@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from pipeline.benchmark.insert import Run, Setting, insert, timed
-from pipeline.benchmark.page import SOLVER_CSV
 from pipeline.benchmark.reference import FINE_MM, Reference, reference
 from pipeline.benchmark.scenes import BenchScene
 from reports.bench import TARGETS_MM, recommended
 
+SOLVER_CSV = "solver.csv"
 SEGMENTS_MM = (5.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.1)
 QUICK_SEGMENTS_MM = (5.0, 2.0, 1.0, 0.5)
 VARIANTS = (
@@ -29,6 +30,8 @@ VARIANTS = (
 )
 """Each is tried with every segment length; the default comes first."""
 CLOSED_FORM = Setting(1.0, "closed_form", quadrature="joints", tolerance=1e-6, max_iterations=20_000)
+ASKED = ("method", "segment_mm", "hull", "quadrature", "tolerance")
+"""What a row says of its setting."""
 CLOSED_FORM_SHORTEST_MM = 1.0
 """Sweeps grow with the square of the number of joints: below 1 mm one insertion takes minutes."""
 
@@ -47,15 +50,11 @@ def costs(
 ) -> Iterator[dict[str, Any]]:
     """One row per scene and setting; see ``_row``.
 
-    The walls of a scene are made once, and every setting's kernels are compiled before they are timed.
+    The walls of a scene are made once. Every kernel is compiled before it is timed: the reference runs them all.
     """
     for scene in scenes:
         limit = reference(scene, fine_mm)
         walls = {hull: scene.wall(hull) for hull in dict.fromkeys(s.hull for s in chosen)}
-        warm = {(s.method, s.hull, s.quadrature): s for s in chosen}
-        for setting in warm.values():
-            wall, depth = walls[setting.hull], min(scene.depth_mm, 3 * scene.step_mm)
-            insert(scene if wall is None else replace(scene, depth_mm=depth), setting, wall)
         for setting in chosen:
             seconds, run = timed(partial(insert, scene, setting, walls[setting.hull]), repeats)
             yield _row(scene, setting, run, seconds, limit)
@@ -68,11 +67,7 @@ def _row(scene: BenchScene, setting: Setting, run: Run, seconds: float, limit: R
     spared = run.work.get("wall_look_ups_proven_unnecessary", 0.0) + run.work.get("wall_look_ups_cheap", 0.0)
     return {
         "scene": scene.name,
-        "method": setting.method,
-        "segment_mm": setting.segment_mm,
-        "hull": setting.hull,
-        "quadrature": setting.quadrature,
-        "tolerance": setting.tolerance,
+        **{name: getattr(setting, name) for name in ASKED},
         "ms_per_mm": 1e3 * seconds / scene.depth_mm,
         "tip_error_mm": tip,
         "shape_error_mm": shape,
@@ -106,16 +101,14 @@ def measure_cost(scenes: Sequence[BenchScene], out: Path, say: Callable[[str], N
 
 def advice(rows: pd.DataFrame) -> Iterator[str]:
     """The fastest setting of each scene within each target error, a line each."""
-    best = recommended(rows)
-    for target in TARGETS_MM:
-        for scene in dict.fromkeys(rows["scene"]):
-            mine = best[(best["scene"] == scene) & (best["target_mm"] == target)] if len(best) else best
-            if mine.empty:
-                yield f"{scene}: no setting reaches {target:g} mm"
-                continue
-            row = mine.iloc[0]
-            yield (
-                f"{scene}: for {target:g} mm use {row['method']}, segment {row['segment_mm']:g} mm, "
-                f"hull {row['hull']}, quadrature {row.get('quadrature', '-')}, tolerance {row['tolerance']:g}: "
-                f"{row['ms_per_mm']:.3g} ms per mm, {row['shape_error_mm']:.2g} mm"
-            )
+    best = {(row["scene"], row["target_mm"]): row for row in recommended(rows).to_dict("records")}
+    for target, scene in product(TARGETS_MM, dict.fromkeys(rows["scene"])):
+        if (scene, target) not in best:
+            yield f"{scene}: no setting reaches {target:g} mm"
+            continue
+        row = best[scene, target]
+        yield (
+            f"{scene}: for {target:g} mm use {row['method']}, segment {row['segment_mm']:g} mm, "
+            f"hull {row['hull']}, quadrature {row['quadrature']}, tolerance {row['tolerance']:g}: "
+            f"{row['ms_per_mm']:.3g} ms per mm, {row['shape_error_mm']:.2g} mm"
+        )

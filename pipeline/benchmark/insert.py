@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter, process_time
 from typing import Any, TypeVar
@@ -29,7 +29,6 @@ class Setting:
     quadrature: str = "tip"
     tolerance: float = 1e-9
     max_iterations: int = 200
-    initial: str = "slide"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,45 +49,33 @@ class Run:
 
 
 def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, switch: Any = None) -> Run:
-    """Push the scene's wire in.
+    """Push the scene's wire in; a free wire is bent by its dead load at once.
 
     wall : made already (it costs more than an insertion).     switch : skips of the solver, all by default.
     """
     wall = scene.wall(setting.hull) if wall is None else wall
-    solutions = list(_solutions(scene, setting, wall, switch))
-    last = solutions[-1]
-    work: Counter[str] = Counter()
-    for solution in solutions:
-        work.update(solution.work)
-    return Run(
-        last,
-        scene.wire(setting.segment_mm).arcs_at(last.depth_mm),
-        all(s.converged for s in solutions) and abs(last.depth_mm - scene.depth_mm) < 1e-6,
-        len(solutions),
-        sum(s.iterations for s in solutions),
-        dict(work),
-    )
-
-
-def _solutions(
-    scene: BenchScene, setting: Setting, wall: VesselWall | None, switch: Any
-) -> Iterable[Solution]:
-    """A solution for each depth; a free wire is bent by its dead load at once."""
     wire = scene.wire(setting.segment_mm)
     if wall is None:
-        return [
+        solutions = [
             relax(
                 wire, None, depth_mm=scene.depth_mm, entry_mm=scene.entry_mm, entry_direction=scene.direction,
                 material_axis=scene.material_axis, roll_deg=scene.roll_deg, load_N=scene.load_N,
                 method=setting.method, tolerance=setting.tolerance, max_iterations=setting.max_iterations,
             )
         ]  # fmt: skip
-    insertion = Insertion(
-        wire, wall, scene.entry_mm, scene.direction, setting.method, setting.initial, scene.material_axis,
-        tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
-        quadrature=setting.quadrature, switch=switch,
-    )  # fmt: skip
-    return insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg)
+    else:
+        insertion = Insertion(
+            wire, wall, scene.entry_mm, scene.direction, setting.method, material_axis=scene.material_axis,
+            tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
+            quadrature=setting.quadrature, switch=switch,
+        )  # fmt: skip
+        solutions = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
+    last, work = solutions[-1], Counter[str]()
+    for solution in solutions:
+        work.update(solution.work)
+    reached = all(s.converged for s in solutions) and abs(last.depth_mm - scene.depth_mm) < 1e-6
+    iterations = sum(s.iterations for s in solutions)
+    return Run(last, wire.arcs_at(last.depth_mm), reached, len(solutions), iterations, dict(work))
 
 
 def timed(work: Callable[[], Result], repeats: int = 3) -> tuple[float, Result]:
@@ -98,7 +85,7 @@ def timed(work: Callable[[], Result], repeats: int = 3) -> tuple[float, Result]:
     otherwise be measured along.
     """
     seconds: list[float] = []
-    for _ in range(max(repeats, 1)):
+    for _ in range(repeats):
         start, wall = process_time(), perf_counter()
         result = work()
         seconds.append(process_time() - start)

@@ -11,20 +11,15 @@ from pipeline.run.progress import CaseProgress
 from pipeline.run.stages import CaseRun, run_stages
 from pipeline.simulate.replay import guide_wire, rolls
 from pipeline.study.config import Config
-from pipeline.study.manifest import Case, read_manifest
+from pipeline.study.manifest import Case
 
 
 class NoScene(ValueError):
     """A case that cannot be pushed through: the sentence says why."""
 
 
-def scenes_of(manifest: Path, config: Config) -> list[BenchScene]:
-    """One scene per case of the manifest; raises ManifestError or NoScene."""
-    return [scene_of(case, config) for case in read_manifest(manifest).cases]
-
-
 def scene_of(case: Case, config: Config) -> BenchScene:
-    """Segment the case's lumen (or read it) and push to its deepest insertion_mm."""
+    """Segment the case's lumen (or read it) and push to its deepest insertion_mm; raises NoScene."""
     if not case.insertion_mm:
         msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
         raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")

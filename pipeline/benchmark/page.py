@@ -1,4 +1,4 @@
-"""The page of a benchmark, made of the tables that its parts leave in the folder."""
+"""The page of a benchmark, made of the tables that its parts have left in the folder."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ from pathlib import Path
 
 import pandas as pd
 
+from pipeline.benchmark.claims import CLAIMS_CSV, ORDERS_CSV
+from pipeline.benchmark.cost import SOLVER_CSV
+from pipeline.benchmark.peers.run import PEERS_CSV
+from pipeline.benchmark.stress.run import STRESS_CSV
 from pipeline.run.provenance import collect
 from reports.bench import BENCH_COLUMNS, render_bench
 
-SOLVER_CSV, PEERS_CSV, BENCH_CSV = "solver.csv", "peers.csv", "bench.csv"
-CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
-STRESS_CSV, SCENES_CSV = "stress.csv", "stress_scenes.csv"
+BENCH_CSV = "bench.csv"
+NOTE = (
+    "Milliseconds are processor time of a whole insertion in steps of 1 mm, median of the repeats, compilation "
+    "excluded, divided by its length. Errors are against an insertion with 0.1 and 0.05 mm segments, extrapolated, on "
+    "the same voxel wall (0.3 mm) with the smooth hull, so that a sampled hull's error holds what that model changes."
+)
+"""What the reader of the figures must know."""
 
 
 def machine() -> str:
@@ -25,16 +33,6 @@ def machine() -> str:
     )
 
 
-def note() -> str:
-    """What the reader of the figures must know."""
-    return (
-        f"Machine: {machine()}. Milliseconds are processor time of a whole insertion in steps of 1 mm, median of the "
-        "repeats, compilation excluded, divided by its length. Errors are against an insertion with 0.1 and 0.05 mm "
-        "segments, extrapolated, on the same voxel wall (0.3 mm) with the smooth hull, so that a sampled hull's error "
-        "holds what that model changes."
-    )
-
-
 def write_page(out: Path) -> Path:
     """Join what lies in the folder into bench.csv and render it."""
     parts = [pd.read_csv(out / name) for name in (SOLVER_CSV, PEERS_CSV) if (out / name).exists()]
@@ -42,4 +40,4 @@ def write_page(out: Path) -> Path:
     table = pd.concat(parts, ignore_index=True) if parts else empty
     table.to_csv(out / BENCH_CSV, index=False)
     others = [out / name if (out / name).exists() else None for name in (STRESS_CSV, CLAIMS_CSV, ORDERS_CSV)]
-    return render_bench(out / BENCH_CSV, out, *others, note=note())
+    return render_bench(out / BENCH_CSV, out, *others, note=f"Machine: {machine()}. {NOTE}")

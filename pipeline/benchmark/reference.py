@@ -52,19 +52,14 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     for segment in fine_mm * 2.0 ** np.arange(COARSER):
         runs = [insert(scene, Setting(s, quadrature="segments")) for s in (segment, 0.5 * segment)]
         if all(run.reached for run in runs):
-            return _extrapolated(runs, arcs)
+            coarse, fine = (resampled(run.last.joints_mm, run.arcs_mm, arcs, smooth=True) for run in runs)
+            first, second = (run.last.energy_N_mm for run in runs)
+            limit = fine + (fine - coarse) / 3.0
+            return Reference(arcs, limit, second + (second - first) / 3.0, shape_error(fine, limit)[0])
     last = next(run.last for run in runs if not run.reached)
     where = f"its reference stopped at {last.depth_mm:.2f} of {scene.depth_mm:g} mm: {last.status.value}"
     msg = f"benchmark: scene {scene.name}: {where}; allowed: a scene that can be passed; lower its depth"
     raise ValueError(msg)
-
-
-def _extrapolated(runs: list[Run], arcs: Array) -> Reference:
-    """The limit of a run and one with half its segments."""
-    coarse, fine = (resampled(run.last.joints_mm, run.arcs_mm, arcs, smooth=True) for run in runs)
-    first, second = (run.last.energy_N_mm for run in runs)
-    limit = fine + (fine - coarse) / 3.0
-    return Reference(arcs, limit, second + (second - first) / 3.0, shape_error(fine, limit)[0])
 
 
 def arc_samples(depth_mm: float) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -70,7 +70,7 @@ class BenchScene:
         return [float(d) for d in np.linspace(self.depth_mm / count, self.depth_mm, count)]
 
 
-@cache
+@lru_cache(maxsize=4)
 def sampled(distance: Distance, box: tuple[Vector, Vector], voxel_mm: float) -> Grid:
     """A signed distance on voxels between two corners, float32; beyond NEAR_MM outside it is interpolated."""
     low, high = np.array(box, dtype=np.float64)
@@ -105,7 +105,6 @@ def sheath(bore_mm: float = 0.25, wall_stiffness: float = 1.0) -> BenchScene:
 
     What the tip meets dies out along the sheath; a wire that is pushed hard buckles in it.
     """
-
     box = ((-4.0, -3.0, -SHEATH_MM - 3.0), (BEND_TURN_MM + 4.0, 3.0, BEND_INLET_MM + BEND_TURN_MM + 6.0))
     entry, distance = (0.0, 0.0, -SHEATH_MM), partial(sheath_distance, bore_mm=bore_mm)
     return BenchScene(
@@ -169,8 +168,3 @@ def _of_catalogue(name: str, depth_mm: float, setup: Setup) -> BenchScene:
         distance=setup.anatomy.distance,
         box=(tuple(low.tolist()), tuple(high.tolist())),
     )
-
-
-def usual(seed: int, *, quick: bool) -> list[BenchScene]:
-    """The scenes of ``wireval bench``."""
-    return [bend(), siphon()] if quick else [bend(), siphon(), willis(seed), cantilever()]

@@ -5,23 +5,23 @@ from __future__ import annotations
 from argparse import Namespace
 
 from pipeline.benchmark import page, scenes
-from pipeline.benchmark.claim import tell
-from pipeline.benchmark.claims import STUDIES
+from pipeline.benchmark.claims import measure_claims
 from pipeline.benchmark.cost import measure_cost
-from pipeline.benchmark.own_case import NoScene, scenes_of
+from pipeline.benchmark.own_case import NoScene, scene_of
 from pipeline.benchmark.peers.run import measure_peers
 from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
 from pipeline.commands.common import complain, say
 from pipeline.load import LoadError
 from pipeline.study.config import Config
-from pipeline.study.manifest import ManifestError
+from pipeline.study.manifest import ManifestError, read_manifest
 
 
 def main(args: Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
     plain = not (args.stress or args.peers)
     try:
-        chosen = scenes_of(args.manifest, Config()) if plain and args.manifest is not None else []
+        cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
+        chosen = [scene_of(case, Config()) for case in cases]
     except (ManifestError, NoScene, LoadError) as error:
         return complain(getattr(error, "problems", [str(error)]), str(args.manifest))
     args.out.mkdir(parents=True, exist_ok=True)
@@ -33,9 +33,11 @@ def main(args: Namespace) -> int:
     if args.peers:
         measure_peers(args.out, say, quick=args.quick)
     if plain:
-        chosen = chosen or scenes.usual(args.seed, quick=args.quick)
+        if args.manifest is None:
+            chosen = [scenes.bend(), scenes.siphon()]
+            chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
         if args.manifest is None:
-            sound &= tell((claim for study in STUDIES for claim in study()), args.out, say)
+            sound &= measure_claims(args.out, say)
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -127,7 +128,7 @@ def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
     angles = chain.angles(solution.frames)
     angles[5, 0] += 0.01
     nodes, frames = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
-    energy = chain.energy(nodes, frames, chain.wall_forces(nodes, frames))
+    energy = chain.energy(nodes, frames)
     moved = replace(solution, joints_mm=nodes, frames=frames, energy_N_mm=energy)
     assert judge(plan, wire, wall, moved, float("nan"), False).fault == "not_at_rest"
 
@@ -141,8 +142,7 @@ def test_the_judge_sees_a_saddle() -> None:
     plan.load_N = (0.0, 0.0, -force)
     unloaded = relax(wire, None, depth_mm=20.0)
     chain = assemble(wire, None, 20.0, plan.load_N)
-    state = (unloaded.joints_mm, unloaded.frames)
-    energy = chain.energy(*state, chain.wall_forces(*state))
+    energy = chain.energy(unloaded.joints_mm, unloaded.frames)
     column = replace(unloaded, energy_N_mm=energy)
     assert judge(plan, wire, None, column, float("nan"), True).fault == "no_minimum"
     assert not judge(plan, wire, None, column, float("nan"), False).fault
@@ -153,6 +153,11 @@ def _crashes(seed: int, index: int) -> Outcome:
         os._exit(3)
     if index == 2:
         time.sleep(60.0)
+    if index == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if index == 5:
+        msg = "no such scene"
+        raise KeyError(msg)
     if index == 3:
         stop = time.perf_counter() + 60.0
         while time.perf_counter() < stop:
@@ -162,11 +167,14 @@ def _crashes(seed: int, index: int) -> Outcome:
 
 def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "run_scene", _crashes)
-    done = list(run_isolated(0, [0, 1, 0, 2, 3], limit_s=0.5))
-    assert [d.outcome for d in done] == ["converged", "crash", "converged", "hang", "hang"]
+    done = list(run_isolated(0, [0, 1, 0, 2, 3, 4, 5, 0], limit_s=0.5))
+    assert [d.outcome for d in done[:5]] == ["converged", "crash", "converged", "hang", "hang"]
+    assert [d.outcome for d in done[5:]] == ["crash", "crash", "converged"]
     assert "exit code 3" in done[1].detail
     assert "no answer within 5 s" in done[3].detail
     assert "0.5 s of processor time" in done[4].detail
+    assert "exit code -9" in done[5].detail
+    assert "KeyError: 'no such scene'" in done[6].detail
 
 
 def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,13 +12,12 @@ import pytest
 from scipy.optimize import check_grad
 
 from pipeline.benchmark import page, scenes, vessels
-from pipeline.benchmark.claim import Claim, write_claims
-from pipeline.benchmark.claims import fitted
+from pipeline.benchmark.claims import Claim, fitted, measure_claims
 from pipeline.benchmark.cost import advice, costs, settings
 from pipeline.benchmark.insert import Setting, insert, timed
 from pipeline.benchmark.isolate import Lost
-from pipeline.benchmark.peers.frame import Task, measured
-from pipeline.benchmark.peers.run import ask, bending_energy, row_of
+from pipeline.benchmark.peers.frame import Task, pushed
+from pipeline.benchmark.peers.run import ask, bending_energy
 from pipeline.benchmark.peers.table import sentences
 from pipeline.benchmark.reference import arc_samples, reference, resampled, shape_error
 from pipeline.benchmark.stress import statics
@@ -110,15 +109,11 @@ def test_second_assembly_has_the_gradient_of_its_energy() -> None:
     start = 0.05 * rng.normal(size=(len(chain.length), 3))
     frame = np.eye(3)
 
-    def state(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, statics.WallForces]:
-        nodes, frames = chain.roll_out(u.reshape(-1, 3), np.zeros(3), frame)
-        return nodes, frames, chain.wall_forces(nodes, frames)
-
     def energy(u: np.ndarray) -> float:
-        return chain.energy(*state(u))
+        return chain.energy(*chain.roll_out(u.reshape(-1, 3), np.zeros(3), frame))
 
     def gradient(u: np.ndarray) -> np.ndarray:
-        return chain.moments(*state(u))[0].ravel()
+        return chain.moments(*chain.roll_out(u.reshape(-1, 3), np.zeros(3), frame))[0].ravel()
 
     flat = start.ravel()
     assert energy(flat) > 0.1
@@ -160,23 +155,13 @@ def test_orders_are_fitted_drawn_and_a_broken_promise_is_marked(tmp_path: Path) 
     errors = tuple(0.003 * size**1.5 for size in sizes)
     order = fitted(sizes, errors)
     assert order == pytest.approx(1.5)
-    write_claims(
-        [
-            Claim(
-                "order of it",
-                order,
-                "1",
-                "at least 1.9",
-                False,
-                "it, tip: segment length, mm",
-                sizes,
-                errors,
-                "mm",
-            ),
-            Claim("time of it", 0.25, "ms"),
-        ],
-        tmp_path,
+    order_of_it = Claim(
+        "order of it", order, "1", "at least 1.9", False, "it, tip: segment length, mm", sizes, errors, "mm"
     )
+    said: list[str] = []
+    claims = [order_of_it, Claim("time of it", 0.25, "ms")]
+    assert not measure_claims(tmp_path, said.append, [lambda: iter(claims)])
+    assert said == ["order of it: 1.5  [at least 1.9] NOT MET", "time of it: 0.25 ms [] "]
     text = page.write_page(tmp_path).read_text(encoding="utf-8")
     assert (tmp_path / "figures" / "orders.png").exists()
     assert 'id="orders"' in text
@@ -234,10 +219,8 @@ def test_peers_are_compared_within_one_run() -> None:
 @pytest.mark.peers
 def test_mujoco_comes_to_the_same_bend() -> None:
     pytest.importorskip("mujoco", reason="needs the extra [peers]")
-    task = Task("bend", 30)
-    answer = ask("mujoco", 0, task)
-    assert not isinstance(answer, Lost), answer
-    row = row_of(answer, task)
+    row = ask("mujoco", 0, Task("bend", 30))
+    assert not isinstance(row, Lost), row
     # what 30 segments of any solver are off: 0.036 mm of shape, 0.10 mm at the tip
     assert row["shape_error_mm"] < 0.05
     assert row["tip_error_mm"] < 0.15
@@ -251,4 +234,4 @@ def test_mujoco_that_flies_apart_is_no_answer(monkeypatch: pytest.MonkeyPatch, t
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file where it stands
     monkeypatch.setattr(mujoco, "WALL_SAFETY", 0.02)
     with pytest.raises(RuntimeError, match="unstable"):
-        measured(mujoco.Wire, Task("bend", 30), pushes=50)
+        pushed(mujoco.Wire, Task("bend", 30), 50)

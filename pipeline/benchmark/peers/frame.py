@@ -1,4 +1,4 @@
-"""What every rival is asked, what its file has to provide, and how its answer is timed."""
+"""What every rival is asked, what its file has to provide, and how it is timed."""
 
 from __future__ import annotations
 
@@ -43,34 +43,6 @@ class Task:
         return [length * (i + 1) / count for i in range(count)]
 
 
-class NodalWall:
-    """A wall as a force on n + 1 nodes, and the time that asking it took.
-
-    A node stands for a segment of wire, the last one for half of one, the one at the clamp for none.
-    """
-
-    def __init__(self, wall: VesselWall, n: int, segment_mm: float) -> None:
-        self.wall, self.seconds = wall, 0.0
-        self.stiffness_N_mm = wall.stiffness_N_mm2 * np.full(n + 1, segment_mm)
-        self.stiffness_N_mm[[0, -1]] *= (0.0, 0.5)
-
-    def forces(self, points: Array) -> Array:
-        """Forces (n + 1, 3), N."""
-        return self.forces_and_stiffness(points)[0]
-
-    def forces_and_stiffness(self, points: Array) -> tuple[Array, Array]:
-        """Forces (n + 1, 3) and the derivative of minus the force by the place (n + 1, 3, 3), N/mm."""
-        start = process_time()
-        phi, gradient, hessian = self.wall.look_up(points)
-        depth = np.maximum(phi + RADIUS_MM, 0.0)
-        force = -(self.stiffness_N_mm * depth)[:, None] * gradient
-        touching = (self.stiffness_N_mm * (depth > 0))[:, None, None]
-        outer = gradient[:, :, None] * gradient[:, None, :]
-        matrix = touching * (outer + depth[:, None, None] * hessian)
-        self.seconds += process_time() - start
-        return force, matrix
-
-
 class RivalWire(ABC):
     """A rival's wire in one task, built before the clock runs.
 
@@ -95,9 +67,11 @@ class RivalWire(ABC):
         scene, wall = task.set_up, task.set_up.wall()
         self.task, self.length_mm, self.steps = task, scene.depth_mm, 0
         self.segment_mm = scene.depth_mm / (task.n - self.before_clamp)
-        self.wall = None if wall is None else NodalWall(wall, task.n, self.segment_mm)
-        # of the wall at a node inside, N/mm
+        self.wall, self.wall_seconds = wall, 0.0
+        # of the wall at a node inside, N/mm; the tip stands for half a segment of wire, the clamp for none
         self.wall_N_mm = 0.0 if wall is None else wall.stiffness_N_mm2 * self.segment_mm
+        self.nodal_N_mm = np.full(task.n + 1, self.wall_N_mm)
+        self.nodal_N_mm[[0, -1]] *= (0.0, 0.5)
         # where the clamp is before the first push: scene B's wire starts in the tube before the entry
         self.start_mm = 0.0 if wall is None else -scene.depth_mm
         # the longest stretch that nothing holds: in the tube about half the wire
@@ -107,7 +81,19 @@ class RivalWire(ABC):
 
     def forces(self, points: Array) -> Array:
         """Load or wall at the nodes, both (n + 1, 3), N and mm."""
-        return self.load_N if self.wall is None else self.wall.forces(points)
+        return self.load_N if self.wall is None else self.wall_forces(self.wall, points)[0]
+
+    def wall_forces(self, wall: VesselWall, points: Array) -> tuple[Array, Array]:
+        """Forces (n + 1, 3) and the derivative of minus the force by the place (n + 1, 3, 3), N/mm; timed."""
+        start = process_time()
+        phi, gradient, hessian = wall.look_up(points)
+        depth = np.maximum(phi + RADIUS_MM, 0.0)
+        force = -(self.nodal_N_mm * depth)[:, None] * gradient
+        touching = (self.nodal_N_mm * (depth > 0))[:, None, None]
+        outer = gradient[:, :, None] * gradient[:, None, :]
+        matrix = touching * (outer + depth[:, None, None] * hessian)
+        self.wall_seconds += process_time() - start
+        return force, matrix
 
     def rest(self, advance: Callable[[], Array], still_mm: float, most: int) -> None:
         """Call ``advance`` until no node that it returns is further than this from where it was one call before."""
@@ -129,30 +115,11 @@ class RivalWire(ABC):
         """Nodes (m, 3) mm, the last one at the tip."""
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """A rival's answer. points_mm (m, 3), the last one at the tip.     seconds (pushes,) of processor time.
-
-    callback : share of the time that was spent in the Python callback that is the wall.
-    """
-
-    name: str
-    note: str
-    status: str
-    points_mm: Array
-    seconds: Array
-    callback: float
-
-
-def measured(rival: type[RivalWire], task: Task, pushes: int | None = None) -> Measured:
-    """Build a rival's wire, push it in (so often, else all the way), and read it off."""
-    wire = rival(task)
-    seconds = []
-    for depth in task.depths()[:pushes]:
+def pushed(rival: type[RivalWire], task: Task, most: int | None = None) -> tuple[RivalWire, list[float]]:
+    """Build a rival's wire and push it in, all the way or so often; seconds of processor time of each push."""
+    wire, seconds = rival(task), []
+    for depth in task.depths()[:most]:
         start = process_time()
         wire.push(depth)
         seconds.append(process_time() - start)
-    callback = float("nan") if wire.wall is None else wire.wall.seconds / sum(seconds)
-    each = f"{wire.steps} steps" if len(seconds) == 1 else f"{wire.steps / len(seconds):.0f} steps per push"
-    note = wire.note.format(steps=each)
-    return Measured(wire.name, note, wire.status, wire.points(), np.array(seconds), callback)
+    return wire, seconds

@@ -6,7 +6,6 @@ import importlib
 import os
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -16,12 +15,12 @@ import numpy as np
 import pandas as pd
 
 from pipeline.benchmark.isolate import Lost, alone
-from pipeline.benchmark.page import PEERS_CSV
-from pipeline.benchmark.peers.frame import EI, Measured, RivalWire, Task, measured
+from pipeline.benchmark.peers.frame import EI, RivalWire, Task, pushed
 from pipeline.benchmark.peers.table import sentences
-from pipeline.benchmark.reference import reference, resampled, shape_error
+from pipeline.benchmark.reference import Reference, reference, resampled, shape_error
 from pipeline.model import Array, arc_length
 
+PEERS_CSV = "peers.csv"
 OURS = "wireval"
 LIMIT_S = 300.0
 QUICK_SEGMENTS = {"cantilever": 20, "bend": 30}
@@ -30,30 +29,27 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def measure_peers(out: Path, say: Callable[[str], None], *, quick: bool) -> None:
-    """Rivals from PyPI on scenes A and B, and this solver in the same run."""
-    rows = run_peers(quick=quick, say=say)
-    rows.to_csv(out / PEERS_CSV, index=False)
-    for line in sentences(rows):
-        say(line)
+    """Rivals on scenes A and B, and this solver in the same run: a row for each, scene and number of segments.
 
-
-def run_peers(*, quick: bool = False, say: Callable[[str], None] = lambda _: None) -> pd.DataFrame:
-    """One row per simulator, scene and number of segments; those that are not installed are named and left out."""
+    Those that are not installed, or have no answer, are named and left out.
+    """
     os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started here
     rows = []
     for module, number, task in _work(quick, say):
-        answer = ask(module, number, task)
-        if isinstance(answer, Lost):
-            say(f"{module} {task.scene} {task.n} {task.per_mm}: no answer: {answer.reason}")
+        row = ask(module, number, task)
+        if isinstance(row, Lost):
+            say(f"{module} {task.scene} {task.n} {task.per_mm}: no answer: {row.reason}")
             continue
-        row = row_of(answer, task)
         rows.append(row)
         say(
             f"{row['method']:20s} {row['scene']:10s} n {row['joints']:4d}  {row['ms_per_step']:10.4f} ms per step "
             f"(last {row['ms_last_step']:.4f})  shape {row['shape_error_mm']:.5f} mm  tip {row['tip_error_mm']:.5f} mm"
             f"  {row['steps']} steps  callback {100 * row['callback_share']:.0f} %"
         )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    table.to_csv(out / PEERS_CSV, index=False)
+    for line in sentences(table):
+        say(line)
 
 
 def _work(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, int, Task]]:
@@ -76,9 +72,9 @@ def _work(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, int, T
         yield from ((name.lower(), number, task) for number, task in found)
 
 
-def ask(module: str, number: int, task: Task) -> Measured | Lost:
-    """The answer of a rival in a process of its own."""
-    return alone("spawn", partial(_answer, module, number, task), LIMIT_S)
+def ask(module: str, number: int, task: Task) -> dict[str, Any] | Lost:
+    """The row of a rival, which a process of its own makes."""
+    return alone("spawn", partial(_row, module, number, task, reference(task.set_up)), LIMIT_S)
 
 
 def _rivals(module: str) -> tuple[type[RivalWire], ...]:
@@ -107,12 +103,42 @@ def _tasks(module: str, quick: bool) -> list[tuple[int, Task]]:
     return found
 
 
-def _answer(module: str, number: int, task: Task) -> Measured:
-    """The answer of a rival; what it has to load and compile is on nobody's clock."""
-    rival = _rivals(module)[number]
-    measured(rival, Task(task.scene, WARM_SEGMENTS[task.scene]), pushes=2)
-    runs = [measured(rival, task) for _ in range(rival.repeats)]
-    return replace(runs[-1], seconds=np.median([run.seconds for run in runs], axis=0))
+def _row(module: str, number: int, task: Task, limit: Reference) -> dict[str, Any]:
+    """A row with the columns of the benchmark's table and what the peers' own table adds.
+
+    What a rival has to load and compile is on nobody's clock.
+    """
+    rival, length = _rivals(module)[number], limit.arcs_mm[-1]
+    pushed(rival, Task(task.scene, WARM_SEGMENTS[task.scene]), 2)
+    runs = [pushed(rival, task) for _ in range(rival.repeats)]
+    wire, seconds = runs[-1][0], np.median([seconds for _, seconds in runs], axis=0)
+    points, total = wire.points(), float(seconds.sum())
+    # counted back from the tip: a node before the clamp falls away
+    arcs = arc_length(points)
+    shape, tip = shape_error(resampled(points, arcs - arcs[-1] + length, limit.arcs_mm), limit.points_mm)
+    steps = f"{wire.steps} steps" if len(seconds) == 1 else f"{wire.steps / len(seconds):.0f} steps per push"
+    return {
+        "scene": task.scene,
+        "method": wire.name,
+        "segment_mm": length / task.n,
+        "hull": "offset",
+        "tolerance": float("nan"),
+        "ms_per_mm": 1e3 * total / length,
+        "tip_error_mm": tip,
+        "shape_error_mm": shape,
+        "iterations": float("nan"),
+        "joints": task.n,
+        "steps_per_mm": task.per_mm,
+        "steps": len(seconds),
+        "ms_per_step": 1e3 * float(seconds.mean()),
+        "ms_last_step": 1e3 * float(seconds[-1]),
+        "relative_tip_error": tip / length,
+        "bending_uJ": 1e3 * bending_energy(points),
+        "callback_share": wire.wall_seconds / total if wire.wall_seconds else float("nan"),
+        "status": wire.status,
+        "note": wire.note.format(steps=steps),
+        "reference_uncertainty_mm": limit.uncertainty_mm,
+    }
 
 
 def bending_energy(points: Array) -> float:
@@ -124,34 +150,3 @@ def bending_energy(points: Array) -> float:
         np.linalg.norm(np.cross(unit[:-1], unit[1:]), axis=1), np.einsum("na,na->n", unit[:-1], unit[1:])
     )
     return float(0.5 * EI * np.sum(turn**2 / (0.5 * (length[:-1] + length[1:]))))
-
-
-def row_of(answer: Measured, task: Task) -> dict[str, Any]:
-    """A row with the columns of the benchmark's table and what the peers' own table adds."""
-    limit, length = reference(task.set_up), task.set_up.depth_mm
-    # counted back from the tip: a node before the clamp falls away
-    arcs = arc_length(answer.points_mm)
-    points = resampled(answer.points_mm, arcs - arcs[-1] + limit.arcs_mm[-1], limit.arcs_mm)
-    shape, tip = shape_error(points, limit.points_mm)
-    return {
-        "scene": task.scene,
-        "method": answer.name,
-        "segment_mm": length / task.n,
-        "hull": "offset",
-        "tolerance": float("nan"),
-        "ms_per_mm": 1e3 * float(answer.seconds.sum()) / length,
-        "tip_error_mm": tip,
-        "shape_error_mm": shape,
-        "iterations": float("nan"),
-        "joints": task.n,
-        "steps_per_mm": task.per_mm,
-        "steps": len(answer.seconds),
-        "ms_per_step": 1e3 * float(answer.seconds.mean()),
-        "ms_last_step": 1e3 * float(answer.seconds[-1]),
-        "relative_tip_error": tip / length,
-        "bending_uJ": 1e3 * bending_energy(answer.points_mm),
-        "callback_share": answer.callback,
-        "status": answer.status,
-        "note": answer.note,
-        "reference_uncertainty_mm": limit.uncertainty_mm,
-    }

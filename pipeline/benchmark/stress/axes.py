@@ -27,7 +27,15 @@ def draw(seed: int, index: int) -> Plan:
     plan.axes = (first, *(str(n) for n in others))
     for name in plan.axes:
         plan = replace(plan, **AXES[name](plan, rng))
-    _finish(plan, rng)
+    if not plan.depths:
+        # three on the way in, sometimes one on the way out
+        share = [0.3, 0.7, 1.0] + [0.4] * int(rng.random() < 0.3)
+        plan.depths = [plan.length_mm * s for s in share]
+    if plan.way == "relax":
+        plan.depths = [max(plan.depths)]
+    # a wire of a thousand joints is relaxed at a few depths only: this study is about stability, not speed
+    plan.step_mm = max(plan.step_mm, plan.length_mm / 60.0)
+    plan.rolls = (plan.rolls * len(plan.depths))[: len(plan.depths)]
     return plan
 
 
@@ -52,19 +60,6 @@ def _moderate(rng: Rng, seed: int, index: int) -> Plan:
         dtype=str(rng.choice(["float32", "float64"])),
         rolls=[float(rng.uniform(-180.0, 180.0))],
     )
-
-
-def _finish(plan: Plan, rng: Rng) -> None:
-    """Depths that the axes left open: three on the way in, sometimes one on the way out."""
-    if not plan.depths:
-        share = [0.3, 0.7, 1.0] + [0.4] * int(rng.random() < 0.3)
-        plan.depths = [plan.length_mm * s for s in share]
-    if plan.way == "relax":
-        plan.depths = [max(plan.depths)]
-    # a wire of a thousand joints is relaxed at a few depths only: this study is about stability, not speed
-    plan.step_mm = max(plan.step_mm, plan.length_mm / 60.0)
-    turns = len(plan.depths)
-    plan.rolls = (plan.rolls * turns)[:turns]
 
 
 def _log_uniform(rng: Rng, low: float, high: float) -> float:
@@ -134,28 +129,6 @@ def _zero_step(plan: Plan, rng: Rng) -> Changes:
     return {"way": "insertion", "depths": [choices[i] for i in rng.permutation(len(choices))]}
 
 
-def _huge_step(plan: Plan, rng: Rng) -> Changes:
-    """All the way at once, and back."""
-    depths = [plan.length_mm * rng.uniform(1.0, 3.0), 1.0, plan.length_mm]
-    return {"way": "insertion", "step_mm": 1e6, "depths": depths}
-
-
-def _precision(_: Plan, rng: Rng) -> Changes:
-    """Grids in other types, anisotropic and turned, far from the origin."""
-    return {
-        "dtype": str(rng.choice(["float16", "float32", "float64"])),
-        "voxel_mm": tuple(rng.uniform(0.3, 1.5, 3).tolist()),
-        "turned": bool(rng.random() < 0.7),
-        "far_mm": float(rng.choice([0.0, 1e3, 1e5])),
-    }
-
-
-def _hull(_: Plan, rng: Rng) -> Changes:
-    """Sampled hulls of few and many points, and thick wires."""
-    hull = f"samples:{int(rng.choice([1, 2, 3, 4, 8, 16]))}"
-    return {"hull": hull, "radius_mm": rng.uniform(0.0, 0.8), "quadrature": "joints"}
-
-
 def _loads(plan: Plan, rng: Rng) -> Changes:
     """A dead load on the tip, with or without a wall, from a feather to far beyond buckling."""
     wall = bool(rng.random() < 0.4)
@@ -189,7 +162,12 @@ AXES: dict[str, Callable[[Plan, Rng], Changes]] = {
     # the entry lies beside the vessel's axis, often outside the vessel
     "entry_outside": lambda plan, rng: {"offset_mm": plan.lumen_mm * rng.uniform(0.5, 3.0)},
     "zero_step": _zero_step,
-    "huge_step": _huge_step,
+    # all the way at once, and back
+    "huge_step": lambda plan, rng: {
+        "way": "insertion",
+        "step_mm": 1e6,
+        "depths": [plan.length_mm * rng.uniform(1.0, 3.0), 1.0, plan.length_mm],
+    },
     # up to ten turns, either way, in one go or spread over the depths
     "roll": lambda _, rng: {"rolls": rng.uniform(-3600.0, 3600.0, int(rng.integers(1, 4))).tolist()},
     # NaN or inf in the grid, at one voxel or at all
@@ -198,8 +176,19 @@ AXES: dict[str, Callable[[Plan, Rng], Changes]] = {
     "grid_edge": lambda _, rng: {"crop": rng.uniform(0.15, 0.8)},
     # a lumen of one voxel, or a chain of single voxels
     "single_voxel": lambda _, rng: {"lumen": str(rng.choice(["voxel", "thread"]))},
-    "precision": _precision,
-    "hull": _hull,
+    # grids in other types, anisotropic and turned, far from the origin
+    "precision": lambda _, rng: {
+        "dtype": str(rng.choice(["float16", "float32", "float64"])),
+        "voxel_mm": tuple(rng.uniform(0.3, 1.5, 3).tolist()),
+        "turned": bool(rng.random() < 0.7),
+        "far_mm": float(rng.choice([0.0, 1e3, 1e5])),
+    },
+    # sampled hulls of few and many points, and thick wires
+    "hull": lambda _, rng: {
+        "hull": f"samples:{int(rng.choice([1, 2, 3, 4, 8, 16]))}",
+        "radius_mm": rng.uniform(0.0, 0.8),
+        "quadrature": "joints",
+    },
     # a field that is no distance: noise of up to a voxel on every node
     "noisy_wall": lambda plan, rng: {"noise_mm": float(max(plan.voxel_mm)) * rng.uniform(0.05, 1.0)},
     "loads": _loads,
@@ -209,7 +198,7 @@ AXES: dict[str, Callable[[Plan, Rng], Changes]] = {
     "friction": lambda _, rng: {"way": "insertion", "friction": _log_uniform(rng, 1e-3, 1.0)},
     # a wire without thickness, or thicker than a segment is long
     "radius": lambda plan, rng: {"radius_mm": float(rng.choice([0.0, 1e-6, plan.segment_mm * 2]))},
-    # too few: it must be said, and the state must be sound
+    # an iteration limit that is too low: it must be said, and the state must be sound
     "few_iterations": lambda _, rng: {"max_iterations": int(rng.integers(1, 6))},
     "closed_form": _closed_form,
 }

@@ -30,7 +30,7 @@ SHOWN = (
 
 @dataclass
 class Plan:
-    """Everything that defines a scene, before anything is built; axes change it in place.
+    """Everything that defines a scene, before anything is built.
 
     way : "relax" (one relaxation from a start shape) or "insertion" (depth after depth).
     lumen : kind of vessel; ``lumen_mm`` its radius, ``voxel_mm`` (3,) the grid's spacing.
@@ -89,9 +89,8 @@ def lumen_grid(plan: Plan) -> Grid:
     if plan.lumen in ("voxel", "thread"):
         values = np.full(points.shape[:3], 0.5 * float(np.mean(plan.voxel_mm)))
         inside = np.hypot(points[..., 0], points[..., 1]) < 0.5 * min(plan.voxel_mm[:2]) + 1e-9
-        where = np.argwhere(inside & (points[..., 2] > -1.0))
-        for i in where[: 1 if plan.lumen == "voxel" else None]:
-            values[tuple(i)] *= -1.0
+        where = np.argwhere(inside & (points[..., 2] > -1.0))[: 1 if plan.lumen == "voxel" else None]
+        values[tuple(where.T)] *= -1.0
     else:
         values = lumen_distance(plan.lumen, points, plan.lumen_mm)
         middle = 0.5 * (axes[2][0] + axes[2][-1])

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import multiprocessing
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -16,13 +15,13 @@ from typing import Any
 import pandas as pd
 
 from pipeline.benchmark.isolate import Lost, alone
-from pipeline.benchmark.page import SCENES_CSV, STRESS_CSV
 from pipeline.benchmark.stress.axes import AXES, draw
 from pipeline.benchmark.stress.plan import SHOWN
 from pipeline.benchmark.stress.scene_run import Outcome, run_scene
 from solver import warm_up
 from solver._compile import hash_of
 
+SCENES_CSV, STRESS_CSV = "stress_scenes.csv", "stress.csv"
 SCENES, QUICK_SCENES = 5000, 200
 LIMIT_S = 60.0
 """Processor time beyond which a scene hangs: the work of a depth is limited, the slowest scene takes some 15 s."""
@@ -73,17 +72,14 @@ def run_stress(
     path : a CSV file that gets each row as its scene ends; the rows of this seed and of the same sources that are
     there already are kept and not run again.
     """
-    sources, began = version(), perf_counter()
-    rows = _rows_at(path, seed, sources, indices)
+    began, rows = perf_counter(), _rows_at(path, seed, indices)
     known = {row["index"] for row in rows}
     left = [index for index in indices if index not in known]
-    with path.open("w", newline="", encoding="utf-8") if path else io.StringIO() as file:
-        writer = csv.DictWriter(file, list(KINDS))
-        writer.writeheader()
-        writer.writerows(rows)
+    with path.open("w", encoding="utf-8") if path else io.StringIO() as file:
+        pd.DataFrame(rows, columns=COLUMNS).to_csv(file, index=False)
         for number, done in enumerate(run_isolated(seed, left, jobs), 1):
-            rows.append(_row(seed, sources, done))
-            writer.writerow(rows[-1])
+            rows.append(_row(seed, done))
+            pd.DataFrame([rows[-1]]).to_csv(file, index=False, header=False)
             file.flush()
             if done.fault:
                 say(f"scene {done.index}: {done.fault}: {done.detail}")
@@ -93,31 +89,29 @@ def run_stress(
     return pd.DataFrame(rows).sort_values("index", ignore_index=True)
 
 
-def _row(seed: int, sources: str, done: Outcome) -> dict[str, Any]:
+def _row(seed: int, done: Outcome) -> dict[str, Any]:
     plan = draw(seed, done.index)
     row = {**vars(done), "axes": " ".join(done.axes), **{name: getattr(plan, name) for name in SHOWN}}
-    return {**row, "axis": done.axes[0], "seed": seed, "version": sources}
+    return {**row, "axis": done.axes[0], "seed": seed, "version": version()}
 
 
-KINDS = {name: type(value) for name, value in _row(0, "", Outcome(0, ("",), "")).items()}
-"""The columns of the table of scenes, and what is in them."""
+COLUMNS = list(_row(0, Outcome(0, ("",), "")))
 
 
-def _rows_at(path: Path | None, seed: int, sources: str, indices: Collection[int]) -> list[dict[str, Any]]:
+def _rows_at(path: Path | None, seed: int, indices: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of this seed and version in a table; others are left out, and so is a last line that was cut off."""
-    if path is None or not path.exists():
+    text = path.read_text(encoding="utf-8") if path is not None and path.exists() else ""
+    # the version is the last column: behind the last one there is no whole line
+    whole, last, _ = text.rpartition(end := f",{version()}\n")
+    if not last:
         return []
-    with path.open(newline="", encoding="utf-8") as file:
-        # the version is the last column: a line without it is no whole line
-        mine = [r for r in csv.DictReader(file) if r.get("version") == sources and r.get("seed") == str(seed)]
-    rows = [{name: _typed(kind, row[name]) for name, kind in KINDS.items()} for row in mine]
-    wanted = set(indices)
-    return list({row["index"]: row for row in rows if row["index"] in wanted}.values())
-
-
-def _typed(kind: type, text: str) -> Any:
-    """A field of the table; a number that a scene does not have is an empty field, or says nan."""
-    return kind(text or "nan") if kind is float else kind(text)
+    # an empty text is a text
+    numbers = {"residual": ["", "nan"], "stretch": ["", "nan"]}
+    table = pd.read_csv(
+        io.StringIO(whole + end), dtype={"version": str}, keep_default_na=False, na_values=numbers
+    )
+    mine = table[(table["seed"] == seed) & (table["version"] == version()) & table["index"].isin(indices)]
+    return [{str(name): value for name, value in row.items()} for row in mine.to_dict("records")]
 
 
 def measure_stress(out: Path, say: Callable[[str], None], seed: int, count: int) -> bool:

@@ -94,8 +94,7 @@ def _straight_energy(plan: Plan, wire: GuideWire, wall: VesselWall | None, solut
     chain = assemble(wire, wall, plan.depths[0], plan.load_N)
     angles = np.zeros((len(chain.length), 3))
     angles[:, 1] = -chain.rest
-    state = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
-    return chain.energy(*state, chain.wall_forces(*state))
+    return chain.energy(*chain.roll_out(angles, solution.joints_mm[0], solution.frames[0]))
 
 
 def _outcome(plan: Plan, solutions: list[Solution], verdicts: list[Verdict], seconds: float) -> Outcome:

@@ -21,21 +21,12 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class WallForces:
-    """Forces on the wire: points (p, 3) mm, forces (p, 3) N, the node (p,) that carries each, energy N mm."""
-
-    points: Array
-    forces: Array
-    node: NDArray[np.int64]
-    energy: float
-
-
-@dataclass(frozen=True, eq=False)
 class Chain:
     """A wire of k joints at one depth, with its wall and a dead load (k + 1, 3) on its nodes, N.
 
-    length (k,) of the segments; bend, twist and rest (k,): stiffness and rest bend of the joints. Where torsion is
-    rigid, twist is 0 and only the first two of the three kinds of angle are free.
+    length (k,) of the segments; bend and twist (k,): stiffness of the joints; rest (k,): their rest bend, rad, and
+    at_rest the same as turns.     kinds : how many of a joint's angles are free: bend, bend and, where torsion is not
+    rigid, twist.
     States are nodes (k + 1, 3) mm and frames (k + 1, 3, 3), as a solution publishes them.
     """
 
@@ -45,39 +36,35 @@ class Chain:
     bend: Array
     twist: Array
     rest: Array
+    at_rest: Rotation
     load: Array
-
-    @property
-    def kinds(self) -> int:
-        """How many of a joint's angles are free: bend, bend and, where torsion is not rigid, twist."""
-        return 3 if self.wire.twists else 2
+    kinds: int
 
     def angles(self, frames: Array) -> Array:
         """Joint angles (k, 3) beyond the rest bend, rad, in the material frame: log of Bᵀ Rᵀ R'."""
         turn = np.einsum("nji,njk->nik", frames[:-1], frames[1:])
-        return np.asarray((self._bent_at_rest().inv() * Rotation.from_matrix(turn)).as_rotvec())
-
-    def _bent_at_rest(self) -> Rotation:
-        zero = np.zeros_like(self.rest)
-        return Rotation.from_rotvec(np.column_stack([zero, self.rest, zero]))
+        return np.asarray((self.at_rest.inv() * Rotation.from_matrix(turn)).as_rotvec())
 
     def roll_out(self, angles: Array, base: Array, frame: Array) -> tuple[Array, Array]:
         """Nodes and frames of the chain with these joint angles (k, 3), clamped at ``base`` in ``frame``."""
         k = len(self.length)
         nodes, frames = np.empty((k + 1, 3)), np.empty((k + 1, 3, 3))
         nodes[0], frames[0] = base, frame
-        turn = (self._bent_at_rest() * Rotation.from_rotvec(angles)).as_matrix()
+        turn = (self.at_rest * Rotation.from_rotvec(angles)).as_matrix()
         for j in range(k):
             frames[j + 1] = frames[j] @ turn[j]
             nodes[j + 1] = nodes[j] + self.length[j] * frames[j + 1, :, 2]
         return nodes, frames
 
-    def wall_forces(self, nodes: Array, frames: Array) -> WallForces:
-        """The wall's forces at the joints, looked up afresh: ½ k w d², w half of either segment."""
-        k, wall, reach = len(self.length), self.wall, self.wire.radius_mm
-        node, points, count = np.arange(1, k + 1), nodes[1:], 1
+    def _wall(self, nodes: Array, frames: Array) -> tuple[Array, Array, float]:
+        """Force and moment about the origin on each node, (k + 1, 3), N and N mm, and energy: ½ k w d² at the joints.
+
+        The wall is looked up afresh; w is half of either segment.
+        """
+        wall, reach, k = self.wall, self.wire.radius_mm, len(self.length)
+        force, moment, points, count = np.zeros_like(nodes), np.zeros_like(nodes), nodes[1:], 1
         if wall is None:
-            return WallForces(points, np.zeros((k, 3)), node, 0.0)
+            return force, moment, 0.0
         if wall.samples:
             count, angle = wall.samples, 2 * np.pi * np.arange(wall.samples)[:, None] / wall.samples
             first, second = frames[1:, None, :, 0], frames[1:, None, :, 1]
@@ -87,37 +74,40 @@ class Chain:
         depth = np.maximum(phi + reach, 0.0)
         weight = 0.5 * (self.length + np.append(self.length[1:], 0.0))
         stiffness = wall.stiffness_N_mm2 * np.repeat(weight, count) / count
-        energy = float(0.5 * np.sum(stiffness * depth**2))
-        return WallForces(points, -(stiffness * depth)[:, None] * gradient, np.repeat(node, count), energy)
+        each, node = -(stiffness * depth)[:, None] * gradient, np.repeat(np.arange(1, k + 1), count)
+        np.add.at(force, node, each)
+        np.add.at(moment, node, np.cross(points, each))
+        return force, moment, float(0.5 * np.sum(stiffness * depth**2))
 
-    def moments(self, nodes: Array, frames: Array, wall: WallForces) -> tuple[Array, Array]:
+    def moments(self, nodes: Array, frames: Array, contact_N: Array | None = None) -> tuple[Array, Array]:
         """Energy gradient (k, 3) by the joint angles, N mm, and the elastic moments (k, 3) that it balances.
 
         Turning all that lies beyond joint j by δ moves its points by δ × (x - x_j): the gradient is c u_j plus the
         moment of the forces beyond, taken into the material frame and through the right Jacobian of exp.
         Rows hold bend, bend, twist; the twist row is 0 where torsion is rigid.
+        contact_N : the wall's forces (k + 1, 3) on the nodes, where they are known better than by a look-up.
         """
-        u = self.angles(frames)
-        force, moment = np.zeros_like(nodes), np.zeros_like(nodes)
-        np.add.at(force, wall.node, wall.forces)
-        np.add.at(moment, wall.node, np.cross(wall.points, wall.forces))
-        force += self.load
-        moment += np.cross(nodes, self.load)
+        if contact_N is None:
+            force, moment, _ = self._wall(nodes, frames)
+        else:
+            force, moment = contact_N, np.cross(nodes, contact_N)
+        force, moment = force + self.load, moment + np.cross(nodes, self.load)
         force, moment = np.cumsum(force[::-1], axis=0)[::-1], np.cumsum(moment[::-1], axis=0)[::-1]
         # forces on node j itself have no lever at joint j, so the sum may start at j + 1
         about = moment[1:] - np.cross(nodes[:-1], force[1:])
         body = np.einsum("nji,nj->ni", frames[1:], about)
+        u = self.angles(frames)
         elastic = np.column_stack([self.bend, self.bend, self.twist]) * u
         gradient = elastic - np.einsum("nji,nj->ni", _right_jacobian(u), body)
         gradient[:, self.kinds :] = 0.0
         return gradient, elastic
 
-    def energy(self, nodes: Array, frames: Array, wall: WallForces) -> float:
+    def energy(self, nodes: Array, frames: Array) -> float:
         """Total energy, N mm."""
         u = self.angles(frames)
         bending = 0.5 * float(np.sum(self.bend * (u[:, 0] ** 2 + u[:, 1] ** 2)))
         twisting = 0.5 * float(np.sum(self.twist * u[:, 2] ** 2))
-        return bending + wall.energy + twisting - float(np.sum(self.load * nodes))
+        return bending + self._wall(nodes, frames)[2] + twisting - float(np.sum(self.load * nodes))
 
 
 def assemble(
@@ -136,7 +126,9 @@ def assemble(
     twist = wire.torsional_stiffness_N_mm2 / (outer - inner) if wire.twists else np.zeros(k)
     load = np.zeros((k + 1, 3))
     load[k] = tip_load_N
-    return Chain(wire, wall, length, 1.0 / compliance, twist, rest, load)
+    at_rest = Rotation.from_rotvec(np.column_stack([np.zeros(k), rest, np.zeros(k)]))
+    kinds = 3 if wire.twists else 2
+    return Chain(wire, wall, length, 1.0 / compliance, twist, rest, at_rest, load, kinds)
 
 
 def _integral(

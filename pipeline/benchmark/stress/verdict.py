@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.benchmark.stress.plan import Plan
-from pipeline.benchmark.stress.statics import Array, Chain, WallForces, assemble
+from pipeline.benchmark.stress.statics import Array, Chain, assemble
 from solver import GuideWire, Solution, VesselWall
 
 STRETCH = 1e-12
@@ -61,7 +61,10 @@ def judge(
     if len(solution.joints_mm) < 2:
         return Verdict()
     chain = assemble(wire, wall, solution.depth_mm, plan.load_N)
-    stretch = _stretch(chain.length, solution.joints_mm)
+    # relative to the larger of length and coordinates, whose last place bounds what can be kept
+    steps = np.linalg.norm(np.diff(solution.joints_mm, axis=0), axis=1)
+    reach = np.maximum(chain.length, np.abs(solution.joints_mm).max())
+    stretch = float(np.max(np.abs(steps - chain.length) / reach))
     if not stretch <= STRETCH:
         return Verdict("stretched", f"{stretch:.3g}", stretch=stretch)
     if solution.energy_N_mm > start_energy + ROSE * abs(start_energy) + 1e-15:
@@ -72,28 +75,17 @@ def judge(
     return replace(_at_rest(chain, solution, plan.quadrature == "joints", deep), stretch=stretch)
 
 
-def _stretch(length: Array, nodes: Array) -> float:
-    """Relative to the larger of the length and the coordinates, whose last place bounds what can be kept."""
-    steps = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
-    reach = np.maximum(length, np.abs(nodes).max())
-    return float(np.max(np.abs(steps - length) / reach))
-
-
 def _at_rest(chain: Chain, solution: Solution, at_joints: bool, deep: bool) -> Verdict:
     """Do the moments of a wire called converged balance, and is there no way down from it?
 
     at_joints : the solver looks the wall up where the second assembly does; else its own contact forces are taken.
     """
-    nodes, frames = solution.joints_mm, solution.frames
-    forces = chain.wall_forces(nodes, frames)
+    state = (solution.joints_mm, solution.frames)
     parts = abs(solution.bending_energy_N_mm) + abs(solution.wall_energy_N_mm)
-    if at_joints:
-        energy = chain.energy(nodes, frames, forces)
-        if abs(energy - solution.energy_N_mm) > 1e-6 * (parts + 1e-9 + abs(energy)):
-            return Verdict("wrong_energy", f"{solution.energy_N_mm!r}, is {energy!r}")
-    else:
-        forces = WallForces(nodes, np.asarray(solution.contact_force_N), np.arange(len(nodes)), 0.0)
-    gradient, elastic = chain.moments(nodes, frames, forces)
+    energy = chain.energy(*state)
+    if at_joints and abs(energy - solution.energy_N_mm) > 1e-6 * (parts + 1e-9 + abs(energy)):
+        return Verdict("wrong_energy", f"{solution.energy_N_mm!r}, is {energy!r}")
+    gradient, elastic = chain.moments(*state, None if at_joints else np.asarray(solution.contact_force_N))
     scale = max(float(np.abs(elastic).max()), MOMENT_FLOOR_RAD * float(chain.bend.max()))
     residual = float(np.abs(gradient).max()) / scale
     left = float(np.sum(gradient**2 / (2.0 * chain.bend[:, None])))
@@ -120,13 +112,14 @@ def _way_down(chain: Chain, solution: Solution, parts: float) -> str:
     start = chain.angles(solution.frames)
     start[:, chain.kinds :] = 0.0
 
+    def state(angles: Array) -> tuple[Array, Array]:
+        return chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
+
     def energy(angles: Array) -> float:
-        state = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
-        return chain.energy(*state, chain.wall_forces(*state))
+        return chain.energy(*state(angles))
 
     def gradient(angles: Array) -> Array:
-        state = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
-        return chain.moments(*state, chain.wall_forces(*state))[0][:, : chain.kinds].ravel()
+        return chain.moments(*state(angles))[0][:, : chain.kinds].ravel()
 
     curvature, direction = _lowest(gradient, start, chain.kinds)
     if curvature > -SADDLE * float(chain.bend.min()):

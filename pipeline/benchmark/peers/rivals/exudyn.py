@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from itertools import pairwise
 from typing import Any
 
@@ -9,8 +10,9 @@ import exudyn as exu
 import numpy as np
 from exudyn import itemInterface as items
 
-from pipeline.benchmark.peers.frame import EA_N, EI, NodalWall, RivalWire, Task
+from pipeline.benchmark.peers.frame import EA_N, EI, RivalWire, Task
 from pipeline.model import Array
+from solver import VesselWall
 
 LOAD_STEPS = 10
 SMALLEST_STEP_MM = 0.05
@@ -68,7 +70,7 @@ class WithoutJacobian(RivalWire):
         ]
         return int(self.mbs.AddObject(items.ObjectConnectorCoordinate(markerNumbers=marks)))
 
-    def _add_wall(self, wall: NodalWall) -> None:
+    def _add_wall(self, wall: VesselWall) -> None:
         """The wall as a right-hand side of its own: force, and one 3x3 block of Jacobian per touching node."""
         size = self.start.size
 
@@ -77,11 +79,11 @@ class WithoutJacobian(RivalWire):
 
         def force(_mbs: Any, _t: float, _item: int, q: Any, _q_t: Any) -> Array:
             out = np.zeros_like(self.start)
-            out[:, :3] = wall.forces(places(q))
+            out[:, :3] = self.forces(places(q))
             return out.ravel()
 
         def jacobian(_mbs: Any, _t: float, _item: int, q: Any, _q_t: Any, f: float, _f_t: float) -> Any:
-            matrix = wall.forces_and_stiffness(places(q))[1]
+            matrix = self.wall_forces(wall, places(q))[1]
             touching = np.flatnonzero(np.any(matrix != 0.0, axis=(1, 2)))
             i, a, b = (each.ravel() for each in np.meshgrid(touching, range(3), range(3), indexing="ij"))
             rows = np.column_stack([6 * i + a, 6 * i + b, f * matrix[i, a, b]])
@@ -101,32 +103,31 @@ class WithoutJacobian(RivalWire):
         if self.wall is None:
             self.mbs.SolveStatic(self.settings)
             return
-        system, step = self.mbs.systemData, depth_mm - self.depth_mm
-        before = np.asarray(system.GetODE2Coordinates()).copy()
-        if self._step(before, depth_mm, step):
-            how = f"static Newton, wall through GenericODE2 callbacks ({self.given})"
-            self.depth_mm, self.note = depth_mm, f"ANCFCable (3D), {how}, {self.halved} steps halved"
-            return
-        self.halved += 1
-        if step < SMALLEST_STEP_MM:
-            msg = f"Exudyn: no static solution at {depth_mm:g} mm"
-            raise RuntimeError(msg)
-        system.SetODE2Coordinates(before, configuration=exu.ConfigurationType.Initial)
-        system.SetODE2Coordinates(before)
-        self.push(depth_mm - 0.5 * step)
-        self.push(depth_mm)
+        step = depth_mm - self.depth_mm
+        if not self._step(depth_mm, step):
+            self.halved += 1
+            if step < SMALLEST_STEP_MM:
+                msg = f"Exudyn: no static solution at {depth_mm:g} mm"
+                raise RuntimeError(msg)
+            self.push(depth_mm - 0.5 * step)
+            self.push(depth_mm)
+        how = f"static Newton, wall through GenericODE2 callbacks ({self.given})"
+        self.depth_mm, self.note = depth_mm, f"ANCFCable (3D), {how}, {self.halved} steps halved"
 
-    def _step(self, before: Array, depth_mm: float, step_mm: float) -> bool:
-        """One static step: the material slides along the wire's own curve, then Newton."""
+    def _step(self, depth_mm: float, step_mm: float) -> bool:
+        """One static step: the material slides along the wire's own curve, then Newton. False: all is as before."""
         self.mbs.SetObjectParameter(self.clamp, "offset", depth_mm)
-        state, moved = before.copy(), before[: self.start.size].reshape(-1, 6) + self.start
+        system, initial = self.mbs.systemData, exu.ConfigurationType.Initial
+        before = np.array(system.GetODE2Coordinates())
+        moved = before.reshape(-1, 6) + self.start
         moved[:, :3] += step_mm * moved[:, 3:] / np.linalg.norm(moved[:, 3:], axis=1)[:, None]
-        state[: self.start.size] = (moved - self.start).ravel()
-        self.mbs.systemData.SetODE2Coordinates(state, configuration=exu.ConfigurationType.Initial)
-        try:
-            return bool(self.mbs.SolveStatic(self.settings, updateInitialValues=True))
-        except exu.SolverError:
-            return False
+        system.SetODE2Coordinates((moved - self.start).ravel(), configuration=initial)
+        with suppress(exu.SolverError):
+            if self.mbs.SolveStatic(self.settings, updateInitialValues=True):
+                return True
+        system.SetODE2Coordinates(before, configuration=initial)
+        system.SetODE2Coordinates(before)
+        return False
 
     def points(self) -> Array:
         """Nodes in our axes."""

@@ -28,22 +28,12 @@ class _System(ea.BaseSystemCollection, ea.Constraints, ea.Forcing):  # type: ign
     """The modules that are needed."""
 
 
-class _Clamp(ea.ConstraintBase):  # type: ignore[misc]
+class _Clamp(ea.OneEndFixedBC):  # type: ignore[misc]
     """Holds the first element straight at a place that can be moved."""
 
-    def __init__(self, place: Array, frame: Array, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.place, self.frame = place, frame
-
-    def constrain_values(self, system: Any, time: float) -> None:
-        """Place and direction."""
-        system.position_collection[:, 0] = self.place
-        system.director_collection[..., 0] = self.frame
-
-    def constrain_rates(self, system: Any, time: float) -> None:
-        """Nothing of it moves."""
-        system.velocity_collection[:, 0] = 0.0
-        system.omega_collection[:, 0] = 0.0
+    def __init__(self, *fixed: Any, place: Array, **kwargs: Any) -> None:
+        super().__init__(*fixed, **kwargs)
+        self.fixed_position_collection = place
 
 
 class _Push(ea.NoForces):  # type: ignore[misc]
@@ -92,7 +82,8 @@ class Wire(RivalWire):
         self.pace = 3.52 * np.sqrt(EI * self.segment_mm / mass) / self.free_mm**2
         system = _System()
         system.append(rod)
-        system.constrain(rod).using(_Clamp, place=self.place, frame=rod.director_collection[..., 0].copy())
+        held = {"constrained_position_idx": (0,), "constrained_director_idx": (0,)}
+        system.constrain(rod).using(_Clamp, place=self.place, **held)
         system.add_forcing_to(rod).using(_Push, self)
         system.finalize()
         self.rod, self.system = rod, system

@@ -20,10 +20,8 @@ class Wire(RivalWire):
         super().__init__(task)
         scene = task.set_up
         self.wire = scene.wire(self.segment_mm)
-        wall = None if self.wall is None else self.wall.wall
-        insertion = Insertion(self.wire, wall, scene.entry_mm, scene.direction)
+        insertion = Insertion(self.wire, self.wall, scene.entry_mm, scene.direction)
         self.solutions = insertion.to_depths(task.depths())
-        self.wall = None  # nothing of it is asked from Python
 
     def push(self, depth_mm: float) -> None:
         """Relax, or go on to the next depth."""
