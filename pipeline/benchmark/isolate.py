@@ -46,7 +46,8 @@ def alone(method: str, work: Callable[[], Answer], wall_s: float, processor_s: f
 
 
 def _answer(pipe: Connection, processor_s: float, work: Callable[[], object]) -> None:
-    """Send what the work returns, or what it raises in words."""
+    """Send what the work returns, or what it raises in words; Ctrl-C is left to the process that waits."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.setitimer(signal.ITIMER_PROF, processor_s)
     try:
         pipe.send(work())

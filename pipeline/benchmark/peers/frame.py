@@ -17,6 +17,8 @@ from solver import VesselWall
 
 EI = scenes.STIFFNESS
 RADIUS_MM = scenes.RADIUS_MM
+MOMENT_MM4 = 0.25 * np.pi * RADIUS_MM**4
+"""Second moment of area of the round section."""
 EA_N = 4.0 * EI / RADIUS_MM**2
 """Of a round wire of one material: with 1.2 kN, 1 mN stretch it by 1e-6, as good as the chain's not at all."""
 GJ = EI / 1.3
@@ -78,6 +80,10 @@ class RivalWire(ABC):
         self.free_mm = scene.depth_mm if wall is None else 0.5 * scene.depth_mm
         self.load_N = np.zeros((task.n + 1, 3))
         self.load_N[-1] = scene.load_N
+
+    def pace(self, mass: float) -> float:
+        """Circular frequency of the slowest mode, for nodes of this mass: that of a cantilever's free stretch."""
+        return float(3.52 * np.sqrt(EI * self.segment_mm / mass) / self.free_mm**2)
 
     def forces(self, points: Array) -> Array:
         """Load or wall at the nodes, both (n + 1, 3), N and mm."""

@@ -24,7 +24,7 @@ PEERS_CSV = "peers.csv"
 OURS = "wireval"
 LIMIT_S = 300.0
 QUICK_SEGMENTS = {"cantilever": 20, "bend": 30}
-WARM_SEGMENTS = {"cantilever": 5, "bend": 6}
+WARM_SEGMENTS = 6
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -109,7 +109,7 @@ def _row(module: str, number: int, task: Task, limit: Reference) -> dict[str, An
     What a rival has to load and compile is on nobody's clock.
     """
     rival, length = _rivals(module)[number], limit.arcs_mm[-1]
-    pushed(rival, Task(task.scene, WARM_SEGMENTS[task.scene]), 2)
+    pushed(rival, Task(task.scene, WARM_SEGMENTS), 2)
     runs = [pushed(rival, task) for _ in range(rival.repeats)]
     wire, seconds = runs[-1][0], np.median([seconds for _, seconds in runs], axis=0)
     points, total = wire.points(), float(seconds.sum())

@@ -14,7 +14,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from pipeline.benchmark.peers.frame import EI, GJ, RADIUS_MM, RivalWire, Task
+from pipeline.benchmark.peers.frame import EI, GJ, MOMENT_MM4, RADIUS_MM, RivalWire, Task
 from pipeline.model import Array
 
 DT_S = 0.002
@@ -58,16 +58,16 @@ class Wire(RivalWire):
 
     def __init__(self, task: Task) -> None:
         super().__init__(task)
-        segment, moment = self.segment_mm, 0.25 * np.pi * RADIUS_MM**4
+        segment = self.segment_mm
         # fastest mode: bending of neighbouring segments against each other, 16 EI / (m λ³), plus the wall's
-        stiffest = SAFETY * 16.0 * EI / segment**3 + WALL_SAFETY * self.wall_N_mm
-        mass = 0.25 * DT_S**2 * stiffest
-        self.pace = 3.52 * np.sqrt(EI * segment / mass) / self.free_mm**2
+        mass = 0.25 * DT_S**2 * (SAFETY * 16.0 * EI / segment**3 + WALL_SAFETY * self.wall_N_mm)
+        pace = self.pace(mass)
+        self.still_mm = STILL_MM * pace * CHECK * DT_S
         self.model = mujoco.MjModel.from_xml_string(
             XML.format(
                 dt=DT_S, start=self.start_mm - 0.5 * segment, count=task.n + 2, length=self.length_mm + segment,
-                radius=RADIUS_MM, young=EI / moment, shear=GJ / (2.0 * moment), mass=mass,
-                damping=1.4 / self.pace * EI / segment,
+                radius=RADIUS_MM, young=EI / MOMENT_MM4, shear=GJ / (2.0 * MOMENT_MM4), mass=mass,
+                damping=1.4 / pace * EI / segment,
             )
         )  # fmt: skip
         self.data = mujoco.MjData(self.model)
@@ -82,7 +82,7 @@ class Wire(RivalWire):
     def push(self, depth_mm: float) -> None:
         """Move the clamp and wait."""
         self.model.body_pos[self.base, 0] = depth_mm - self.length_mm - 0.5 * self.segment_mm
-        self.rest(self._advance, STILL_MM * self.pace * CHECK * DT_S, MOST_STEPS // CHECK)
+        self.rest(self._advance, self.still_mm, MOST_STEPS // CHECK)
 
     def _advance(self) -> Array:
         """CHECK steps; the places are those at the end of them."""

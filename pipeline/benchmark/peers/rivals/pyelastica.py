@@ -12,7 +12,7 @@ from typing import Any
 import elastica as ea
 import numpy as np
 
-from pipeline.benchmark.peers.frame import EI, RADIUS_MM, RivalWire, Task
+from pipeline.benchmark.peers.frame import EA_N, EI, MOMENT_MM4, RADIUS_MM, RivalWire, Task
 from pipeline.model import Array
 
 STRETCH = 1e-2
@@ -39,9 +39,9 @@ class _Clamp(ea.OneEndFixedBC):  # type: ignore[misc]
 class _Push(ea.NoForces):  # type: ignore[misc]
     """The load or the wall, and drag towards rest."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire, drag: float) -> None:
         super().__init__()
-        self.wire, self.drag = wire, 1.6 * wire.pace
+        self.wire, self.drag = wire, drag
 
     def apply_forces(self, system: Any, time: float = 0.0) -> None:
         """External forces of this step."""
@@ -65,26 +65,25 @@ class Wire(RivalWire):
         super().__init__(task)
         by_hand = "mass and stretching scaled" + (" by hand" if self.wall is None else "")
         self.note = f"Cosserat rod, Verlet, {{steps}}, {by_hand}, clamp shifted"
-        moment, area = 0.25 * np.pi * RADIUS_MM**4, np.pi * RADIUS_MM**2
         self.place = np.array([0.0, 0.0, self.start_mm - 0.5 * self.segment_mm])
         rod = ea.CosseratRod.straight_rod(
             task.n, self.place.copy(), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]),
             task.n * self.segment_mm, RADIUS_MM, 1.0,
-            youngs_modulus=EI / moment, shear_modulus=EI / moment / 2.6,
+            youngs_modulus=EI / MOMENT_MM4, shear_modulus=EI / MOMENT_MM4 / 2.6,
         )  # fmt: skip
         rod.shear_matrix *= STRETCH
-        stretch = STRETCH * EI / moment * area / self.segment_mm
-        mass = 4.0 * (stretch + self.wall_N_mm)
+        mass = 4.0 * (STRETCH * EA_N / self.segment_mm + self.wall_N_mm)
         rod.mass[:] = mass
         inertia = mass * self.segment_mm**2 / 3.0
         rod.mass_second_moment_of_inertia[:] = np.eye(3)[:, :, None] * inertia
         rod.inv_mass_second_moment_of_inertia[:] = np.eye(3)[:, :, None] / inertia
-        self.pace = 3.52 * np.sqrt(EI * self.segment_mm / mass) / self.free_mm**2
+        pace = self.pace(mass)
+        self.still_mm = STILL_MM * pace * CHECK
         system = _System()
         system.append(rod)
         held = {"constrained_position_idx": (0,), "constrained_director_idx": (0,)}
         system.constrain(rod).using(_Clamp, place=self.place, **held)
-        system.add_forcing_to(rod).using(_Push, self)
+        system.add_forcing_to(rod).using(_Push, self, 1.6 * pace)
         system.finalize()
         self.rod, self.system = rod, system
         self.stepper, self.time = ea.PositionVerlet(), np.float64(0.0)
@@ -94,7 +93,7 @@ class Wire(RivalWire):
         z = depth_mm - self.length_mm - 0.5 * self.segment_mm
         self.rod.position_collection[2] += z - self.place[2]
         self.place[2] = z
-        self.rest(self._advance, STILL_MM * self.pace * CHECK, MOST_STEPS // CHECK)
+        self.rest(self._advance, self.still_mm, MOST_STEPS // CHECK)
 
     def _advance(self) -> Array:
         for _ in range(CHECK):

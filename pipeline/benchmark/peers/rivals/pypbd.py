@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pypbd as pbd
 
-from pipeline.benchmark.peers.frame import EI, GJ, RADIUS_MM, RivalWire, Task
+from pipeline.benchmark.peers.frame import EI, GJ, MOMENT_MM4, RADIUS_MM, RivalWire, Task
 from pipeline.model import Array
 
 DT_S = 0.05
@@ -52,8 +52,7 @@ class Wire(RivalWire):
         self._add_bodies()
         pairs = [(i, i + 1) for i in range(n)]
         joints = [np.array([0.0, 0.0, self.start_mm + (i + 0.5) * segment]) for i in range(n)]
-        inertia = 0.25 * np.pi * RADIUS_MM**4
-        young, shear = EI / inertia, 0.5 * GJ / inertia
+        young, shear = EI / MOMENT_MM4, 0.5 * GJ / MOMENT_MM4
         self.model.addDirectPositionBasedSolverForStiffRodsConstraint(
             pairs, joints, [RADIUS_MM] * n, [segment] * n, [young] * n, [shear] * n
         )
