@@ -29,6 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("--seed", type=int, default=0, metavar="S")
     add("--scanner", default="psf", choices=("psf", "conebeam"))
 
+
 if TYPE_CHECKING:
     from data_synthetic.catalogue.scene import NamedScene
 
