@@ -36,8 +36,8 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
     folder.mkdir()
     (folder / "__init__.py").touch()
     (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
-    start = f"from {package}._compile import on_disk\n"
-    kernel = start + "{imports}\n\n@on_disk()\ndef {name}():\n    return {value}\n"
+    head = f"from {package}._compile import on_disk\n"
+    kernel = head + "{imports}\n\n@on_disk()\ndef {name}():\n    return {value}\n"
     (folder / "callee.py").write_text(kernel.format(imports="", name="callee", value=1))
     middle = kernel.format(imports=f"from {package}.callee import callee", name="middle", value="callee()")
     (folder / "middle.py").write_text(middle)

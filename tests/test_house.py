@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import shutil
 import statistics
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+import grimp
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("solver", "pipeline", "reports", "data_synthetic")
 SOURCES = [p for package in PACKAGES for p in sorted((ROOT / package).rglob("*.py")) if "out" not in p.parts]
-MAX_FUNCTION_LINES = 75  # one screen and a half
-MAX_KERNEL_LINES = 130  # compiled kernels hold the unrolled arithmetic of one step of an algorithm
+MAX_LINES, MAX_ARGUMENTS = 40, 7
+LONG = {
+    "solver/relax.py:relax": "the public call documents every argument with its unit",
+}
+MANY_ARGUMENTS = {
+    "solver/relax.py:relax": "public contract",
+    "solver/insertion.py:__init__": "public contract",
+    "pipeline/trace/__init__.py:trace": "public contract",
+}
+"""Functions beyond the limits, each with its reason; an entry that is not needed any more is an error."""
 TEXTS = [*SOURCES, *ROOT.glob("*.md"), ROOT / "pyproject.toml", ROOT / "requirements.lock", ROOT / "Makefile"]
 
 
@@ -27,12 +37,22 @@ def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
             yield node
 
 
-def code_lines(node: ast.AST) -> int:
-    return (node.end_lineno or 0) - node.lineno + 1  # type: ignore[attr-defined]
+def code_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    return (node.end_lineno or 0) - node.lineno + 1
+
+
+def argument_count(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+    return sum(argument.arg not in {"self", "cls"} for argument in given)
+
+
+def beyond(paths: Sequence[Path], measure: Callable[[ast.FunctionDef], int], limit: int) -> dict[str, int]:
+    found = {f"{label(path)}:{node.name}": measure(node) for path in paths for node in functions(path)}
+    return {name: count for name, count in found.items() if count > limit}
 
 
 def label(path: Path) -> str:
-    return str(path.relative_to(ROOT))
+    return str(path.relative_to(ROOT) if path.is_relative_to(ROOT) else path)
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=label)
@@ -41,22 +61,32 @@ def test_every_module_says_what_it_is_for(path: Path) -> None:
     assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module starts with a docstring"
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=label)
-def test_functions_stay_readable(path: Path) -> None:
-    limit = MAX_KERNEL_LINES if "kernels" in str(path) else MAX_FUNCTION_LINES
-    lengths = {node.name: code_lines(node) for node in functions(path)}
-    long = [f"{name}: {count} lines" for name, count in lengths.items() if count > limit]
-    assert not long, f"split these, or say in the issue why not: {long}"
+def test_functions_stay_readable() -> None:
+    assert set(beyond(SOURCES, code_lines, MAX_LINES)) == set(LONG), "split these, or say in LONG why not"
+    assert set(beyond(SOURCES, argument_count, MAX_ARGUMENTS)) == set(MANY_ARGUMENTS), (
+        "named tuples, as the kernels do"
+    )
+
+
+def test_the_limits_bite(tmp_path: Path) -> None:
+    path = tmp_path / "grown.py"
+    path.write_text("def grown(a, b, c, d, e, f, g, *, h):\n" + "    a += 1\n" * MAX_LINES)
+    assert list(beyond([path], code_lines, MAX_LINES).values()) == [MAX_LINES + 1]
+    assert list(beyond([path], argument_count, MAX_ARGUMENTS).values()) == [MAX_ARGUMENTS + 1]
+    path.write_text("def small(a, b, c, d, e, f, g):\n" + "    a += 1\n" * (MAX_LINES - 1))
+    assert not beyond([path], code_lines, MAX_LINES) | beyond([path], argument_count, MAX_ARGUMENTS)
 
 
 def test_most_functions_are_small() -> None:
     lengths = sorted(code_lines(node) for path in SOURCES for node in functions(path))
-    assert statistics.median(lengths) <= 16, "the median function (docstring included)"
-    assert lengths[int(0.9 * len(lengths))] <= 45, "nine of ten functions"
+    assert statistics.median(lengths) <= 13, "the median function (docstring included)"
+    assert lengths[int(0.9 * len(lengths))] <= 30, "nine of ten functions"
 
 
 def test_most_files_are_small() -> None:
-    assert statistics.median(len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES) <= 150
+    lengths = {label(path): len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
+    assert statistics.median(lengths.values()) <= 150
+    assert max(lengths.values()) <= 300, max(lengths, key=lambda name: lengths[name])
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=label)
@@ -73,6 +103,13 @@ def test_help_imports_nothing_heavy() -> None:
         [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT
     )
     assert not {"numpy", "SimpleITK", "numba", "matplotlib", "pandas"} & set(done.stdout.split())
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    """Imports inside functions count, too."""
+    graph = grimp.build_graph(*PACKAGES, cache_dir=None)
+    order = graphlib.TopologicalSorter({m: graph.find_modules_directly_imported_by(m) for m in graph.modules})
+    assert list(order.static_order()), "CycleError names the circle"
 
 
 @pytest.mark.skipif(

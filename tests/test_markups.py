@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from data_synthetic.shapes.centrelines import read_tree
+from data_synthetic.anatomy.centrelines import read_tree
 from pipeline.load.centrelines import read_markups_branches
 from pipeline.load.curves import read_curve
 

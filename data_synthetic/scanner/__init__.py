@@ -1,7 +1,8 @@
-"""From shapes to grey values: partial volume, point spread, noise; or a whole rotational X-ray run."""
+"""From vessels and wires to grey values: partial volume, point spread, noise; or a whole rotational X-ray run."""
 
 from __future__ import annotations
 
-from data_synthetic.scanner.psf import Greys, PsfScanner
+from data_synthetic.scanner.phantom import Greys, Phantom
+from data_synthetic.scanner.psf import PsfScanner
 
-__all__ = ["Greys", "PsfScanner"]
+__all__ = ["Greys", "Phantom", "PsfScanner"]

@@ -13,11 +13,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import find_objects
 
-from data_synthetic.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array
 
-Array = NDArray[np.float64]
-Volume = NDArray[np.float32]
+ABSENT = (
+    "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
+)
+"""What is said where RTK is missing."""
 
 MARGIN = 1.16
 """The detector sees the volume's width and a sixth more: what lies further out is cut off, as a head is."""
@@ -75,11 +79,11 @@ class CArm:
 
     def paths(self, share: Volume) -> Volume:
         """Path lengths (stack) in mm through shares of voxels of the grid; only the box that is filled is projected."""
-        filled = [np.flatnonzero(share.any(axis=tuple({0, 1, 2} - {a}))) for a in range(3)]
-        if not len(filled[0]):
+        filled = find_objects((share > 0).astype(np.int8))
+        if not filled:
             return np.zeros((self.arc.projections, self.arc.pixels, self.arc.pixels), dtype=np.float32)
-        low = np.array([max(f[0] - BORDER, 0) for f in filled])
-        high = np.minimum([f[-1] + 1 + BORDER for f in filled], share.shape)
+        low = np.array([max(f.start - BORDER, 0) for f in filled[0]])
+        high = np.minimum([f.stop + BORDER for f in filled[0]], share.shape)
         part = share[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
         centre = (0.5 * (low + high - 1) - 0.5 * (np.array(share.shape) - 1)) * self.grid.spacing_mm
         return self.line_integrals(part, self.grid.spacing_mm, centre)
@@ -126,12 +130,9 @@ class CArm:
         return np.ascontiguousarray(itk.array_from_image(fdk.GetOutput()).transpose(2, 0, 1))
 
     def _detector_image(self, stack: Volume) -> Any:
-        itk, _ = _toolkit()
-        image = itk.image_from_array(np.ascontiguousarray(stack))
+        """An image of a stack, its middle on the central ray."""
         half = 0.5 * (self.arc.pixels - 1) * self.pixel_mm
-        image.SetSpacing([self.pixel_mm, self.pixel_mm, 1.0])
-        image.SetOrigin([-half, -half, 0.0])
-        return image
+        return _image(stack, np.array([self.pixel_mm, self.pixel_mm, 1.0]), np.array([-half, -half, 0.0]))
 
 
 def _toolkit() -> tuple[Any, Any]:
@@ -145,17 +146,19 @@ def _toolkit() -> tuple[Any, Any]:
 
             _ = itk.Image, RTK.ThreeDCircularProjectionGeometry
     except ImportError as problem:
-        msg = "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
-        raise ImportError(msg) from problem
+        raise ImportError(ABSENT) from problem
     return itk, RTK
 
 
 def _volume_image(values: Volume, spacing: Array, centre: Array) -> Any:
     """RTK turns about its second axis: x, y, z become its first, third and second."""
-    itk, _ = _toolkit()
-    image = itk.image_from_array(np.ascontiguousarray(values.transpose(1, 2, 0)))
-    order = [0, 2, 1]
     origin = centre - 0.5 * (np.array(values.shape) - 1) * spacing
-    image.SetSpacing([float(spacing[a]) for a in order])
-    image.SetOrigin([float(origin[a]) for a in order])
+    return _image(values.transpose(1, 2, 0), spacing[[0, 2, 1]], origin[[0, 2, 1]])
+
+
+def _image(values: Volume, spacing: Array, origin: Array) -> Any:
+    """An itk image of an array whose last axis is the image's first."""
+    image = _toolkit()[0].image_from_array(np.ascontiguousarray(values))
+    image.SetSpacing(spacing.tolist())
+    image.SetOrigin(origin.tolist())
     return image

@@ -12,17 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from data_synthetic.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array
 from data_synthetic.scanner.c_arm import Arc, CArm
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
-from data_synthetic.scanner.psf import Greys
-from data_synthetic.tubes import Anatomy
-
-Array = NDArray[np.float64]
-Volume = NDArray[np.float32]
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
+from data_synthetic.scanner.particles import splat, wire_particles
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""
@@ -43,8 +40,8 @@ WIRE_BLUR_VOXELS = 0.35
 VESSEL_MM = 5.0
 """The vessel behind the body by which grey values are calibrated."""
 
-FULL = Greys()
-"""The grey values that a full dose of 40 mg iodine per ml at full exposure stands for."""
+FULL, FULL_ARC = Greys(), Arc()
+"""The grey values that a full dose of 40 mg iodine per ml at full exposure stands for, and the run that gives them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,27 +56,21 @@ class ConeBeamScanner:
     share: Volume
 
     @staticmethod
-    def of(
-        anatomy: Anatomy,
-        bone: Anatomy | None,
-        gap_mm: float,
-        grid: ScanGrid,
-        arc: Arc | None = None,
-        greys: Greys = FULL,
-    ) -> ConeBeamScanner:
+    def of(phantom: Phantom, grid: ScanGrid, arc: Arc = FULL_ARC) -> ConeBeamScanner:
         """Project the phantom once; ImportError says how to get itk-rtk.
 
-        greys : contrast is the share of iodine, noise the exposure (photons go with its inverse square), both
+        Of its greys, contrast is the share of iodine, noise the exposure (photons go with its inverse square), both
         relative to the ideal scanner's defaults; drift and washout are those of the iodine.
         """
-        arc = arc or Arc()
+        greys, share = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         arm = CArm(grid, replace(arc, photons=arc.photons * (FULL.noise / greys.noise) ** 2))
-        share = lumen_coverage(anatomy, grid)
-        bony = np.zeros_like(share) if bone is None else bone_coverage(bone, anatomy, gap_mm, grid)
+        bony = np.zeros_like(share)
+        if phantom.bone is not None:
+            bony = bone_coverage(phantom.bone, phantom.anatomy, phantom.bone_gap_mm, grid)
         return ConeBeamScanner(arm, greys, arm.body_paths(), arm.paths(share), arm.paths(bony), share)
 
-    def scan(self, wires: Sequence[tuple[Array, float]], seed: Sequence[int]) -> NDArray[np.int16]:
-        """One run with wires (points (n, 3), radius), its photons and its dose of iodine drawn from ``seed``."""
+    def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
+        """One run with wires, its photons and its dose of iodine drawn from ``seed``."""
         rng = np.random.default_rng(list(seed))
         iodine = self.iodine(1.0 + self.greys.drift * float(rng.normal()))
         seen = rng.poisson(self.counts(self.wire_paths(wires), iodine)).astype(np.float32)
@@ -115,16 +106,12 @@ class ConeBeamScanner:
         vessel = -np.log(behind.sum() / through.sum()) / VESSEL_MM
         return float(-np.log(through.sum()) / width), float((FULL.contrast - FULL.background) / vessel)
 
-    def wire_paths(self, wires: Sequence[tuple[Array, float]]) -> Volume | np.float32:
+    def wire_paths(self, wires: Wires) -> Volume | np.float32:
         """Path lengths of wire in mm, from a grid of half voxels around it."""
-        if not wires:
-            return np.float32(0.0)
-        out = np.zeros_like(self.contrast)
-        for points, radius in wires:
-            out += self._wire_path(points, radius)
-        return out
+        return sum((self._wire_path(points, radius) for points, radius in wires), np.float32(0.0))
 
     def _wire_path(self, points: Array, radius: float) -> Volume:
+        """Path lengths of one wire."""
         grid = self.arm.grid
         fine = 0.5 * grid.spacing_mm
         middle = 0.5 * (np.array(grid.shape) - 1)

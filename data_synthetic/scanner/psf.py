@@ -6,39 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from data_synthetic.scan_grid import ScanGrid
-from data_synthetic.scanner.coverage import CUT, bone_coverage, lumen_coverage, splat, wire_particles
-from data_synthetic.tubes import Anatomy
-
-Array = NDArray[np.float64]
-Volume = NDArray[np.float32]
+from data_synthetic.geometry.scan_grid import ScanGrid, Volume
+from data_synthetic.geometry.vectors import Array
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
+from data_synthetic.scanner.particles import CUT, splat, wire_particles
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
 
 WIRE_STEP_VOXELS = 0.1
 """Distance between the discs of points that fill the wire; blurred by 0.8 voxel, nothing of it is left to see."""
-
-
-@dataclass(frozen=True)
-class Greys:
-    """Grey values and blur. noise : sd per voxel at a voxel of 0.3 mm; it goes with
-    voxel^-2, as a thin wire's peak does, so that a small study differs in sampling, not in contrast to noise.
-
-    psf_voxels : sd of the point spread.     correlation_voxels : sd of the noise's own smoothing.
-    drift : sd of a frame's gain.     washout : share of the contrast that is lost while a cone-beam scan turns; the
-    ideal scanner sees the mean.     wire : with 0.36 mm of wire in 0.3 mm voxels 6000 gives a contrast-to-noise of 12.
-    """
-
-    background: float = 100.0
-    contrast: float = 1000.0
-    bone: float = 1300.0
-    wire: float = 6000.0
-    noise: float = 100.0
-    psf_voxels: float = 0.8
-    correlation_voxels: float = 0.5
-    drift: float = 0.005
-    washout: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +28,20 @@ class PsfScanner:
     blurred: Volume
 
     @staticmethod
-    def of(anatomy: Anatomy, bone: Anatomy | None, gap_mm: float, grid: ScanGrid, greys: Greys) -> PsfScanner:
+    def of(phantom: Phantom, grid: ScanGrid) -> PsfScanner:
         """Voxelise the phantom once."""
-        sharp = lumen_coverage(anatomy, grid)
+        greys, sharp = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         sharp *= (1.0 - 0.5 * greys.washout) * (greys.contrast - greys.background)
         sharp += greys.background
-        if bone is not None:
-            share = bone_coverage(bone, anatomy, gap_mm, grid)
+        if phantom.bone is not None:
+            share = bone_coverage(phantom.bone, phantom.anatomy, phantom.bone_gap_mm, grid)
             # bone shares a voxel with tissue, never with lumen: the gap keeps them apart
             sharp += share * (greys.bone - sharp)
-        return PsfScanner(grid, greys, sharp, _blur(sharp, grid, greys))
+        blurred = gaussian_filter(sharp, _psf_voxels(grid, greys), truncate=CUT, mode="nearest")
+        return PsfScanner(grid, greys, sharp, blurred)
 
-    def scan(self, wires: Sequence[tuple[Array, float]], seed: Sequence[int]) -> NDArray[np.int16]:
-        """One volume with wires (points (n, 3), radius), its noise drawn from ``seed``."""
+    def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
+        """One volume with wires, indexed x, y, z, its noise drawn from ``seed``."""
         rng = np.random.default_rng(list(seed))
         out = self._noise(rng)
         gain = 1.0 + self.greys.drift * float(rng.normal())
@@ -79,31 +57,21 @@ class PsfScanner:
         nearest = np.clip(np.rint(index).astype(np.int64), 0, np.array(self.grid.shape) - 1)
         replaced = self.sharp[tuple(nearest.T)]
         weights = gain * volume / float(np.prod(self.grid.spacing_mm)) * (self.greys.wire - replaced)
-        splat(index, weights.astype(np.float64), self._sigma(), out)
-
-    def _sigma(self) -> Array:
-        return _sigma(self.grid, self.greys)
+        splat(index, weights.astype(np.float64), _psf_voxels(self.grid, self.greys), out)
 
     def _noise(self, rng: np.random.Generator) -> Volume:
         """Gaussian noise of the asked sd after its own smoothing."""
         sd = self.greys.noise * (0.3 / self.grid.voxel_mm) ** 2
         white = rng.standard_normal(self.grid.shape, dtype=np.float32)
-        s = self.greys.correlation_voxels
-        if s > 0:
-            gaussian_filter(white, s, truncate=CUT, mode="wrap", output=white)
-            white *= np.float32(sd / _kernel_norm(s))
-        else:
-            white *= np.float32(sd)
+        correlation = self.greys.correlation_voxels
+        gaussian_filter(white, correlation, truncate=CUT, mode="wrap", output=white)
+        white *= np.float32(sd / _kernel_norm(correlation))
         return white
 
 
-def _sigma(grid: ScanGrid, greys: Greys) -> Array:
-    """Point spread in voxels per axis: isotropic in mm."""
+def _psf_voxels(grid: ScanGrid, greys: Greys) -> Array:
+    """sd of the point spread along each axis, voxels: isotropic in mm."""
     return np.asarray(greys.psf_voxels * grid.voxel_mm / grid.spacing_mm)
-
-
-def _blur(sharp: Volume, grid: ScanGrid, greys: Greys) -> Volume:
-    return np.asarray(gaussian_filter(sharp, _sigma(grid, greys), truncate=CUT, mode="nearest"))
 
 
 def _kernel_norm(sigma: float) -> float:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import statistics
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from time import perf_counter, process_time
+from typing import Any, TypeVar
 
 from pipeline.benchmark.scenes import BenchScene
-from solver import Insertion, Solution, Status, VesselWall, relax
+from pipeline.model import Array
+from solver import Insertion, Solution, VesselWall, relax
 
-Array = NDArray[np.float64]
+Result = TypeVar("Result")
+
+LONG_S = 2.0
+"""Work longer than this is timed once: its own length averages the noise."""
 
 
 @dataclass(frozen=True)
@@ -25,77 +29,66 @@ class Setting:
     quadrature: str = "tip"
     tolerance: float = 1e-9
     max_iterations: int = 200
-    initial: str = "slide"
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
     """The wire at the end, and the sums over all depths.
 
-    reached : the whole depth, every step converged.     work : sums of the solver's counters.
-    steps : depths asked for.     energies (steps,) : after each of them.
+    last : the solution at the last depth.     arcs_mm : (joints + 1,), where its joints lie along the wire.
+    reached : the whole depth, every step converged.     steps : depths asked for.
+    work : sums of the solver's counters.
     """
 
-    joints_mm: Array
+    last: Solution
     arcs_mm: Array
-    depth_mm: float
-    energy_N_mm: float
-    status: Status
     reached: bool
-    iterations: int
     steps: int
-    energies: Array
+    iterations: int
     work: dict[str, float]
-
-    @property
-    def sentence(self) -> str:
-        """The last status in words."""
-        return self.status.value
 
 
 def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, switch: Any = None) -> Run:
-    """Push the scene's wire in.
+    """Push the scene's wire in; a free wire is bent by its dead load at once.
 
     wall : made already (it costs more than an insertion).     switch : skips of the solver, all by default.
     """
     wall = scene.wall(setting.hull) if wall is None else wall
-    solutions = list(_solutions(scene, setting, wall, switch))
-    last = solutions[-1]
-    work: Counter[str] = Counter()
-    for solution in solutions:
-        work.update(solution.work)
-    arcs = scene.wire(setting.segment_mm).arcs_at(last.depth_mm)
-    return Run(
-        last.joints_mm,
-        np.asarray(arcs),
-        last.depth_mm,
-        last.energy_N_mm,
-        last.status,
-        all(s.converged for s in solutions) and abs(last.depth_mm - scene.depth_mm) < 1e-6,
-        sum(s.iterations for s in solutions),
-        len(solutions),
-        np.array([s.energy_N_mm for s in solutions]),
-        dict(work),
-    )
-
-
-def _solutions(scene: BenchScene, setting: Setting, wall: VesselWall | None, switch: Any) -> Any:
     wire = scene.wire(setting.segment_mm)
     if wall is None:
-        return [_bent(scene, setting)]
-    insertion = Insertion(
-        wire, wall, scene.entry_mm, scene.direction, setting.method, setting.initial, scene.material_axis,
-        tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
-        quadrature=setting.quadrature, switch=switch,
-    )  # fmt: skip
-    return insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg)
+        solutions = [
+            relax(
+                wire, None, depth_mm=scene.depth_mm, entry_mm=scene.entry_mm, entry_direction=scene.direction,
+                material_axis=scene.material_axis, roll_deg=scene.roll_deg, load_N=scene.load_N,
+                method=setting.method, tolerance=setting.tolerance, max_iterations=setting.max_iterations,
+            )
+        ]  # fmt: skip
+    else:
+        insertion = Insertion(
+            wire, wall, scene.entry_mm, scene.direction, setting.method, material_axis=scene.material_axis,
+            tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
+            quadrature=setting.quadrature, switch=switch,
+        )  # fmt: skip
+        solutions = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
+    last, work = solutions[-1], Counter[str]()
+    for solution in solutions:
+        work.update(solution.work)
+    reached = all(s.converged for s in solutions) and abs(last.depth_mm - scene.depth_mm) < 1e-6
+    iterations = sum(s.iterations for s in solutions)
+    return Run(last, wire.arcs_at(last.depth_mm), reached, len(solutions), iterations, dict(work))
 
 
-def _bent(scene: BenchScene, setting: Setting) -> Solution:
-    """A free wire is bent by its dead load at once."""
-    return relax(
-        scene.wire(setting.segment_mm), None, depth_mm=scene.depth_mm, entry_mm=scene.entry_mm,
-        entry_direction=scene.direction, material_axis=scene.material_axis, roll_deg=scene.roll_deg,
-        load_N=scene.load_N, method=setting.method, tolerance=setting.tolerance,
-        max_iterations=setting.max_iterations,
-    )  # fmt: skip
+def timed(work: Callable[[], Result], repeats: int = 3) -> tuple[float, Result]:
+    """Median seconds of processor time over the repeats, and the last result.
+
+    Processor time, not time on the wall: all that is measured here runs in one thread, and a busy machine would
+    otherwise be measured along.
+    """
+    seconds: list[float] = []
+    for _ in range(repeats):
+        start, wall = process_time(), perf_counter()
+        result = work()
+        seconds.append(process_time() - start)
+        if perf_counter() - wall > LONG_S:
+            break
+    return statistics.median(seconds), result

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import rolls
 from pipeline.run.store import Store, default_root
+from pipeline.simulate.replay import guide_wire
 from pipeline.study.config import Config
-from pipeline.study.manifest import read_manifest
 from pipeline.study.schema import Case
 
 
@@ -18,13 +16,8 @@ class NoScene(ValueError):
     """A case that cannot be pushed through: the sentence says why."""
 
 
-def scenes_of(manifest: Path, config: Config) -> list[BenchScene]:
-    """One scene per case of the manifest; raises ManifestError or NoScene."""
-    return [scene_of(case, config) for case in read_manifest(manifest).cases]
-
-
 def scene_of(case: Case, config: Config) -> BenchScene:
-    """Segment the case's lumen (or read it) and push to its deepest insertion_mm."""
+    """Segment the case's lumen (or read it) and push to its deepest insertion_mm; raises NoScene."""
     if not case.insertion_mm:
         msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
         raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")
@@ -35,17 +28,13 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         raise NoScene(msg)
     return BenchScene(
         case.id,
-        "the user's own case",
         max(case.insertion_mm),
         step_mm=config.solver.step_mm,
         entry_mm=case.entry_mm,
         direction=case.entry_direction,
         material_axis=case.material_axis,
         roll_deg=rolls(case.roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
-        radius_mm=case.wire.radius_mm,
-        stiffness=case.wire.bending_stiffness_N_mm2,
-        rest=case.wire.rest_curvature_per_mm,
-        torsion=case.wire.torsional_stiffness_N_mm2,
+        guide_wire=guide_wire(case.wire, config.solver.segment_mm, config.simulate.bending_scale),
         wall_stiffness=case.wall.stiffness_N_mm2,
         friction=case.wall.friction,
         ready=known.lumen.distance,

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
-from pipeline.benchmark.errors import arc_samples, resampled, shape_error
 from pipeline.benchmark.insert import Run, Setting, insert
 from pipeline.benchmark.scenes import BenchScene
-
-Array = NDArray[np.float64]
+from pipeline.model import Array
 
 FINE_MM = 0.1
 """Half the smallest segment but one that is judged; the pair 0.1, 0.05 mm leaves about 1e-4 mm in the bend."""
 COARSER = 3
 """Pairs that are tried, each twice as coarse, where the finest one does not get through."""
+SAMPLE_MM = 0.5
+"""Arc step of the comparison: the same for every segment length, so that coarse chains are not flattered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,15 @@ class Reference:
     energy_N_mm: float
     uncertainty_mm: float
 
+    def errors_of(self, run: Run) -> tuple[float, float, float]:
+        """RMS and tip distance, mm, and relative energy error of a run; NaN where it did not reach the depth."""
+        if not run.reached:
+            return float("nan"), float("nan"), float("nan")
+        points = resampled(run.last.joints_mm, run.arcs_mm, self.arcs_mm)
+        return *shape_error(points, self.points_mm), run.last.energy_N_mm / self.energy_N_mm - 1.0
 
+
+@cache
 def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     """Two insertions with segments of ``fine_mm`` and half of it, coarser ones where these do not reach the depth.
 
@@ -42,18 +52,33 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     for segment in fine_mm * 2.0 ** np.arange(COARSER):
         runs = [insert(scene, Setting(s, quadrature="segments")) for s in (segment, 0.5 * segment)]
         if all(run.reached for run in runs):
-            return _extrapolated(runs, arcs)
-    run = next(run for run in runs if not run.reached)
-    where = (
-        f"benchmark: scene {scene.name}: its reference stopped at {run.depth_mm:.2f} of {scene.depth_mm:g} mm"
-    )
-    msg = f"{where}: {run.sentence}; allowed: a scene that can be passed; lower its depth"
+            coarse, fine = (resampled(run.last.joints_mm, run.arcs_mm, arcs, smooth=True) for run in runs)
+            first, second = (run.last.energy_N_mm for run in runs)
+            limit = fine + (fine - coarse) / 3.0
+            return Reference(arcs, limit, second + (second - first) / 3.0, shape_error(fine, limit)[0])
+    last = next(run.last for run in runs if not run.reached)
+    where = f"its reference stopped at {last.depth_mm:.2f} of {scene.depth_mm:g} mm: {last.status.value}"
+    msg = f"benchmark: scene {scene.name}: {where}; allowed: a scene that can be passed; lower its depth"
     raise ValueError(msg)
 
 
-def _extrapolated(runs: list[Run], arcs: Array) -> Reference:
-    """The limit of a run and one with half its segments."""
-    curves = [resampled(run.joints_mm, run.arcs_mm, arcs, smooth=True) for run in runs]
-    limit = curves[1] + (curves[1] - curves[0]) / 3.0
-    energy = runs[1].energy_N_mm + (runs[1].energy_N_mm - runs[0].energy_N_mm) / 3.0
-    return Reference(arcs, limit, energy, shape_error(curves[1], limit)[0])
+def arc_samples(depth_mm: float) -> Array:
+    """Arc lengths (m,) from 0 to the depth at about SAMPLE_MM."""
+    return np.linspace(0.0, depth_mm, max(2, round(depth_mm / SAMPLE_MM) + 1))
+
+
+def resampled(joints_mm: ArrayLike, arcs_mm: Array, samples_mm: Array, *, smooth: bool = False) -> Array:
+    """Points (m, 3) at arc lengths (m,) of a chain with joints (n, 3) at arc lengths (n,).
+
+    smooth : through a cubic spline, fourth order, for a reference; the chain itself is straight between its joints.
+    """
+    joints = np.asarray(joints_mm, dtype=np.float64)
+    if smooth and len(joints) > 3:
+        return np.asarray(CubicSpline(arcs_mm, joints)(samples_mm))
+    return np.column_stack([np.interp(samples_mm, arcs_mm, joints[:, a]) for a in range(3)])
+
+
+def shape_error(points: Array, reference: Array) -> tuple[float, float]:
+    """Root mean square and tip distance, mm, of points (m, 3) at the same arc lengths."""
+    apart = np.linalg.norm(points - reference, axis=1)
+    return float(np.sqrt(np.mean(apart**2))), float(apart[-1])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.commands.common import complain, say
+
 HELP = "run time against error; rivals; a stress study"
 
 
@@ -23,6 +25,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
-    from pipeline.benchmark.command import main as bench
+    from pipeline.benchmark import page, scenes
+    from pipeline.benchmark.claims import measure_claims
+    from pipeline.benchmark.cost import measure_cost
+    from pipeline.benchmark.own_case import NoScene, scene_of
+    from pipeline.benchmark.peers.run import measure_peers
+    from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
+    from pipeline.load import LoadError
+    from pipeline.study.config import Config
+    from pipeline.study.manifest import ManifestError, read_manifest
 
-    return bench(args)
+    plain = not (args.stress or args.peers)
+    try:
+        cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
+        chosen = [scene_of(case, Config()) for case in cases]
+    except (ManifestError, NoScene, LoadError) as error:
+        return complain(getattr(error, "problems", [str(error)]), str(args.manifest))
+    args.out.mkdir(parents=True, exist_ok=True)
+    say(f"machine: {page.machine()}")
+    sound = True
+    if args.stress:
+        count = args.scenes or (QUICK_SCENES if args.quick else SCENES)
+        sound &= measure_stress(args.out, say, args.seed, count)
+    if args.peers:
+        measure_peers(args.out, say, quick=args.quick)
+    if plain:
+        if args.manifest is None:
+            chosen = [scenes.bend(), scenes.siphon()]
+            chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
+        measure_cost(chosen, args.out, say, quick=args.quick)
+        if args.manifest is None:
+            sound &= measure_claims(args.out, say)
+    say(f"report: {page.write_page(args.out)}")
+    return 0 if sound else 1

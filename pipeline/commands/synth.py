@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING
 
 from pipeline.commands.common import complain, say
 from pipeline.study.suggest import did_you_mean
@@ -30,6 +30,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("--scanner", default="psf", choices=("psf", "conebeam"))
 
 
+if TYPE_CHECKING:
+    from data_synthetic.catalogue.scene import NamedScene
+
+
 def _progress(done: int, total: int) -> None:
     """One line per written frame, on stderr, so that stdout holds the result alone."""
     end = "\r" if sys.stderr.isatty() and done < total else "\n"
@@ -37,49 +41,53 @@ def _progress(done: int, total: int) -> None:
     sys.stderr.flush()
 
 
-def _problem(args: Namespace, names: tuple[str, ...]) -> str:
-    """What is wrong with the command line; empty where nothing is."""
-    sources = [s for s in (args.name, args.anatomy, args.background) if s is not None]
-    if len(sources) != 1:
-        return "give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"
-    if args.name is not None and args.name not in names:
-        return f"no scene {args.name!r}; {did_you_mean(args.name, names)}"
-    if args.name is None and args.scanner != "psf":
-        return f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"
-    for path in (args.anatomy, args.background):
-        if path is not None and not path.exists():
-            return f"{path}: no such file"
-    return "" if args.out is not None else "-o DIR is missing: where shall the study be written?"
-
-
-def _study(args: Namespace) -> Any:
-    """The study in memory; its truth is computed here."""
+def _problems(args: Namespace) -> list[str]:
+    """What is wrong with the command line before any file is read; empty where nothing is."""
     from data_synthetic import catalogue
 
-    wanted = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
-    given = {k: v for k, v in wanted.items() if v is not None}
+    sources = [s for s in (args.name, args.anatomy, args.background) if s is not None]
+    if len(sources) != 1:
+        return ["give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"]
+    if args.name is not None and args.name not in catalogue.names():
+        return [f"no scene {args.name!r}; {did_you_mean(args.name, catalogue.names())}"]
+    if args.name is None and args.scanner != "psf":
+        return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]
+    for path in (args.anatomy, args.background):
+        if path is not None and not path.exists():
+            return [f"{path}: no such file"]
+    return [] if args.out is not None else ["-o DIR is missing: where shall the study be written?"]
+
+
+def _scene(args: Namespace) -> NamedScene:
+    """The scene that is asked for; ValueError where its file holds none."""
+    from data_synthetic import catalogue
+
     if args.background is not None:
-        given.pop("size", None)  # a real scan has its own
-        return catalogue.from_background(args.background, **given)
-    scene = args.name if args.anatomy is None else catalogue.from_anatomy(args.anatomy)
-    return catalogue.build(scene, scanner=args.scanner, **given)
+        return catalogue.background_scene(args.background, args.voxel_mm)
+    return catalogue.from_anatomy(args.anatomy) if args.name is None else catalogue.describe(args.name)
 
 
 def main(args: Namespace) -> int:
     """Exit 0 when the study is written, 2 on wrong input."""
     from data_synthetic import catalogue
-    from data_synthetic.write import write_study
+    from data_synthetic.write import earlier_files, in_the_way, write_study
 
     if args.list:
         for name in catalogue.names():
             say(f"{name:24s} {catalogue.describe(name).why}")
         return 0
-    problem = _problem(args, tuple(catalogue.names()))
-    if problem:
-        return complain([problem], "the command line")
+    problems = _problems(args)
+    if problems:
+        return complain(problems, "the command line")
     clock = perf_counter()
+    numbers = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     try:
-        study = _study(args)
+        scene = _scene(args)
+        problems = catalogue.Wanted(**numbers).problems(scene, args.scanner)
+        problems += in_the_way(args.out, args.format, args.frames or scene.frames)
+        if problems:
+            return complain(problems, "the command line")
+        study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
     quality = study.quality
@@ -87,6 +95,9 @@ def main(args: Namespace) -> int:
         f"truth: largest force residual {quality['largest_residual_N']:.1e} N; halving its resolution moves it by "
         f"{quality['halving_moves_mm']:.4f} mm"
     )
+    earlier = len(earlier_files(args.out))
+    if earlier:
+        say(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
     manifest = write_study(study, args.out, format=args.format, progress=_progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0

@@ -17,7 +17,17 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry
 from pipeline.model import Counters, Volume
 
-__all__ = ["Box", "Crop", "Header", "LoadError", "Source", "load", "read_header", "require_same_geometry"]
+__all__ = [
+    "SUFFIXES",
+    "Box",
+    "Crop",
+    "Header",
+    "LoadError",
+    "Source",
+    "load",
+    "read_header",
+    "require_same_geometry",
+]
 
 
 class Format(Protocol):
@@ -35,6 +45,8 @@ class Format(Protocol):
 
 FORMATS: tuple[Format, ...] = (dicom, hdf5, files)
 """The first that recognises a path reads it; ``files`` leaves the rest to SimpleITK."""
+SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
+"""By these a file in a folder is taken for a scan where there is no manifest."""
 
 
 def read_header(

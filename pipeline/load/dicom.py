@@ -99,64 +99,61 @@ def _series_files(folder: Path, wanted: str) -> tuple[str, ...]:
     return next(iter(images.values()))
 
 
-def _is_image(path: str) -> bool:
+def _header_of(path: Path) -> sitk.ImageFileReader:
     reader = sitk.ImageFileReader()
-    reader.SetFileName(path)
+    reader.SetFileName(str(path))
+    reader.ReadImageInformation()
+    return reader
+
+
+def _is_image(path: str) -> bool:
     try:
-        reader.ReadImageInformation()
+        reader = _header_of(Path(path))
     except RuntimeError:
         return False
     return bool(reader.HasMetaDataKey(POSITION)) or frames_of(Path(path)) is not None
 
 
-def _multiframe_stack(source: Source, path: Path, frames: Frames) -> Stack:
-    """The frames of one file, sorted along their normal."""
-    reader = sitk.ImageFileReader()
-    reader.SetFileName(str(path))
-    reader.ReadImageInformation()
-    size = reader.GetSize()
+def read_stack(source: Source) -> Stack:
+    """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
+    names = _series_files(source.path, source.dataset) if source.path.is_dir() else (str(source.path),)
+    files = [Path(name) for name in names]
+    headers = [_header_of(path) for path in files]
+    several = frames_of(files[0]) if len(files) == 1 else None
+    where = several or _slices(files, headers)
+    if several is not None:
+        files *= _frame_count(files[0], headers[0], several)
+    _require_uniform(source, where, [header.GetSize()[:2] for header in headers])
+    axes = where.orientations[0].reshape(2, 3).T
+    order = np.argsort(where.positions @ np.cross(axes[:, 0], axes[:, 1]), kind="stable")
+    width, height = headers[0].GetSize()[:2]
+    return Stack(
+        tuple(files[i] for i in order), where.positions[order], axes, where.pixels_mm[0][::-1], (width, height),
+        sitk.GetPixelIDValueAsString(headers[-1].GetPixelID()), tuple(map(int, order)) if several else (),
+    )  # fmt: skip
+
+
+def _slices(files: list[Path], headers: list[sitk.ImageFileReader]) -> Frames:
+    """Where the slices of a series lie, one file each."""
+    tags = ((POSITION, 3), (ORIENTATION, 6), (PIXEL_SPACING, 2))
+    each = [[_numbers(h, tag, n, path) for tag, n in tags] for path, h in zip(files, headers, strict=True)]
+    positions, orientations, pixels = (np.array(values) for values in zip(*each, strict=True))
+    return Frames(positions, orientations, pixels)
+
+
+def _frame_count(path: Path, header: sitk.ImageFileReader, frames: Frames) -> int:
+    """Frames of a multi-frame file, each of which must have a position."""
+    size = header.GetSize()
     count = size[2] if len(size) > 2 else 1
     if count != len(frames.positions):
         msg = f"{path}: the file holds {count} frames and positions of {len(frames.positions)}; allowed: one for each."
         raise LoadError(msg + " Export the series again.")
-    _require_uniform(source, list(frames.orientations), list(frames.pixels_mm), [size[:2]])
-    axes = frames.orientations[0].reshape(2, 3).T
-    order = np.argsort(frames.positions @ np.cross(axes[:, 0], axes[:, 1]), kind="stable")
-    return Stack(
-        (path,) * count, frames.positions[order], axes, frames.pixels_mm[0][::-1], (size[0], size[1]),
-        sitk.GetPixelIDValueAsString(reader.GetPixelID()), tuple(int(i) for i in order),
-    )  # fmt: skip
+    return int(count)
 
 
-def read_stack(source: Source) -> Stack:
-    """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
-    names = _series_files(source.path, source.dataset) if source.path.is_dir() else (str(source.path),)
-    several = frames_of(Path(names[0])) if len(names) == 1 else None
-    if several is not None:
-        return _multiframe_stack(source, Path(names[0]), several)
-    files, positions, orientations, pixels, sizes = [], [], [], [], []
-    pixel_type = ""
-    for name in names:
-        reader = sitk.ImageFileReader()
-        reader.SetFileName(name)
-        reader.ReadImageInformation()
-        path = Path(name)
-        files.append(path)
-        positions.append(_numbers(reader, POSITION, 3, path))
-        orientations.append(_numbers(reader, ORIENTATION, 6, path))
-        pixels.append(_numbers(reader, PIXEL_SPACING, 2, path)[::-1])  # DICOM writes row spacing (y) first
-        sizes.append(tuple(reader.GetSize()[:2]))
-        pixel_type = sitk.GetPixelIDValueAsString(reader.GetPixelID())
-    _require_uniform(source, orientations, pixels, sizes)
-    axes = orientations[0].reshape(2, 3).T
-    order = np.argsort(np.array(positions) @ np.cross(axes[:, 0], axes[:, 1]), kind="stable")
-    return Stack(
-        tuple(files[i] for i in order), np.array(positions)[order], axes, pixels[0], sizes[0], pixel_type
-    )
-
-
-def _require_uniform(source: Source, orientations: list[Any], pixels: list[Any], sizes: list[Any]) -> None:
-    for name, values in (("orientation", orientations), ("pixel spacing", pixels), ("size", sizes)):
+def _require_uniform(source: Source, where: Frames, sizes: list[Any]) -> None:
+    pixels = where.pixels_mm[:, ::-1]  # DICOM writes row spacing (y) first
+    for name, values in (("orientation", where.orientations), ("pixel spacing", pixels), ("size", sizes)):
         kinds = Counter(tuple(np.round(v, 5)) for v in values)
         if len(kinds) > 1:
             found = "; ".join(

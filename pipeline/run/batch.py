@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 J = TypeVar("J")
+R = TypeVar("R")
 THREADS = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -28,10 +29,11 @@ LOST = "the worker process was killed (out of memory?); run this case alone with
 
 
 @dataclass(frozen=True)
-class Outcome(Generic[J]):
-    """What became of a job: done, or crashed with an error (its traceback in ``log``), or lost with its worker."""
+class Outcome(Generic[J, R]):
+    """What became of a job: a result, or an error (its traceback in ``log``), or lost with its worker."""
 
     job: J
+    result: R | None = None
     error: str = ""
     log: str = ""
 
@@ -42,8 +44,8 @@ class Outcome(Generic[J]):
 
 
 def run_all(
-    jobs: Sequence[J], work: Callable[[J], Any], workers: int = 1, address: str = ""
-) -> Iterator[Outcome[J]]:
+    jobs: Sequence[J], work: Callable[[J], R], workers: int = 1, address: str = ""
+) -> Iterator[Outcome[J, R]]:
     """Run ``work`` on every job, yielding outcomes as they come.
 
     With one worker in this process, else in as many processes, or on the dask cluster at ``address``.
@@ -55,23 +57,22 @@ def run_all(
         lost = yield from _collected(executor, jobs, work)
         for job in lost:
             again = yield from _collected(executor, [job], work)
-            yield from (Outcome(each, LOST, LOST) for each in again)
+            yield from (Outcome(each, None, LOST, LOST) for each in again)
 
 
-def guarded(work: Callable[[J], Any], job: J) -> Outcome[J]:
+def guarded(work: Callable[[J], R], job: J) -> Outcome[J, R]:
     """Run one job; an error becomes its outcome, since it must not take the batch along."""
     try:
-        work(job)
+        return Outcome(job, work(job))
     except Exception as error:
-        return Outcome(job, f"{type(error).__name__}: {error}", traceback.format_exc())
-    return Outcome(job)
+        return Outcome(job, None, f"{type(error).__name__}: {error}", traceback.format_exc())
 
 
 def _collected(
-    executor: Executor, jobs: Sequence[J], work: Callable[[J], Any]
-) -> Generator[Outcome[J], None, list[J]]:
+    executor: Executor, jobs: Sequence[J], work: Callable[[J], R]
+) -> Generator[Outcome[J, R], None, list[J]]:
     """Yield the outcomes of jobs and return those whose worker died."""
-    futures: dict[Future[Outcome[J]], J] = {executor.submit(guarded, work, job): job for job in jobs}
+    futures: dict[Future[Outcome[J, R]], J] = {executor.submit(guarded, work, job): job for job in jobs}
     lost: list[J] = []
     for future in as_completed(futures):
         # ``guarded`` raises nothing: what comes here is the end of a worker, under the name that its executor gives it

@@ -14,9 +14,10 @@ from pipeline.run import sweep
 from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.case import Job, finished, run_case
+from pipeline.run.junit import write_junit
 from pipeline.run.keys import file_hash
 from pipeline.run.provenance import collect
-from pipeline.run.results import crashed, write_json
+from pipeline.run.results import crashed, found_results, write_json
 from pipeline.study.manifest import Manifest
 from pipeline.study.schema import Case
 from pipeline.study.settings import to_toml
@@ -100,17 +101,11 @@ def guard_out(out: Path, manifest: Path) -> None:
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     """Run everything and write what is about the whole; the totals and the path of the page."""
     out, jobs = plan.out, plan.jobs
-    info: dict[str, Any] = {
-        "manifest": str(plan.manifest.path),
-        "manifest_sha256": file_hash(plan.manifest.path),
-    }
-    info |= {
-        "provenance": collect(),
-        "assumptions": plan.assumptions,
-        "config": plan.template.settings.as_dict(),
-    }
+    settings, manifest = plan.template.settings, plan.manifest.path
+    info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
+    info |= {"provenance": collect(), "assumptions": plan.assumptions, "config": settings.as_dict()}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
-    write_text(out / "config.resolved.toml", to_toml(plan.template.settings))
+    write_text(out / "config.resolved.toml", to_toml(settings))
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
     run_cases(plan, jobs)
     for point in plan.points:
@@ -119,29 +114,27 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
         sweep.write_sweep(out, plan.points)
     totals = aggregate(out, info, name)
     if junit:
-        from pipeline.run.junit import write_junit
-        from pipeline.run.results import found_results
-
         write_junit(junit, found_results(out))
     return totals, render_index(out, embed=plan.template.embed)
 
 
 def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     """Run jobs, the longest first, so that no long case is left for the end; a crash becomes that case's result."""
-    longest = (
-        sorted(jobs, key=lambda job: -job.case.frame_count) if plan.workers > 1 or plan.address else jobs
-    )
+    several = plan.workers > 1 or plan.address
+    longest = sorted(jobs, key=lambda job: -job.case.frame_count) if several else jobs
     for outcome in run_all(longest, run_case, plan.workers, plan.address):
         if not outcome.done:
-            job = outcome.job
-            job.folder.mkdir(parents=True, exist_ok=True)
-            for (
-                name
-            ) in CASE_FILES:  # of an earlier run: they would stand beside this result and belong to another
-                (job.folder / name).unlink(missing_ok=True)
-            with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
-                handle.write(outcome.log + "\n")
-            crashed(job.case, outcome.error).write(job.folder)
+            _write_crash(outcome.job, outcome.error, outcome.log)
+
+
+def _write_crash(job: Job, error: str, log: str) -> None:
+    """A result for a job that could not be finished; files of an earlier run, which belong to another one, go."""
+    job.folder.mkdir(parents=True, exist_ok=True)
+    for name in CASE_FILES:
+        (job.folder / name).unlink(missing_ok=True)
+    with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
+        handle.write(log + "\n")
+    crashed(job.case, error).write(job.folder)
 
 
 def intention(plan: Plan) -> list[str]:

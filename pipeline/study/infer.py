@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from pipeline.load import LoadError, load, read_header
+from pipeline.load import SUFFIXES, LoadError, load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.model import Array, Volume
 from pipeline.study.schema import natural_key
 
-SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_WIRE = """radius_mm = {radius}
 bending_stiffness_N_mm2 = [[0.0, 0.5], [30.0, 5.0], [100.0, 40.0]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -124,17 +125,7 @@ def to_toml(resolved: Resolved) -> str:
 
 
 def _line(key: str, item: dict[str, Any]) -> str:
-    """One setting; TOML has no null, so one that is left to the data is a comment."""
+    """One setting. TOML takes a value as JSON writes it, but has no null: what is left to the data is a comment."""
     if item["value"] is None:
         return f"# {key}: estimated from the data"
-    return f"{key} = {_literal(item['value'])}  # {item['source']}"
-
-
-def _literal(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_literal(v) for v in value) + "]"
-    return repr(value)
+    return f"{key} = {json.dumps(item['value'], ensure_ascii=False)}  # {item['source']}"

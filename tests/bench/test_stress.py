@@ -14,10 +14,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.benchmark.stress import AXES, draw, isolate, run_stress, stress_table
-from pipeline.benchmark.stress.judge import judge
+from pipeline.benchmark.stress import run as study
+from pipeline.benchmark.stress.axes import AXES, draw
 from pipeline.benchmark.stress.plan import Plan
+from pipeline.benchmark.stress.run import run_isolated, run_stress, stress_table
 from pipeline.benchmark.stress.scene_run import Outcome, build, run_scene, solve
+from pipeline.benchmark.stress.statics import assemble
+from pipeline.benchmark.stress.verdict import judge
+from solver import relax
 
 SEED = 400
 SAMPLE = 100
@@ -119,34 +123,26 @@ def test_every_relaxation_of_an_insertion_knows_its_start() -> None:
 
 
 def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
-    from pipeline.benchmark import statics
-
     plan, wire, wall, (solution, _) = _solved()
-    joints = statics.joints_of(wire, 20.0)
-    angles = statics.angles_of(solution.frames, joints)
+    chain = assemble(wire, wall, 20.0)
+    angles = chain.angles(solution.frames)
     angles[5, 0] += 0.01
-    nodes, frames = statics.roll_out(joints, angles, solution.joints_mm[0], solution.frames[0])
-    forces = statics.wall_forces(wall, wire, joints, nodes, frames)
-    energy = statics.energy_of(joints, frames, forces.energy, nodes)
+    nodes, frames = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
+    energy = chain.energy(nodes, frames)
     moved = replace(solution, joints_mm=nodes, frames=frames, energy_N_mm=energy)
     assert judge(plan, wire, wall, moved, float("nan"), False).fault == "not_at_rest"
 
 
 def test_the_judge_sees_a_saddle() -> None:
     """A straight column under four times its buckling load is at rest, and no minimum."""
-    from pipeline.benchmark import statics
-    from solver import relax
-
     plan = Plan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
     plan.stiffness = [[0.0, 10.0]]
     wire, _ = build(plan)
     force = 4 * np.pi**2 * 10.0 / (4 * 20.0**2)
     plan.load_N = (0.0, 0.0, -force)
     unloaded = relax(wire, None, depth_mm=20.0)
-    load = np.zeros((len(unloaded.joints_mm), 3))
-    load[-1, 2] = -force
-    joints = statics.joints_of(wire, 20.0)
-    energy = statics.energy_of(joints, unloaded.frames, 0.0, unloaded.joints_mm, load)
+    chain = assemble(wire, None, 20.0, plan.load_N)
+    energy = chain.energy(unloaded.joints_mm, unloaded.frames)
     column = replace(unloaded, energy_N_mm=energy)
     assert judge(plan, wire, None, column, float("nan"), True).fault == "no_minimum"
     assert not judge(plan, wire, None, column, float("nan"), False).fault
@@ -157,6 +153,11 @@ def _crashes(seed: int, index: int) -> Outcome:
         os._exit(3)
     if index == 2:
         time.sleep(60.0)
+    if index == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if index == 5:
+        msg = "no such scene"
+        raise KeyError(msg)
     if index == 3:
         stop = time.perf_counter() + 60.0
         while time.perf_counter() < stop:
@@ -164,27 +165,21 @@ def _crashes(seed: int, index: int) -> Outcome:
     return Outcome(index, ("roll",), "converged")
 
 
-def _serve_crashing(pipe: Any, seed: int, limit_s: float) -> None:
-    pipe.send(None)
-    while True:
-        index = pipe.recv()
-        isolate.limit_processor_time(limit_s)
-        pipe.send(_crashes(seed, index))
-
-
 def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(isolate, "_serve", _serve_crashing)
-    done = list(isolate.run_isolated(0, [0, 1, 0, 2, 3], limit_s=0.5))
-    assert [d.outcome for d in done] == ["converged", "crash", "converged", "hang", "hang"]
+    monkeypatch.setattr(study, "run_scene", _crashes)
+    done = list(run_isolated(0, [0, 1, 0, 2, 3, 4, 5, 0], limit_s=0.5))
+    assert [d.outcome for d in done[:5]] == ["converged", "crash", "converged", "hang", "hang"]
+    assert [d.outcome for d in done[5:]] == ["crash", "crash", "converged"]
     assert "exit code 3" in done[1].detail
     assert "no answer within 5 s" in done[3].detail
-    if hasattr(signal, "setitimer"):
-        assert "0.5 s of processor time" in done[4].detail
+    assert "0.5 s of processor time" in done[4].detail
+    assert "exit code -9" in done[5].detail
+    assert "KeyError: 'no such scene'" in done[6].detail
 
 
 def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "pipeline.benchmark.stress.study.run_isolated",
+        "pipeline.benchmark.stress.run.run_isolated",
         lambda *_: [
             Outcome(0, ("roll", "hull"), "converged", iterations=4),
             Outcome(1, ("roll",), "crash", "crash"),
@@ -219,7 +214,7 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
                 residual=[1e-7 / 3, math.nan][index % 2],
             )
 
-    monkeypatch.setattr("pipeline.benchmark.stress.study.run_isolated", runs)
+    monkeypatch.setattr("pipeline.benchmark.stress.run.run_isolated", runs)
     path = tmp_path / "scenes.csv"
     with pytest.raises(KeyboardInterrupt):
         run_stress(5, range(4), path=path)
@@ -236,6 +231,6 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
     # rows of another seed, or of another solver, are no rows of this study
     assert ran == [0, 1, 2, 3] * 2
     run_stress(6, range(4), path=path)
-    monkeypatch.setattr("pipeline.benchmark.stress.ledger.version", lambda: "other")
+    monkeypatch.setattr("pipeline.benchmark.stress.run.version", lambda: "other")
     run_stress(6, range(4), path=path)
     assert ran == [0, 1, 2, 3] * 4

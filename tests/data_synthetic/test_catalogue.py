@@ -12,10 +12,10 @@ import pytest
 import SimpleITK as sitk
 from PIL import Image
 
-from data_synthetic import catalogue, coverage
-from data_synthetic.scene import Study
+from data_synthetic import catalogue
+from data_synthetic.catalogue.study import Study
 from data_synthetic.write import FORMATS, write_study
-from tests.studies import catalogue_page
+from tests.studies import catalogue_page, coverage
 
 SMALL = {"frames": 2, "size": 40, "truth_step_mm": 0.8}
 

@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip("itk", reason="needs the extra [conebeam]")
 
-from data_synthetic.scan_grid import ScanGrid, centred_grid
-from data_synthetic.scanner import Greys
+from data_synthetic.anatomy.tubes import Anatomy, sweep
+from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
+from data_synthetic.scanner import Greys, Phantom
 from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
-from data_synthetic.tubes import Anatomy, sweep
 
 ARC = Arc(projections=60, pixels=96, photons=1e5)
 VESSEL = Anatomy((sweep("v", [[5.0, -3.0, -20.0], [5.0, -3.0, 24.0]], 2.5),))
@@ -26,7 +26,7 @@ def grid() -> ScanGrid:
 
 @pytest.fixture(scope="module")
 def scanner(grid: ScanGrid) -> ConeBeamScanner:
-    return ConeBeamScanner.of(VESSEL, None, 1.0, grid, ARC)
+    return ConeBeamScanner.of(Phantom(VESSEL), grid, ARC)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_contrast_washes_out_and_drifts(scanner: ConeBeamScanner, plain: np.ndar
 
 
 def test_less_exposure_is_more_noise(scanner: ConeBeamScanner, grid: ScanGrid, plain: np.ndarray) -> None:
-    dark = ConeBeamScanner.of(VESSEL, None, 1.0, grid, ARC, Greys(noise=300.0))
+    dark = ConeBeamScanner.of(Phantom(VESSEL, greys=Greys(noise=300.0)), grid, ARC)
     assert dark.arm.arc.photons == pytest.approx(ARC.photons / 9)
     middle = (slice(14, 20), slice(14, 34), slice(14, 34))
     noise = [np.diff(scan[middle], axis=2).std() for scan in (plain, dark.scan([], (0,)).astype(float))]
@@ -73,7 +73,7 @@ def test_less_exposure_is_more_noise(scanner: ConeBeamScanner, grid: ScanGrid, p
 def test_a_moved_phantom_is_seen_where_it_lies(grid: ScanGrid, plain: np.ndarray) -> None:
     """Moving the phantom by two voxels is moving the grid by two: greys move along, the calibration does not."""
     shift = np.array([1.0, 0.0, 0.0])
-    moved = ConeBeamScanner.of(VESSEL, None, 1.0, replace(grid, origin_mm=grid.origin_mm - shift), ARC)
+    moved = ConeBeamScanner.of(Phantom(VESSEL), replace(grid, origin_mm=grid.origin_mm - shift), ARC)
     there = moved.scan([], (0,)).astype(float)[:, :, 18:30].mean(axis=2)
     here = plain[:, :, 18:30].mean(axis=2)
     assert (

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from data_synthetic import shapes
-from data_synthetic.rod import edge_lengths, relax, shape_from_points
-from data_synthetic.rod_friction import ELASTIC_SLIP_MM, Held, Sliders
-from data_synthetic.tubes import Anatomy
-from data_synthetic.wire import TrueWire
-from data_synthetic.wire_truth import Insertion, _advance, _rod, replay
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.rod import replay as replaying
+from data_synthetic.rod.relax import Equilibrium, relax
+from data_synthetic.rod.replay import TrueInsertion, _advance, _rod, replay
+from data_synthetic.rod.rod import Rod, edge_lengths, shape_from_points
+from data_synthetic.rod.sliders import ELASTIC_SLIP_MM, Sliders
+from data_synthetic.rod.wire import TrueWire
 
 X, Y, Z = np.eye(3)
 LOAD_N, SOFT_N_MM2 = 0.5, 0.01
@@ -25,43 +27,56 @@ def bend() -> Anatomy:
     return shapes.bend(turn_mm=TURN_MM)
 
 
-def soft_wire_around(bend: Anatomy, friction: float) -> Insertion:
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A dead load on the tip of every wire."""
+
+    def with_load(insertion: TrueInsertion, depth: float, roll_deg: float) -> Rod:
+        rod = _rod(insertion, depth, roll_deg)
+        loads = np.zeros((len(rod.lengths) + 1, 3))
+        loads[-1] = LOAD_N * X
+        return replace(rod, loads_N=loads)
+
+    monkeypatch.setattr(replaying, "_rod", with_load)
+
+
+def soft_wire_around(bend: Anatomy, friction: float) -> TrueInsertion:
     """A wire as soft as a thread, drawn round the inner side of a bend of 90 degrees by a dead load."""
     wire = TrueWire(0.18, ((0.0, SOFT_N_MM2),), ((0.0, 0.0),))
     entry = np.array([INNER_MM, 0.0, -6.0])  # in line with the inner side, so that the clamp turns nothing
-    return Insertion(wire, bend, 20.0, entry, Z, X, 0.4, 0.4, friction, LOAD_N * X)
+    return TrueInsertion(wire, bend, 20.0, entry, Z, X, 0.4, 0.4, friction)
 
 
-def laid_around(insertion: Insertion) -> Held:
+def laid_around(insertion: TrueInsertion) -> Equilibrium:
     """At rest without friction: straight up, round the inner side, straight on."""
-    rod = _rod(insertion, DEPTH_MM, 0.0)
+    rod = replaying._rod(insertion, DEPTH_MM, 0.0)
     arc = np.concatenate([[0.0], np.cumsum(rod.lengths)])
     turn = TURN_MM - INNER_MM
     angle = np.clip((arc - 6.0) / turn, 0.0, np.pi / 2)
     x = INNER_MM + turn * (1.0 - np.cos(angle)) + np.maximum(arc - 6.0 - turn * np.pi / 2, 0.0)
     z = -6.0 + np.minimum(arc, 6.0) + turn * np.sin(angle)
-    state = relax(rod, shape_from_points(rod, np.column_stack([x, 0 * x, z])), 1e-7)
-    return Held(state, state.shape.points, 0.0)
+    return relax(rod, shape_from_points(rod, np.column_stack([x, 0 * x, z])), 1e-7)
 
 
-def base_tension(insertion: Insertion, held: Held, depth: float) -> float:
+def base_tension(insertion: TrueInsertion, state: Equilibrium, depth: float) -> float:
     """Tension behind the clamp: the strain of the first edge."""
-    first = held.equilibrium.shape.points[1] - held.equilibrium.shape.points[0]
+    first = state.shape.points[1] - state.shape.points[0]
     length = edge_lengths(depth, insertion.step_mm)[0]
     return insertion.wire.axial_N * (float(np.linalg.norm(first)) / length - 1.0)
 
 
-def drawn_then_let_in(insertion: Insertion) -> tuple[float, float]:
+def drawn_then_let_in(insertion: TrueInsertion) -> tuple[float, float]:
     """Tension at the clamp after the wire was drawn back by 2 mm, and after it was let in again."""
-    held, depth, tensions = laid_around(insertion), DEPTH_MM, []
+    state, depth, tensions = laid_around(insertion), DEPTH_MM, []
     for change in (-0.4, 0.4):
         for _ in range(5):
-            held = _advance(insertion, held, depth, depth + change, 0.0)
+            state = _advance(insertion, state, depth, depth + change, 0.0)
             depth += change
-        tensions.append(base_tension(insertion, held, depth))
+        tensions.append(base_tension(insertion, state, depth))
     return tensions[0], tensions[1]
 
 
+@pytest.mark.usefixtures("drawn")
 @pytest.mark.parametrize("friction", [0.1, 0.3])
 def test_capstan(bend: Anatomy, friction: float) -> None:
     """Euler: the tension behind a turn of theta is the load times exp(-mu theta) let in, exp(mu theta) drawn back."""
@@ -71,13 +86,14 @@ def test_capstan(bend: Anatomy, friction: float) -> None:
     assert drawn == pytest.approx(LOAD_N * turn, rel=0.01)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_without_friction_the_tension_is_the_load(bend: Anatomy) -> None:
     for tension in drawn_then_let_in(soft_wire_around(bend, 0.0)):
         assert tension == pytest.approx(LOAD_N, rel=2e-3)
 
 
 def test_vanishing_friction_is_no_friction(bend: Anatomy) -> None:
-    plain = Insertion(TrueWire(), bend, 2.0, np.array([0, 0, -8.0]), Z, X, 0.4, 0.4)
+    plain = TrueInsertion(TrueWire(), bend, 2.0, np.array([0, 0, -8.0]), Z, X, 0.4, 0.4)
     without, with_little = (
         next(iter(replay(replace(plain, friction=mu), [24.0]))).points_mm for mu in (0.0, 1e-7)
     )
@@ -86,7 +102,7 @@ def test_vanishing_friction_is_no_friction(bend: Anatomy) -> None:
 
 def test_friction_keeps_a_wire_where_it_was_pushed(bend: Anatomy) -> None:
     """In and out again: the frictionless wire comes back to where it was at that depth, the other one does not."""
-    plain = Insertion(TrueWire(), bend, 2.0, np.array([0, 0, -8.0]), Z, X, 0.4, 0.4)
+    plain = TrueInsertion(TrueWire(), bend, 2.0, np.array([0, 0, -8.0]), Z, X, 0.4, 0.4)
     apart = []
     for mu in (0.0, 0.2):
         there, _, back = replay(replace(plain, friction=mu), [24.0, 27.0, 24.0])

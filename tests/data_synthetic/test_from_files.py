@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from data_synthetic import shapes
-from data_synthetic.background import background_study
-from data_synthetic.catalogue import build, from_anatomy
-from data_synthetic.iso_wall import iso_wall
-from data_synthetic.scan_grid import centred_grid
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.centrelines import read_tree
+from data_synthetic.anatomy.from_tree import smooth_tube, way_through
+from data_synthetic.anatomy.iso_wall import iso_wall
+from data_synthetic.anatomy.tubes import Anatomy, ball
+from data_synthetic.catalogue import build, from_anatomy, from_background
+from data_synthetic.geometry.scan_grid import centred_grid
 from data_synthetic.scanner.coverage import lumen_coverage
-from data_synthetic.shapes.centrelines import read_tree
-from data_synthetic.shapes.from_tree import smooth_tube, way_through
-from data_synthetic.tubes import Anatomy, ball
-from data_synthetic.volume_files import to_image
+from data_synthetic.write.volumes import to_image
 
 Z = np.linspace(0.0, 45.0, 25)
 TRUNK = np.column_stack([3 * np.sin(Z / 15), 0.02 * Z**2, Z])
@@ -47,12 +46,12 @@ def write_curve(path: Path, system: str = "LPS", radii: bool = True) -> None:
 def test_swc_becomes_a_smooth_way_with_its_branch(tmp_path: Path) -> None:
     write_swc(tmp_path / "tree.swc", jitter=0.15)
     way = way_through(read_tree(tmp_path / "tree.swc"))
-    tube = way.anatomy.tubes[0]
+    tube = way.tubes[0]
     away = [np.min(np.linalg.norm(TRUNK - p, axis=1)) for p in tube.points_mm[20:-20:10]]
     assert np.median(away) < 1.0  # TRUNK's own points are 1.9 mm apart
-    assert len(way.anatomy.tubes) == 2
-    assert 55 < way.length_mm < 70  # the long edge was cut
-    assert way.anatomy.distance([TRUNK[12] + [8.0, 0.0, 2.4]])[0] < 0  # within the branch
+    assert len(way.tubes) == 2
+    assert 55 < tube.length_mm < 70  # the long edge was cut
+    assert way.distance([TRUNK[12] + [8.0, 0.0, 2.4]])[0] < 0  # within the branch
 
 
 @pytest.mark.parametrize("system", ["LPS", "RAS"])
@@ -120,7 +119,7 @@ def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
     grid = centred_grid([0, 0, 10], (72, 48, 96), 0.5)
     scan = 200 * lumen_coverage(shapes.bend(angle_deg=50.0, turn_mm=25.0, radius_mm=1.8), grid)
     sitk.WriteImage(to_image(scan.astype(np.uint8), grid), str(tmp_path / "scan.mha"))
-    study = background_study(tmp_path / "scan.mha", frames=2, truth_step_mm=0.8)
+    study = from_background(tmp_path / "scan.mha", frames=2, truth_step_mm=0.8)
     assert study.truth[-1].depth_mm > 20
     added = study.frame(1).astype(float) - study.reference
     index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
@@ -137,7 +136,7 @@ def test_wire_in_the_real_aneurysm_scan(real_data: Path, tmp_path: Path) -> None
     raw = gzip.decompress((real_data / "aneurism_3dra" / "aneurism.raw.gz").read_bytes())
     values = np.frombuffer(raw, np.uint8).reshape(256, 256, 256)
     sitk.WriteImage(sitk.GetImageFromArray(values), str(tmp_path / "aneurism.mha"))
-    study = background_study(tmp_path / "aneurism.mha", voxel_mm=0.5, truth_step_mm=0.4)
+    study = from_background(tmp_path / "aneurism.mha", voxel_mm=0.5, truth_step_mm=0.4)
     assert len(study.truth) == 12
     assert study.truth[-1].depth_mm > 60
 
@@ -145,6 +144,6 @@ def test_wire_in_the_real_aneurysm_scan(real_data: Path, tmp_path: Path) -> None
 @pytest.mark.parametrize("name", ["BG001", "BG0002", "BG05", "BG10", "BG0019"])
 def test_real_trees_give_a_way(real_data: Path, name: str) -> None:
     way = way_through(read_tree(real_data / "brava_swc" / f"{name}.swc"))
-    assert way.length_mm > 35
-    inner = way.anatomy.tubes[0].points_mm[8:-8]
-    assert np.all(way.anatomy.distance(inner) < -0.4)
+    assert way.tubes[0].length_mm > 35
+    inner = way.tubes[0].points_mm[8:-8]
+    assert np.all(way.distance(inner) < -0.4)

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data_synthetic.rod import Rod, make_rod, relax, shape_from_points
-from data_synthetic.shapes import straight
-from data_synthetic.wire import TrueWire
+from data_synthetic.anatomy.shapes import straight
+from data_synthetic.rod.relax import relax
+from data_synthetic.rod.rod import Rod, make_rod, shape_from_points
+from data_synthetic.rod.wire import TrueWire
 
 Array = NDArray[np.float64]
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore")]
@@ -79,7 +80,7 @@ def tube_force(ea: Any, step: float) -> Any:
 
 def truth(rod: Rod) -> Array:
     places = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    start = shape_from_points(rod, places[:, None] * rod.direction)
+    start = shape_from_points(rod, places[:, None] * rod.elastic.introducer)
     return relax(rod, start, 1e-8, 3000).shape.points
 
 
@@ -101,7 +102,7 @@ WIRE = TrueWire(RADIUS, ((0.0, STIFFNESS),), ((0.0, 0.0),))
 def test_cantilever_with_a_dead_load(capsys: pytest.CaptureFixture[str]) -> None:
     ea = pytest.importorskip("elastica", reason="needs the extra [peers]")
     load = 5.0 * STIFFNESS / LENGTH**2 * X
-    rod = make_rod(WIRE, np.zeros(3), Z, X, LENGTH, 0.2)
+    rod = make_rod(WIRE, Z, X, LENGTH, 0.2)
     loads = np.zeros((len(rod.lengths) + 1, 3))
     loads[-1] = load
     close(truth(replace(rod, loads_N=loads)), elastica_rod(ea, Z, X, load=load), "cantilever", capsys)
@@ -112,7 +113,7 @@ def test_wire_pressed_against_a_tube(capsys: pytest.CaptureFixture[str]) -> None
     direction = np.array([np.sin(TILT), 0.0, np.cos(TILT)])
     normal = np.array([np.cos(TILT), 0.0, -np.sin(TILT)])
     tube = straight(length_mm=60.0, radius_mm=2.0)
-    rod = make_rod(WIRE, np.zeros(3), direction, normal, LENGTH, 0.2, wall=tube, stiffness_N_mm2=WALL)
+    rod = replace(make_rod(WIRE, direction, normal, LENGTH, 0.2), wall=tube, stiffness_N_mm2=WALL)
     mine = truth(rod)
     assert np.any(np.hypot(mine[:, 0], mine[:, 1]) > 2.0 - RADIUS)  # it does touch
     close(mine, elastica_rod(ea, direction, normal, tube=True), "pressed against a tube", capsys)

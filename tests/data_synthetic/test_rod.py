@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from data_synthetic import shapes
-from data_synthetic.rod import Equilibrium, Rod, edge_lengths, make_rod, relax, shape_from_points
-from data_synthetic.tubes import Anatomy
-from data_synthetic.wire import TrueWire, cell_means
-from data_synthetic.wire_truth import Insertion, TrueFrame, replay
+from data_synthetic.anatomy import shapes
+from data_synthetic.anatomy.tubes import Anatomy
+from data_synthetic.rod.relax import Equilibrium, relax
+from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
+from data_synthetic.rod.rod import Rod, edge_lengths, make_rod, shape_from_points
+from data_synthetic.rod.wire import TrueWire, cell_means
 
 Array = NDArray[np.float64]
 LENGTH, STIFFNESS = 100.0, 10.0
@@ -21,7 +22,7 @@ X, Y, Z = np.eye(3)
 
 def cantilever(n: int, rest: float = 0.0, load_N: float = 0.0) -> Equilibrium:
     wire = TrueWire(bending_N_mm2=((0.0, STIFFNESS),), rest_curvature_per_mm=((0.0, rest),))
-    rod = make_rod(wire, np.zeros(3), X, Y, LENGTH, LENGTH / n)
+    rod = make_rod(wire, X, Y, LENGTH, LENGTH / n)
     loads = np.zeros((len(rod.lengths) + 1, 3))
     loads[-1, 1] = load_N
     return relax(replace(rod, loads_N=loads), straight_shape(rod), 1e-8, 3000)
@@ -29,7 +30,7 @@ def cantilever(n: int, rest: float = 0.0, load_N: float = 0.0) -> Equilibrium:
 
 def straight_shape(rod: Rod) -> object:
     places = np.concatenate([[0.0], np.cumsum(rod.lengths)])
-    return shape_from_points(rod, places[:, None] * rod.direction)
+    return shape_from_points(rod, places[:, None] * rod.elastic.introducer)
 
 
 @pytest.mark.parametrize(
@@ -81,8 +82,8 @@ def bend() -> Anatomy:
     return shapes.bend(turn_mm=15.0)
 
 
-def insertion(wall: Anatomy, step_mm: float, **changes: object) -> Insertion:
-    plain = Insertion(TrueWire(), wall, 2.0, np.array([0, 0, -8.0]), Z, X, step_mm, 0.4)
+def insertion(wall: Anatomy, step_mm: float, **changes: object) -> TrueInsertion:
+    plain = TrueInsertion(TrueWire(), wall, 2.0, np.array([0, 0, -8.0]), Z, X, step_mm, 0.4)
     return replace(plain, **changes)  # type: ignore[arg-type]
 
 

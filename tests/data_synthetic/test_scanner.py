@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from data_synthetic.scan_grid import ScanGrid, centred_grid
-from data_synthetic.scanner import Greys, PsfScanner
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
-from data_synthetic.tubes import Anatomy, ball, sweep
+from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
+from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
+from data_synthetic.scanner import Greys, Phantom, PsfScanner
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
+from data_synthetic.scanner.particles import splat, wire_particles
 from tests.naive.tubes import inside_share
 
 QUIET = Greys(noise=0.0, drift=0.0)
@@ -51,7 +52,7 @@ def test_wire_keeps_its_volume(grid: ScanGrid) -> None:
 
 
 def test_painted_wire_has_its_centre_on_its_curve(grid: ScanGrid, vessel: Anatomy) -> None:
-    scanner = PsfScanner.of(vessel, None, 1.0, grid, QUIET)
+    scanner = PsfScanner.of(Phantom(vessel, greys=QUIET), grid)
     added = scanner.scan([(LINE, 0.18)], (0,)).astype(float) - scanner.scan([], (0,))
     k = 30
     weights = added[:, :, k]
@@ -70,7 +71,7 @@ def test_noise_has_the_sd_asked_for_and_its_correlation(
     grid: ScanGrid, vessel: Anatomy, correlation: float
 ) -> None:
     greys = Greys(noise=100.0, drift=0.0, correlation_voxels=correlation)
-    scanner = PsfScanner.of(vessel, None, 1.0, grid, greys)
+    scanner = PsfScanner.of(Phantom(vessel, greys=greys), grid)
     noise = scanner.scan([], (1,)) - scanner.blurred
     assert noise.std() == pytest.approx(100.0, rel=0.02)
     neighbour = float(np.corrcoef(noise[1:].ravel(), noise[:-1].ravel())[0, 1])
@@ -88,7 +89,7 @@ def test_bone_keeps_its_gap(grid: ScanGrid, vessel: Anatomy) -> None:
 
 
 def test_a_frame_is_the_same_every_time_and_frames_differ(grid: ScanGrid, vessel: Anatomy) -> None:
-    scanner = PsfScanner.of(vessel, None, 1.0, grid, Greys())
+    scanner = PsfScanner.of(Phantom(vessel), grid)
     first, again, other = scanner.scan([], (5, 0)), scanner.scan([], (5, 0)), scanner.scan([], (5, 1))
     assert first.dtype == np.int16
     np.testing.assert_array_equal(first, again)
@@ -99,6 +100,6 @@ def test_noise_keeps_pace_with_the_peak_of_a_thin_wire(grid: ScanGrid, vessel: A
     coarse = replace(grid, spacing_mm=2 * grid.spacing_mm)
     noise = [
         (s.scan([], (2,)) - s.blurred).std()
-        for s in (PsfScanner.of(vessel, None, 1.0, g, Greys(drift=0.0)) for g in (grid, coarse))
+        for s in (PsfScanner.of(Phantom(vessel, greys=Greys(drift=0.0)), g) for g in (grid, coarse))
     ]
     assert noise[0] / noise[1] == pytest.approx(2**2, rel=0.05)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from data_synthetic.tubes import Anatomy, ball, sweep
+from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
 from tests.naive.tubes import tube_distance
 
 ARC = np.linspace(0.0, np.pi / 2, 20)

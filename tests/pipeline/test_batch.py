@@ -28,7 +28,7 @@ def work(folder: Path, job: int) -> None:
     (folder / f"done {job}").touch()
 
 
-def check(outcomes: dict[int, batch.Outcome[int]], folder: Path) -> None:
+def check(outcomes: dict[int, batch.Outcome[int, None]], folder: Path) -> None:
     assert sorted(outcomes) == list(range(8))
     assert outcomes[2].error == "RuntimeError: burst pipe"
     assert "in work" in outcomes[2].log

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from data_synthetic import catalogue
-from data_synthetic.scene import Study
-from data_synthetic.study import psf_scanner
+from data_synthetic.catalogue.study import Study
+from data_synthetic.scanner import PsfScanner
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
 from pipeline.register.frames import place_of, record, said
@@ -46,7 +46,7 @@ def scanned(study: Study, motion: Motion, wire: bool = True, seed: int = 0) -> V
     origin = motion.rotation.T @ (grid.origin_mm - motion.shift_mm)
     moved = replace(grid, origin_mm=origin, direction=motion.rotation.T @ grid.direction)
     wires = [(study.truth[-1].points_mm, study.setup.wire.radius_mm)] if wire else []
-    return volume(study, psf_scanner(study.setup, moved).scan(wires, (11, seed)))
+    return volume(study, PsfScanner.of(study.setup, moved).scan(wires, (11, seed)))
 
 
 def a_motion(centre: np.ndarray, voxels: float, degrees: float, seed: int) -> Motion:

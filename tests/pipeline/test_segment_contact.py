@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from data_synthetic import shapes
+from data_synthetic.anatomy import shapes
 from pipeline.model import Volume
 from pipeline.segment import segment
 from pipeline.status import FrameStatus, StageError

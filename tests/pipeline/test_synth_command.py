@@ -28,6 +28,49 @@ def test_wrong_words(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["bend", "--frames", "0"], "frames: got 0; allowed: 1 or more"),
+        (["bend", "--size", "3"], "allowed for bend: 48 or more for 4 voxels across a lumen of 4.0 mm"),
+        (["bend", "--size", "0"], "allowed for bend: 48 or more"),
+        (["bend", "--size", "-1"], "allowed for bend: 48 or more"),
+        (["straight", "--size", "64"], "allowed for straight: 72 or more"),
+        (["siphon", "--size", "64"], "allowed for siphon: 82 or more for voxels no wider than 1.8 wires"),
+        (["bend", "--voxel-mm", "0"], "voxel-mm: got 0; allowed: above 0"),
+        (["bend", "--voxel-mm", "-0.5"], "voxel-mm: got -0.5; allowed: above 0"),
+        (["bend", "--voxel-mm", "nan"], "voxel-mm: got nan; allowed: above 0"),
+        (["bend", "--seed", "-1"], "seed: got -1; allowed: 0 or more"),
+    ],
+)
+def test_wrong_numbers_are_refused_before_any_truth_is_computed(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    expected: str,
+) -> None:
+    monkeypatch.setattr("data_synthetic.catalogue.build", lambda *_args, **_numbers: pytest.fail("built"))
+    assert main(["synth", *words, "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert expected in said[0]
+    assert said[1:] == ["1 problem in the command line; nothing was run"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_written_over_an_earlier_one_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["synth", "short-wire", "-o", str(tmp_path / "study"), "--size", "54"]
+    for frames in ("3", "2"):
+        assert main([*words, "--frames", frames]) == 0
+    assert "an earlier study is replaced: its 6 files are removed" in capsys.readouterr().out
+    assert len(list((tmp_path / "study" / "frames").iterdir())) == 2
+    (tmp_path / "study" / "frames" / "mine.mha").write_bytes(b"")
+    assert main([*words, "--frames", "2"]) == 2
+    assert "mine.mha: would be read as a part of the study" in capsys.readouterr().err
+
+
 def test_no_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synth", "bend"]) == 2
     assert "-o DIR is missing" in capsys.readouterr().err

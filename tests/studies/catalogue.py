@@ -17,7 +17,7 @@ from time import process_time
 import pandas as pd
 
 from data_synthetic import catalogue
-from data_synthetic.scene import Scene
+from data_synthetic.catalogue.scene import NamedScene
 from data_synthetic.write import write_study
 from pipeline.cli import main as wireval
 from pipeline.run.log import STAGES
@@ -60,7 +60,7 @@ class Outcome:
         ]
 
 
-def size_of(scene: Scene) -> int:
+def size_of(scene: NamedScene) -> int:
     """Voxels along an edge."""
     return round(scene.fov_mm / (WIDE_VOXEL_MM if scene.fov_mm > WIDE_MM else VOXEL_MM))
 

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from data_synthetic import catalogue, coverage
-from data_synthetic.scene import Scene, Study
+from data_synthetic import catalogue
+from data_synthetic.catalogue.scene import NamedScene
+from data_synthetic.catalogue.study import Study
 from tests.studies import catalogue as small
+from tests.studies import coverage
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "data_synthetic" / "CATALOGUE.md"
@@ -45,7 +47,7 @@ def page() -> str:
     return HEAD.format(seed=small.SEED, frames=small.FRAMES) + "\n".join(rows) + "\n"
 
 
-def expected(scene: Scene) -> str:
+def expected(scene: NamedScene) -> str:
     """One status where all frames share it, else one a frame."""
     statuses = scene.expected_statuses(small.FRAMES)
     told = statuses[:1] if len(set(statuses)) == 1 else statuses

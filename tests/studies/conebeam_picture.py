@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from data_synthetic import catalogue
-from data_synthetic.scan_grid import ScanGrid
+from data_synthetic.geometry.scan_grid import ScanGrid
 from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def _projection(scene: str, seed: int, grid: ScanGrid, truth: dict[str, object])
     """What the detector sees from one side, 45 degrees off the front: columns across, rows along the axis."""
     setup = catalogue.describe(scene).setup(np.random.default_rng([seed, 1]), 1)
     arc = Arc(projections=1, degrees=-90.0)
-    scanner = ConeBeamScanner.of(setup.anatomy, setup.bone, setup.bone_gap_mm, grid, arc, setup.greys)
+    scanner = ConeBeamScanner.of(setup, grid, arc)
     points = np.array(truth["points_mm"], dtype=np.float64)
     counts = scanner.counts(scanner.wire_paths([(points, setup.wire.radius_mm)]), scanner.iodine())
     seen = np.random.default_rng(seed).poisson(counts[0])

@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data_synthetic import catalogue
-from data_synthetic.background import background_setup, read_scan
-from data_synthetic.scene import Setup
-from data_synthetic.study import planned_insertion
-from data_synthetic.vessel_way import vessel_threshold
-from data_synthetic.wire_truth import TrueFrame, replay
+from data_synthetic.catalogue.scene import Setup
+from data_synthetic.rod.replay import TrueFrame, replay
+from data_synthetic.rod.truth import at_step
 
 Array = NDArray[np.float64]
 ALLOWED_MM = 0.01
@@ -45,11 +43,11 @@ def at_arc(frame: TrueFrame, places: Array) -> Array:
 
 def scene_setup(name: str, seed: int, frames: int) -> Setup:
     """A scene's set-up, or that of a wire in a real scan where the name is a file."""
-    if not Path(name).suffix:
-        scene = catalogue.describe(name)
-        return scene.setup(np.random.default_rng([seed, 1]), min(frames, scene.frames))
-    values, grid = read_scan(Path(name), BACKGROUND_VOXEL_MM)
-    return background_setup(values, grid, vessel_threshold(values), 2 * frames)
+    rng = np.random.default_rng([seed, 1])
+    if Path(name).suffix:
+        return catalogue.background_scene(name, BACKGROUND_VOXEL_MM).setup(rng, 2 * frames)
+    scene = catalogue.describe(name)
+    return scene.setup(rng, min(frames, scene.frames))
 
 
 def halved(name: str, setup: Setup, step_mm: float) -> tuple[str, float, bool]:
@@ -57,7 +55,7 @@ def halved(name: str, setup: Setup, step_mm: float) -> tuple[str, float, bool]:
     step = min(step_mm, min(setup.depths_mm) / 8.0)
     clock = process_time()
     coarse, fine = (
-        list(replay(planned_insertion(setup, h), setup.depths_mm, setup.rolls_deg))
+        list(replay(at_step(setup.insertion(), h), setup.depths_mm, setup.rolls_deg))
         for h in (step, 0.5 * step)
     )
     moves = [apart(a, b) for a, b in zip(coarse, fine, strict=True)]

@@ -2,101 +2,151 @@
 
 from __future__ import annotations
 
-import json
+import importlib
 import os
-import subprocess
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from importlib.metadata import PackageNotFoundError, version
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from pipeline.benchmark.peers.judge import row_of
+from pipeline.benchmark.isolate import Lost, alone
+from pipeline.benchmark.peers.frame import EI, RivalWire, Task, pushed
+from pipeline.benchmark.peers.table import sentences
+from pipeline.benchmark.reference import Reference, reference, resampled, shape_error
+from pipeline.model import Array, arc_length
 
-ADAPTERS = {
-    "exudyn_cable": "exudyn",
-    "exudyn_plain": "exudyn",
-    "pypbd_rod": "pyPBD",
-    "mujoco_cable": "mujoco",
-    "pyelastica_rod": "pyelastica",
-}
-"""Module of this package and the distribution that it needs."""
-OURS = "wireval_chain"
+PEERS_CSV = "peers.csv"
+OURS = "wireval"
 LIMIT_S = 300.0
-WORK: dict[str, Sequence[tuple[str, int]]] = {
-    OURS: [
-        *(("cantilever", n) for n in (5, 10, 20, 50, 100, 200)),
-        *(("bend", n) for n in (30, 60, 120)),
-    ],
-    "exudyn_cable": [
-        *(("cantilever", n) for n in (5, 10, 20, 50, 100, 200)),
-        *(("bend", n) for n in (30, 60, 120)),
-    ],
-    "exudyn_plain": [*(("bend", n) for n in (30, 60, 120))],
-    "pypbd_rod": [*(("cantilever", n) for n in (20, 50, 100)), *(("bend", n) for n in (30, 60, 120))],
-    "pyelastica_rod": [("cantilever", 20), ("cantilever", 50), ("bend", 30), ("bend", 60)],
-    "mujoco_cable": [("cantilever", 20), ("cantilever", 50), ("bend", 30), ("bend", 60)],
-}
-QUICK_WORK = (("cantilever", 20), ("bend", 30))
-SUB_STEPS = (1, 2, 3, 4, 8)
+QUICK_SEGMENTS = {"cantilever": 20, "bend": 30}
+WARM_SEGMENTS = 6
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def missing(distribution: str) -> str:
-    """A sentence where a rival is not installed, else its version."""
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return ""
+def measure_peers(out: Path, say: Callable[[str], None], *, quick: bool) -> None:
+    """Rivals on scenes A and B, and this solver in the same run: a row for each, scene and number of segments.
 
-
-def run_peers(*, quick: bool = False, say: Callable[[str], None] = lambda _: None) -> pd.DataFrame:
-    """One row per simulator, scene and number of segments; those that are not installed are named and left out."""
+    Those that are not installed, or have no answer, are named and left out.
+    """
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started here
     rows = []
-    for adapter, task in _tasks(quick, say):
-        answer = ask(adapter, *task)
-        if "error" in answer:
-            say(f"{adapter} {' '.join(map(str, task))}: no answer: {answer['error']}")
+    for module, number, task in _work(quick, say):
+        row = ask(module, number, task)
+        if isinstance(row, Lost):
+            say(f"{module} {task.scene} {task.n} {task.per_mm}: no answer: {row.reason}")
             continue
-        row = row_of(answer, *task)
         rows.append(row)
         say(
             f"{row['method']:20s} {row['scene']:10s} n {row['joints']:4d}  {row['ms_per_step']:10.4f} ms per step "
             f"(last {row['ms_last_step']:.4f})  shape {row['shape_error_mm']:.5f} mm  tip {row['tip_error_mm']:.5f} mm"
             f"  {row['steps']} steps  callback {100 * row['callback_share']:.0f} %"
         )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    table.to_csv(out / PEERS_CSV, index=False)
+    for line in sentences(table):
+        say(line)
 
 
-def _tasks(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, tuple[str, int, int]]]:
-    for adapter, work in WORK.items():
-        if adapter in ADAPTERS and not missing(ADAPTERS[adapter]):
-            say(f"{ADAPTERS[adapter]}: not installed, left out; pip install 'wireval[peers]' brings it")
+def _work(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, int, Task]]:
+    """Of this solver and of all that the extra [peers] pins, in its order: file, number of the rival in it, task.
+
+    A rival's file has the name of its distribution in small letters. What it is asked is said by the file, which only
+    a process of its own imports.
+    """
+    pinned = [line for line in requires(OURS) or () if re.search(r"extra == .peers", line)]
+    for name in (OURS, *(re.split(r"[^\w.-]", line)[0] for line in pinned)):
+        try:
+            version(name)
+        except PackageNotFoundError:
+            say(f"{name}: not installed, left out; pip install 'wireval[peers]' brings it")
             continue
-        for scene, n in QUICK_WORK if quick else work:
-            yield adapter, (scene, n, 1)
-        if adapter in (OURS, "exudyn_cable") and not quick:
-            for count in SUB_STEPS[1:]:
-                yield adapter, ("bend", 60, count)
+        found = alone("spawn", partial(_tasks, name.lower(), quick), LIMIT_S)
+        if isinstance(found, Lost):
+            say(f"{name.lower()}: no answer: {found.reason}")
+            continue
+        yield from ((name.lower(), number, task) for number, task in found)
 
 
-def ask(adapter: str, scene: str, n: int, per_mm: int, limit_s: float = LIMIT_S) -> dict[str, Any]:
-    """Run one piece of work in a process of its own with one thread; ``error`` is a sentence where it fails."""
-    command = [sys.executable, "-m", "pipeline.benchmark.peers.worker", adapter, scene, str(n), str(per_mm)]
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    try:
-        done = subprocess.run(
-            command,
-            env={**os.environ, **threads},
-            capture_output=True,
-            text=True,
-            timeout=limit_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return {"error": f"none within {limit_s:g} s"}
-    line = done.stdout.strip().rpartition("\n")[2]
-    if done.returncode != 0 or not line.startswith("{"):
-        return {"error": done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"}
-    answer: dict[str, Any] = json.loads(line)
-    return answer
+def ask(module: str, number: int, task: Task) -> dict[str, Any] | Lost:
+    """The row of a rival, which a process of its own makes."""
+    return alone("spawn", partial(_row, module, number, task, reference(task.set_up)), LIMIT_S)
+
+
+def _rivals(module: str) -> tuple[type[RivalWire], ...]:
+    """The rivals of a file; what they print is lost."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    found: tuple[type[RivalWire], ...] = importlib.import_module(
+        f"pipeline.benchmark.peers.rivals.{module}"
+    ).RIVALS
+    return found
+
+
+def _tasks(module: str, quick: bool) -> list[tuple[int, Task]]:
+    """All that is asked of the rivals of a file, with their numbers; ``quick`` is one task a scene."""
+    found = []
+    for number, rival in enumerate(_rivals(module)):
+        tasks = [Task("cantilever", n) for n in rival.segments_a] + [
+            Task("bend", n) for n in rival.segments_b
+        ]
+        if quick:
+            tasks = [Task(scene, QUICK_SEGMENTS[scene]) for scene in dict.fromkeys(t.scene for t in tasks)]
+        else:
+            tasks += [Task("bend", 60, per_mm) for per_mm in rival.per_mm if per_mm > 1]
+        found += [(number, task) for task in tasks]
+    return found
+
+
+def _row(module: str, number: int, task: Task, limit: Reference) -> dict[str, Any]:
+    """A row with the columns of the benchmark's table and what the peers' own table adds.
+
+    What a rival has to load and compile is on nobody's clock.
+    """
+    rival, length = _rivals(module)[number], limit.arcs_mm[-1]
+    pushed(rival, Task(task.scene, WARM_SEGMENTS), 2)
+    runs = [pushed(rival, task) for _ in range(rival.repeats)]
+    wire, seconds = runs[-1][0], np.median([seconds for _, seconds in runs], axis=0)
+    points, total = wire.points(), float(seconds.sum())
+    # counted back from the tip: a node before the clamp falls away
+    arcs = arc_length(points)
+    shape, tip = shape_error(resampled(points, arcs - arcs[-1] + length, limit.arcs_mm), limit.points_mm)
+    steps = f"{wire.steps} steps" if len(seconds) == 1 else f"{wire.steps / len(seconds):.0f} steps per push"
+    return {
+        "scene": task.scene,
+        "method": wire.name,
+        "segment_mm": length / task.n,
+        "hull": "offset",
+        "tolerance": float("nan"),
+        "ms_per_mm": 1e3 * total / length,
+        "tip_error_mm": tip,
+        "shape_error_mm": shape,
+        "iterations": float("nan"),
+        "joints": task.n,
+        "steps_per_mm": task.per_mm,
+        "steps": len(seconds),
+        "ms_per_step": 1e3 * float(seconds.mean()),
+        "ms_last_step": 1e3 * float(seconds[-1]),
+        "relative_tip_error": tip / length,
+        "bending_uJ": 1e3 * bending_energy(points),
+        "callback_share": wire.wall_seconds / total if wire.wall_seconds else float("nan"),
+        "status": wire.status,
+        "note": wire.note.format(steps=steps),
+        "reference_uncertainty_mm": limit.uncertainty_mm,
+    }
+
+
+def bending_energy(points: Array) -> float:
+    """Bending energy of a polyline, N mm, by the turn at its nodes: tells a folded wire from a bent one."""
+    along = np.diff(points, axis=0)
+    length = np.linalg.norm(along, axis=1)
+    unit = along / length[:, None]
+    turn = np.arctan2(
+        np.linalg.norm(np.cross(unit[:-1], unit[1:]), axis=1), np.einsum("na,na->n", unit[:-1], unit[1:])
+    )
+    return float(0.5 * EI * np.sum(turn**2 / (0.5 * (length[:-1] + length[1:]))))

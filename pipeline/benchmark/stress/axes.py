@@ -1,21 +1,73 @@
-"""The axes of stress: each makes one thing of a scene extreme."""
+"""Random scenes: a moderate plan is drawn, then made extreme along one to three axes of stress."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from pipeline.benchmark.stress.plan import Plan, Rng, log_uniform
+from pipeline.benchmark.stress.plan import Plan
+
+Rng = np.random.Generator
+Changes = dict[str, Any]
+"""Fields of a plan and their new values."""
+LUMENS = ("straight", "bend", "siphon", "sphere", "channel")
 
 
-def wall_stiffness(plan: Plan, rng: Rng) -> None:
-    """From next to nothing to hard."""
-    plan.wall_stiffness = log_uniform(rng, 1e-3, 1e6)
+def draw(seed: int, index: int) -> Plan:
+    """Scene ``index`` of the study ``seed``: the same one every time, in any order."""
+    rng = np.random.default_rng([seed, index])
+    plan = _moderate(rng, seed, index)
+    names = list(AXES)
+    first = names[index % len(names)]
+    others = rng.choice([n for n in names if n != first], size=int(rng.integers(0, 3)), replace=False)
+    plan.axes = (first, *(str(n) for n in others))
+    for name in plan.axes:
+        plan = replace(plan, **AXES[name](plan, rng))
+    if not plan.depths:
+        # three on the way in, sometimes one on the way out
+        share = [0.3, 0.7, 1.0] + [0.4] * int(rng.random() < 0.3)
+        plan.depths = [plan.length_mm * s for s in share]
+    if plan.way == "relax":
+        plan.depths = [max(plan.depths)]
+    # a wire of a thousand joints is relaxed at a few depths only: this study is about stability, not speed
+    plan.step_mm = max(plan.step_mm, plan.length_mm / 60.0)
+    plan.rolls = (plan.rolls * len(plan.depths))[: len(plan.depths)]
+    return plan
 
 
-def bending_range(plan: Plan, rng: Rng) -> None:
+def _moderate(rng: Rng, seed: int, index: int) -> Plan:
+    segment = _log_uniform(rng, 0.5, 2.0)
+    voxel = _log_uniform(rng, 0.5, 1.0)
+    curved = rng.random() < 0.5
+    return Plan(
+        seed,
+        index,
+        way=str(rng.choice(["relax", "insertion"])),
+        segment_mm=segment,
+        joints=max(1, round(rng.uniform(15.0, 60.0) / segment)),
+        stiffness=[[0.0, _log_uniform(rng, 0.5, 5.0)], [30.0, _log_uniform(rng, 5.0, 40.0)]],
+        rest=[[0.0, 0.08], [10.0, 0.08], [10.0, 0.0]] if curved else [[0.0, 0.0]],
+        wall_stiffness=_log_uniform(rng, 0.1, 100.0),
+        quadrature=str(rng.choice(["joints", "joints", "tip", "segments"])),
+        initial=str(rng.choice(["slide", "slide", "translate"])),
+        lumen=str(rng.choice(LUMENS)),
+        lumen_mm=rng.uniform(1.0, 3.0),
+        voxel_mm=(voxel, voxel, voxel),
+        dtype=str(rng.choice(["float32", "float64"])),
+        rolls=[float(rng.uniform(-180.0, 180.0))],
+    )
+
+
+def _log_uniform(rng: Rng, low: float, high: float) -> float:
+    """A number between low and high, uniform in its logarithm."""
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def _bending_range(plan: Plan, rng: Rng) -> Changes:
     """Six decades of EI within one wire, in any order, with or without a jump."""
     count = int(rng.integers(2, 7))
     at = np.sort(rng.uniform(0.0, plan.length_mm, count))
@@ -24,174 +76,130 @@ def bending_range(plan: Plan, rng: Rng) -> None:
     rows = [[float(a), float(10.0**d)] for a, d in zip(at, decade, strict=True)]
     if rng.random() < 0.5:
         rows = [row for a, b in zip(rows, [*rows[1:], rows[-1]], strict=True) for row in (a, [b[0], a[1]])]
-    plan.stiffness = rows
+    return {"stiffness": rows}
 
 
-def segment_length(plan: Plan, rng: Rng) -> None:
+def _segment_length(plan: Plan, rng: Rng) -> Changes:
     """Segments from 0.1 to 5 mm, longer than the lumen is wide."""
-    length = plan.length_mm
-    plan.segment_mm = log_uniform(rng, 0.1, 5.0)
-    plan.joints = int(np.clip(round(length / plan.segment_mm), 1, 600))
+    segment = _log_uniform(rng, 0.1, 5.0)
+    return {"segment_mm": segment, "joints": int(np.clip(round(plan.length_mm / segment), 1, 600))}
 
 
-def joints(plan: Plan, rng: Rng) -> None:
+def _joints(plan: Plan, rng: Rng) -> Changes:
     """From one joint to two thousand."""
-    plan.joints = max(1, round(log_uniform(rng, 1.0, 2000.0)))
-    plan.segment_mm = log_uniform(rng, 0.1, 0.5) if plan.joints > 200 else plan.segment_mm
+    joints = max(1, round(_log_uniform(rng, 1.0, 2000.0)))
+    segment = _log_uniform(rng, 0.1, 0.5) if joints > 200 else plan.segment_mm
+    return {"joints": joints, "segment_mm": segment}
 
 
-def rest_curvature(plan: Plan, rng: Rng) -> None:
+def _rest_curvature(plan: Plan, rng: Rng) -> Changes:
     """Up to 1/(2 segment), whole wire or tip."""
     curvature = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0)) * 0.5 / plan.segment_mm
     where = rng.uniform(2.0, 15.0)
-    plan.rest = [[0.0, curvature]]
-    if rng.random() < 0.6:
-        plan.rest += [[where, curvature], [where, 0.0]]
+    tip = [[where, curvature], [where, 0.0]] if rng.random() < 0.6 else []
+    return {"rest": [[0.0, curvature], *tip]}
 
 
-def kinks(plan: Plan, rng: Rng) -> None:
+def _kinks(plan: Plan, rng: Rng) -> Changes:
     """A wire that was bent sharply at some places, or one that starts from a zigzag."""
+    length, segment = plan.length_mm, plan.segment_mm
     if rng.random() < 0.5:
-        limit = 0.5 / plan.segment_mm
-        rows = [[0.0, 0.0]]
-        for at in np.sort(rng.uniform(0.0, plan.length_mm, 3)):
-            kink = float(rng.uniform(-limit, limit))
-            rows += [[float(at), 0.0], [float(at), kink]]
-            rows += [[float(at) + plan.segment_mm, kink], [float(at) + plan.segment_mm, 0.0]]
-        plan.rest = [[max(r[0], p[0]), r[1]] for r, p in zip(rows, [rows[0], *rows[:-1]], strict=True)]
-        plan.rest = [
-            [float(a), v]
-            for a, v in zip(np.maximum.accumulate([r[0] for r in rows]), (r[1] for r in rows), strict=True)
-        ]
-        return
-    plan.way = "relax"
+        places, values = [0.0], [0.0]
+        for at in np.sort(rng.uniform(0.0, length, 3)):
+            kink = float(rng.uniform(-0.5 / segment, 0.5 / segment))
+            places += [at, at, at + segment, at + segment]
+            values += [0.0, kink, kink, 0.0]
+        ordered = np.maximum.accumulate(places).tolist()
+        return {"rest": [[place, value] for place, value in zip(ordered, values, strict=True)]}
     steps = rng.normal(size=(40, 3)) + np.array([0.0, 0.0, rng.uniform(0.0, 1.5)])
-    steps *= plan.length_mm / 40 / np.linalg.norm(steps, axis=1, keepdims=True)
-    plan.start = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    steps *= length / 40 / np.linalg.norm(steps, axis=1, keepdims=True)
+    return {"way": "relax", "start": np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])}
 
 
-def narrow_lumen(plan: Plan, rng: Rng) -> None:
+def _narrow_lumen(_: Plan, rng: Rng) -> Changes:
     """Narrower than the wire."""
-    plan.radius_mm = rng.uniform(0.3, 1.5)
-    plan.lumen_mm = plan.radius_mm * rng.uniform(0.2, 1.0)
+    radius = rng.uniform(0.3, 1.5)
+    return {"radius_mm": radius, "lumen_mm": radius * rng.uniform(0.2, 1.0)}
 
 
-def stenosis(plan: Plan, rng: Rng) -> None:
-    """Down to a twentieth of the radius."""
-    plan.stenosis = rng.uniform(0.05, 0.6)
-
-
-def misaligned_entry(plan: Plan, rng: Rng) -> None:
-    """Up to 60 degrees off the vessel's axis."""
-    plan.tilt_deg = rng.uniform(5.0, 60.0)
-
-
-def entry_outside(plan: Plan, rng: Rng) -> None:
-    """The entry lies beside the vessel's axis, often outside the vessel."""
-    plan.offset_mm = plan.lumen_mm * rng.uniform(0.5, 3.0)
-
-
-def zero_step(plan: Plan, rng: Rng) -> None:
+def _zero_step(plan: Plan, rng: Rng) -> Changes:
     """No step, a step of rounding, no wire at all."""
-    plan.way = "insertion"
     end = plan.length_mm * rng.uniform(0.3, 1.0)
     choices = [0.0, end, end, end + 1e-13, end * (1 + 1e-9), 1e-12, end]
-    plan.depths = [choices[i] for i in rng.permutation(len(choices))]
+    return {"way": "insertion", "depths": [choices[i] for i in rng.permutation(len(choices))]}
 
 
-def huge_step(plan: Plan, rng: Rng) -> None:
-    """All the way at once, and back."""
-    plan.way = "insertion"
-    plan.step_mm = 1e6
-    plan.depths = [plan.length_mm * rng.uniform(1.0, 3.0), 1.0, plan.length_mm]
-
-
-def roll(plan: Plan, rng: Rng) -> None:
-    """Up to ten turns, either way, in one go or spread over the depths."""
-    plan.rolls = [float(rng.uniform(-3600.0, 3600.0)) for _ in range(int(rng.integers(1, 4)))]
-
-
-def bad_grid(plan: Plan, rng: Rng) -> None:
-    """NaN or inf in the grid."""
-    plan.defect = str(rng.choice(["nan", "inf", "-inf", "all nan"]))
-
-
-def grid_edge(plan: Plan, rng: Rng) -> None:
-    """The grid ends on the way."""
-    plan.crop = rng.uniform(0.15, 0.8)
-
-
-def single_voxel(plan: Plan, rng: Rng) -> None:
-    """A lumen of one voxel, or a chain of single voxels."""
-    plan.lumen = str(rng.choice(["voxel", "thread"]))
-
-
-def precision(plan: Plan, rng: Rng) -> None:
-    """Grids in other types, anisotropic and turned, far from the origin."""
-    plan.dtype = str(rng.choice(["float16", "float32", "float64"]))
-    plan.voxel_mm = tuple(float(v) for v in rng.uniform(0.3, 1.5, 3))  # type: ignore[assignment]
-    plan.turned = bool(rng.random() < 0.7)
-    plan.far_mm = float(rng.choice([0.0, 1e3, 1e5]))
-
-
-def hull(plan: Plan, rng: Rng) -> None:
-    """Sampled hulls of few and many points, and thick wires."""
-    plan.hull = f"samples:{int(rng.choice([1, 2, 3, 4, 8, 16]))}"
-    plan.radius_mm = rng.uniform(0.0, 0.8)
-    plan.quadrature = "joints"
-
-
-def noisy_wall(plan: Plan, rng: Rng) -> None:
-    """A field that is no distance: noise of up to a voxel on every node."""
-    plan.noise_mm = float(max(plan.voxel_mm)) * rng.uniform(0.05, 1.0)
-
-
-def loads(plan: Plan, rng: Rng) -> None:
+def _loads(plan: Plan, rng: Rng) -> Changes:
     """A dead load on the tip, with or without a wall, from a feather to far beyond buckling."""
-    plan.wall = bool(rng.random() < 0.4)
-    alpha = log_uniform(rng, 1e-3, 300.0)
-    force = alpha * plan.stiffness[-1][1] / plan.length_mm**2
+    wall = bool(rng.random() < 0.4)
+    force = _log_uniform(rng, 1e-3, 300.0) * plan.stiffness[-1][1] / plan.length_mm**2
     direction = rng.normal(size=3)
     if rng.random() < 0.5:
         direction = np.array([0.0, 0.0, -1.0])
-    load = force * direction / np.linalg.norm(direction)
-    plan.load_N = (float(load[0]), float(load[1]), float(load[2]))
+    return {"wall": wall, "load_N": tuple((force * direction / np.linalg.norm(direction)).tolist())}
 
 
-def torsion(plan: Plan, rng: Rng) -> None:
-    """A finite torsional stiffness, over six decades."""
-    plan.torsion = log_uniform(rng, 1e-3, 1e3)
-
-
-def friction(plan: Plan, rng: Rng) -> None:
-    """Coulomb friction up to 1."""
-    plan.way = "insertion"
-    plan.friction = log_uniform(rng, 1e-3, 1.0)
-
-
-def radius(plan: Plan, rng: Rng) -> None:
-    """A wire without thickness, or thicker than a segment is long."""
-    plan.radius_mm = float(rng.choice([0.0, 1e-6, plan.segment_mm * 2]))
-
-
-def few_iterations(plan: Plan, rng: Rng) -> None:
-    """An iteration limit that is too low: it must be said, and the state must be sound."""
-    plan.max_iterations = int(rng.integers(1, 6))
-
-
-def closed_form(plan: Plan, rng: Rng) -> None:
+def _closed_form(plan: Plan, rng: Rng) -> Changes:
     """The seed's relaxation on a scene of its own scale."""
-    plan.method = "closed_form"
-    plan.joints = min(plan.joints, 40)
-    plan.rolls = [math.copysign(min(abs(r), 90.0), r) for r in plan.rolls]
-    plan.max_iterations = int(rng.choice([200, 2000]))
+    rolls = [math.copysign(min(abs(r), 90.0), r) for r in plan.rolls]
+    limit = int(rng.choice([200, 2000]))
+    return {"method": "closed_form", "joints": min(plan.joints, 40), "rolls": rolls, "max_iterations": limit}
 
 
-AXES: dict[str, Callable[[Plan, Rng], None]] = {
-    f.__name__: f
-    for f in (
-        wall_stiffness, bending_range, segment_length, joints, rest_curvature, kinks, narrow_lumen, stenosis,
-        misaligned_entry, entry_outside, zero_step, huge_step, roll, bad_grid, grid_edge, single_voxel, precision,
-        hull, noisy_wall, loads, torsion, friction, radius, few_iterations, closed_form,
-    )
-}  # fmt: skip
+AXES: dict[str, Callable[[Plan, Rng], Changes]] = {
+    # from next to nothing to hard
+    "wall_stiffness": lambda _, rng: {"wall_stiffness": _log_uniform(rng, 1e-3, 1e6)},
+    "bending_range": _bending_range,
+    "segment_length": _segment_length,
+    "joints": _joints,
+    "rest_curvature": _rest_curvature,
+    "kinks": _kinks,
+    "narrow_lumen": _narrow_lumen,
+    # down to a twentieth of the radius
+    "stenosis": lambda _, rng: {"stenosis": rng.uniform(0.05, 0.6)},
+    # up to 60 degrees off the vessel's axis
+    "misaligned_entry": lambda _, rng: {"tilt_deg": rng.uniform(5.0, 60.0)},
+    # the entry lies beside the vessel's axis, often outside the vessel
+    "entry_outside": lambda plan, rng: {"offset_mm": plan.lumen_mm * rng.uniform(0.5, 3.0)},
+    "zero_step": _zero_step,
+    # all the way at once, and back
+    "huge_step": lambda plan, rng: {
+        "way": "insertion",
+        "step_mm": 1e6,
+        "depths": [plan.length_mm * rng.uniform(1.0, 3.0), 1.0, plan.length_mm],
+    },
+    # up to ten turns, either way, in one go or spread over the depths
+    "roll": lambda _, rng: {"rolls": rng.uniform(-3600.0, 3600.0, int(rng.integers(1, 4))).tolist()},
+    # NaN or inf in the grid, at one voxel or at all
+    "bad_grid": lambda _, rng: {"defect": str(rng.choice(["nan", "inf", "-inf", "all nan"]))},
+    # the grid ends on the way
+    "grid_edge": lambda _, rng: {"crop": rng.uniform(0.15, 0.8)},
+    # a lumen of one voxel, or a chain of single voxels
+    "single_voxel": lambda _, rng: {"lumen": str(rng.choice(["voxel", "thread"]))},
+    # grids in other types, anisotropic and turned, far from the origin
+    "precision": lambda _, rng: {
+        "dtype": str(rng.choice(["float16", "float32", "float64"])),
+        "voxel_mm": tuple(rng.uniform(0.3, 1.5, 3).tolist()),
+        "turned": bool(rng.random() < 0.7),
+        "far_mm": float(rng.choice([0.0, 1e3, 1e5])),
+    },
+    # sampled hulls of few and many points, and thick wires
+    "hull": lambda _, rng: {
+        "hull": f"samples:{int(rng.choice([1, 2, 3, 4, 8, 16]))}",
+        "radius_mm": rng.uniform(0.0, 0.8),
+        "quadrature": "joints",
+    },
+    # a field that is no distance: noise of up to a voxel on every node
+    "noisy_wall": lambda plan, rng: {"noise_mm": float(max(plan.voxel_mm)) * rng.uniform(0.05, 1.0)},
+    "loads": _loads,
+    # a finite one, over six decades
+    "torsion": lambda _, rng: {"torsion": _log_uniform(rng, 1e-3, 1e3)},
+    # Coulomb's, up to 1
+    "friction": lambda _, rng: {"way": "insertion", "friction": _log_uniform(rng, 1e-3, 1.0)},
+    # a wire without thickness, or thicker than a segment is long
+    "radius": lambda plan, rng: {"radius_mm": float(rng.choice([0.0, 1e-6, plan.segment_mm * 2]))},
+    # an iteration limit that is too low: it must be said, and the state must be sound
+    "few_iterations": lambda _, rng: {"max_iterations": int(rng.integers(1, 6))},
+    "closed_form": _closed_form,
+}
+"""Each makes one thing of a scene extreme. The order is part of what a seed stands for."""

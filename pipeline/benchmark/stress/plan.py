@@ -1,20 +1,36 @@
-"""One random scene: a moderate one, then made extreme along one to three axes."""
+"""The plan of one random scene, and the wall and the entry that it makes: at the origin, the vessel along +z."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-Rng = np.random.Generator
+from pipeline.benchmark.stress.statics import Array
+from pipeline.benchmark.vessels import lumen_distance
+from solver import Grid
+
+BOXES = {
+    "straight": ([-7.0, -7.0, -6.0], [7.0, 7.0, 70.0]),
+    "bend": ([-7.0, -7.0, -6.0], [34.0, 7.0, 40.0]),
+    "siphon": ([-7.0, -7.0, -6.0], [30.0, 7.0, 34.0]),
+    "sphere": ([-14.0, -14.0, -6.0], [14.0, 14.0, 24.0]),
+    "channel": ([-16.0, -7.0, -6.0], [16.0, 7.0, 60.0]),
+    "voxel": ([-5.0, -5.0, -5.0], [5.0, 5.0, 12.0]),
+    "thread": ([-5.0, -5.0, -5.0], [5.0, 5.0, 30.0]),
+}
+"""The grid's two corners for each kind of lumen, mm."""
+SHOWN = (
+    "way", "lumen", "segment_mm", "joints", "wall_stiffness", "hull", "quadrature", "dtype", "method"
+)  # fmt: skip
+"""What the table of scenes shows of a plan."""
 
 
 @dataclass
 class Plan:
-    """Everything that defines a scene, before anything is built; axes change it in place.
+    """Everything that defines a scene, before anything is built.
 
     way : "relax" (one relaxation from a start shape) or "insertion" (depth after depth).
     lumen : kind of vessel; ``lumen_mm`` its radius, ``voxel_mm`` (3,) the grid's spacing.
@@ -53,7 +69,7 @@ class Plan:
     depths: list[float] = field(default_factory=list)
     rolls: list[float] = field(default_factory=list)
     step_mm: float = 1.0
-    start: NDArray[np.float64] | None = None
+    start: Array | None = None
     load_N: tuple[float, float, float] = (0.0, 0.0, 0.0)
     max_iterations: int = 200
 
@@ -62,77 +78,48 @@ class Plan:
         """Length of the wire in the vessel at its longest."""
         return self.segment_mm * self.joints
 
-    def describe(self) -> dict[str, Any]:
-        """What the table of scenes shows of it."""
-        names = (
-            "way",
-            "lumen",
-            "segment_mm",
-            "joints",
-            "wall_stiffness",
-            "hull",
-            "quadrature",
-            "dtype",
-            "method",
-        )
-        return {name: getattr(self, name) for name in names}
+
+def lumen_grid(plan: Plan) -> Grid:
+    """The plan's wall on its grid, with its defects."""
+    rng = np.random.default_rng([plan.seed, plan.index, 1])
+    low, high = np.array(BOXES[plan.lumen])
+    high = low + (high - low) * np.array([1.0, 1.0, plan.crop])
+    axes = [np.arange(a, b, v) for a, b, v in zip(low, high, plan.voxel_mm, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    if plan.lumen in ("voxel", "thread"):
+        values = np.full(points.shape[:3], 0.5 * float(np.mean(plan.voxel_mm)))
+        inside = np.hypot(points[..., 0], points[..., 1]) < 0.5 * min(plan.voxel_mm[:2]) + 1e-9
+        where = np.argwhere(inside & (points[..., 2] > -1.0))[: 1 if plan.lumen == "voxel" else None]
+        values[tuple(where.T)] *= -1.0
+    else:
+        values = lumen_distance(plan.lumen, points, plan.lumen_mm)
+        middle = 0.5 * (axes[2][0] + axes[2][-1])
+        narrow = (1.0 - plan.stenosis) * plan.lumen_mm * np.exp(-(((points[..., 2] - middle) / 2.5) ** 2))
+        values = values + narrow
+    values = values + plan.noise_mm * rng.uniform(-1.0, 1.0, values.shape)
+    values = values.astype(plan.dtype)
+    if plan.defect == "all nan":
+        values[...] = np.nan
+    elif plan.defect:
+        values[tuple(rng.integers(0, values.shape))] = float(plan.defect)
+    turn, shift = placement(plan)
+    return Grid(values, np.array(plan.voxel_mm), turn @ low + shift, turn)
 
 
-def log_uniform(rng: Rng, low: float, high: float) -> float:
-    """A number between low and high, uniform in its logarithm."""
-    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+def placement(plan: Plan) -> tuple[Array, Array]:
+    """Rotation (3, 3) and shift (3,) that take the scene to where it lies."""
+    rng = np.random.default_rng([plan.seed, plan.index, 2])
+    turn = Rotation.random(rng=rng).as_matrix() if plan.turned else np.eye(3)
+    return turn, plan.far_mm * rng.uniform(-1.0, 1.0, 3)
 
 
-LUMENS = ("straight", "bend", "siphon", "sphere", "channel")
-
-
-def draw(seed: int, index: int) -> Plan:
-    """Scene ``index`` of the study ``seed``: the same one every time, in any order."""
-    from pipeline.benchmark.stress.axes import AXES
-
-    rng = np.random.default_rng([seed, index])
-    plan = _moderate(rng, seed, index)
-    names = list(AXES)
-    first = names[index % len(names)]
-    others = rng.choice([n for n in names if n != first], size=int(rng.integers(0, 3)), replace=False)
-    for name in (first, *others):
-        AXES[str(name)](plan, rng)
-    plan.axes = (first, *(str(n) for n in others))
-    _finish(plan, rng)
-    return plan
-
-
-def _moderate(rng: Rng, seed: int, index: int) -> Plan:
-    segment = log_uniform(rng, 0.5, 2.0)
-    voxel = log_uniform(rng, 0.5, 1.0)
-    curved = rng.random() < 0.5
-    return Plan(
-        seed,
-        index,
-        way=str(rng.choice(["relax", "insertion"])),
-        segment_mm=segment,
-        joints=max(1, round(rng.uniform(15.0, 60.0) / segment)),
-        stiffness=[[0.0, log_uniform(rng, 0.5, 5.0)], [30.0, log_uniform(rng, 5.0, 40.0)]],
-        rest=[[0.0, 0.08], [10.0, 0.08], [10.0, 0.0]] if curved else [[0.0, 0.0]],
-        wall_stiffness=log_uniform(rng, 0.1, 100.0),
-        quadrature=str(rng.choice(["joints", "joints", "tip", "segments"])),
-        initial=str(rng.choice(["slide", "slide", "translate"])),
-        lumen=str(rng.choice(LUMENS)),
-        lumen_mm=rng.uniform(1.0, 3.0),
-        voxel_mm=(voxel, voxel, voxel),
-        dtype=str(rng.choice(["float32", "float64"])),
-        rolls=[float(rng.uniform(-180.0, 180.0))],
-    )
-
-
-def _finish(plan: Plan, rng: Rng) -> None:
-    """Depths that the axes left open: three on the way in, sometimes one on the way out."""
-    if not plan.depths:
-        share = [0.3, 0.7, 1.0] + [0.4] * int(rng.random() < 0.3)
-        plan.depths = [plan.length_mm * s for s in share]
-    if plan.way == "relax":
-        plan.depths = [max(plan.depths)]
-    # a wire of a thousand joints is relaxed at a few depths only: this study is about stability, not speed
-    plan.step_mm = max(plan.step_mm, plan.length_mm / 60.0)
-    turns = len(plan.depths)
-    plan.rolls = (plan.rolls * turns)[:turns]
+def entry(plan: Plan) -> tuple[Array, Array, Array]:
+    """Entry point, direction and material axis of the plan, in the scene's place."""
+    rng = np.random.default_rng([plan.seed, plan.index, 3])
+    turn, shift = placement(plan)
+    about = rng.uniform(0.0, 2 * np.pi)
+    side = np.array([np.cos(about), np.sin(about), 0.0])
+    tilt = np.deg2rad(plan.tilt_deg)
+    direction = np.cos(tilt) * np.array([0.0, 0.0, 1.0]) + np.sin(tilt) * side
+    across = np.array([-np.sin(about), np.cos(about), 0.0])
+    return turn @ (plan.offset_mm * side) + shift, turn @ direction, turn @ across

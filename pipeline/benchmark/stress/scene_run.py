@@ -7,10 +7,10 @@ from time import process_time
 
 import numpy as np
 
-from pipeline.benchmark import statics
-from pipeline.benchmark.stress.judge import Verdict, judge, tip_load
-from pipeline.benchmark.stress.lumens import entry, lumen_grid
-from pipeline.benchmark.stress.plan import Plan, draw
+from pipeline.benchmark.stress.axes import draw
+from pipeline.benchmark.stress.plan import Plan, entry, lumen_grid
+from pipeline.benchmark.stress.statics import assemble
+from pipeline.benchmark.stress.verdict import Verdict, judge
 from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
 
 DEEP_EVERY = 3
@@ -46,13 +46,16 @@ def run_scene(seed: int, index: int) -> Outcome:
         wire, wall = build(plan)
         results = solve(plan, wire, wall)
     except ValueError as error:
-        return _refused(plan, str(error), process_time() - clock)
+        # a refusal is sound if it says what, got what, what is allowed and what to do
+        sound = "got " in str(error) and str(error).count(";") >= 2 and len(str(error)) > 30
+        outcome, fault, detail = "refused", "" if sound else "bad_message", str(error)
     except Exception as error:  # a study of crashes must survive them
-        text = f"{type(error).__name__}: {error}"
-        return Outcome(index, plan.axes, "exception", "exception", text, seconds=process_time() - clock)
-    seconds = process_time() - clock
-    verdicts = [judge(plan, wire, wall, s, e, index % DEEP_EVERY == 0) for s, e in results]
-    return _outcome(plan, [s for s, _ in results], verdicts, seconds)
+        outcome, fault, detail = "exception", "exception", f"{type(error).__name__}: {error}"
+    else:
+        seconds = process_time() - clock
+        verdicts = [judge(plan, wire, wall, s, e, index % DEEP_EVERY == 0) for s, e in results]
+        return _outcome(plan, [s for s, _ in results], verdicts, seconds)
+    return Outcome(index, plan.axes, outcome, fault, detail, seconds=process_time() - clock)
 
 
 def build(plan: Plan) -> tuple[GuideWire, VesselWall | None]:
@@ -66,64 +69,48 @@ def build(plan: Plan) -> tuple[GuideWire, VesselWall | None]:
 def solve(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[Solution, float]]:
     """Solutions, each with the energy that its last relaxation started from."""
     at, direction, axis = entry(plan)
-    if plan.way == "relax":
-        return [_relaxed(plan, wire, wall)]
-    insertion = Insertion(
-        wire, wall, at, direction, plan.method, plan.initial, axis,
-        max_iterations=plan.max_iterations, step_mm=plan.step_mm, quadrature=plan.quadrature, tip_load_N=plan.load_N,
-    )  # fmt: skip
-    found = insertion.to_depths(plan.depths, roll_deg=plan.rolls)
+    if plan.way == "insertion":
+        insertion = Insertion(
+            wire, wall, at, direction, plan.method, plan.initial, axis, max_iterations=plan.max_iterations,
+            step_mm=plan.step_mm, quadrature=plan.quadrature, tip_load_N=plan.load_N,
+        )  # fmt: skip
+        found = list(insertion.to_depths(plan.depths, roll_deg=plan.rolls))
+    else:
+        start = None if plan.start is None else plan.start + at
+        found = [
+            relax(
+                wire, wall, depth_mm=plan.depths[0], entry_mm=at, entry_direction=direction, material_axis=axis,
+                roll_deg=plan.rolls[0], start_mm=start, load_N=plan.load_N if any(plan.load_N) else None,
+                method=plan.method, max_iterations=plan.max_iterations, quadrature=plan.quadrature,
+            )
+        ]  # fmt: skip
+        if start is None and (plan.quadrature == "joints" or wall is None) and plan.friction == 0.0:
+            return [(found[0], _straight_energy(plan, wire, wall, found[0]))]
     return [(s, s.work["start_energy_N_mm"]) for s in found]
 
 
-def _relaxed(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> tuple[Solution, float]:
-    at, direction, axis = entry(plan)
-    start = None if plan.start is None else plan.start + at
-    solution = relax(
-        wire, wall, depth_mm=plan.depths[0], entry_mm=at, entry_direction=direction, material_axis=axis,
-        roll_deg=plan.rolls[0], start_mm=start, load_N=plan.load_N if any(plan.load_N) else None,
-        method=plan.method, max_iterations=plan.max_iterations, quadrature=plan.quadrature,
-    )  # fmt: skip
-    # the second assembly where it knows the start, else what the solver says of it
-    known = plan.start is None and (plan.quadrature == "joints" or wall is None) and plan.friction == 0.0
-    before = solution.work["start_energy_N_mm"]
-    return solution, _straight_energy(plan, wire, wall, solution) if known else before
-
-
 def _straight_energy(plan: Plan, wire: GuideWire, wall: VesselWall | None, solution: Solution) -> float:
-    """Energy of the wire laid straight along the entry direction."""
-    joints = statics.joints_of(wire, plan.depths[0])
-    angle = np.zeros((len(joints.length), 3))
-    angle[:, 1] = -joints.rest
-    nodes, frames = statics.roll_out(joints, angle, solution.joints_mm[0], solution.frames[0])
-    forces = statics.wall_forces(wall, wire, joints, nodes, frames)
-    return statics.energy_of(joints, frames, forces.energy, nodes, tip_load(plan, len(joints.length)))
-
-
-def _refused(plan: Plan, message: str, seconds: float) -> Outcome:
-    """A refusal is sound if it says what, got what, what is allowed and what to do."""
-    sound = "got " in message and message.count(";") >= 2 and len(message) > 30
-    fault = "" if sound else "bad_message"
-    return Outcome(plan.index, plan.axes, "refused", fault, message, seconds=seconds)
+    """Energy of the wire laid straight along the entry direction, by the second assembly."""
+    chain = assemble(wire, wall, plan.depths[0], plan.load_N)
+    angles = np.zeros((len(chain.length), 3))
+    angles[:, 1] = -chain.rest
+    return chain.energy(*chain.roll_out(angles, solution.joints_mm[0], solution.frames[0]))
 
 
 def _outcome(plan: Plan, solutions: list[Solution], verdicts: list[Verdict], seconds: float) -> Outcome:
+    """The first fault, the last status that is not "converged", and the worst of what was measured."""
     bad = next((v for v in verdicts if v.fault), None)
-    ends = [s.status for s in solutions]
-    failed = [s for s in ends if s is not Status.CONVERGED]
-    name = failed[-1].identifier if failed else "converged"
-    residual = [v.residual for v in verdicts if np.isfinite(v.residual)]
-    stretch = [v.stretch for v in verdicts if np.isfinite(v.stretch)]
+    failed = [s.status for s in solutions if s.status is not Status.CONVERGED]
     return Outcome(
         plan.index,
         plan.axes,
-        name,
+        failed[-1].identifier if failed else "converged",
         bad.fault if bad else "",
         bad.detail if bad else (failed[-1].value if failed else ""),
-        sum(s.iterations for s in solutions),
-        len(ends),
-        len(ends) - len(failed),
-        max(residual, default=float("nan")),
-        max(stretch, default=float("nan")),
-        seconds,
+        iterations=sum(s.iterations for s in solutions),
+        depths=len(solutions),
+        depths_converged=len(solutions) - len(failed),
+        residual=max((v.residual for v in verdicts if np.isfinite(v.residual)), default=float("nan")),
+        stretch=max((v.stretch for v in verdicts if np.isfinite(v.stretch)), default=float("nan")),
+        seconds=seconds,
     )

@@ -1,0 +1,96 @@
+"""Centrelines with radii from files: SWC trees (BraVa) and 3D Slicer curves with a Radius measurement."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from data_synthetic.geometry.vectors import Array, Index
+
+LONGEST_EDGE_MM = 5.0
+"""Longer SWC edges join trees that are not joined in the body (BraVa opens the circle of Willis); they are cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Points (n, 3) LPS mm, radii (n,) mm, and undirected edges (m, 2) between points.
+
+    meant : points among which the wire's way is to be found (a slice); the others are neighbours.
+    """
+
+    points_mm: Array
+    radii_mm: Array
+    edges: Index
+    meant: slice = field(default_factory=lambda: slice(None))
+
+
+def read_tree(path: str | Path) -> Tree:
+    """A tree from .swc or .mrk.json; the siblings of a .mrk.json in its folder come along as neighbours.
+
+    Raises ValueError when the file is neither, or holds no radii.
+    """
+    path = Path(path)
+    if path.name.endswith(".swc"):
+        return _read_swc(path)
+    if path.name.endswith(".mrk.json"):
+        others = sorted(p for p in path.parent.glob("*.mrk.json") if p != path)
+        return _joined([_read_curve(path), *(_read_curve(p) for p in others)])
+    msg = f"anatomy: {path}: got {path.suffix!r}; allowed: .swc, .mrk.json (with a Radius measurement); convert it"
+    raise ValueError(msg)
+
+
+def _read_swc(path: Path) -> Tree:
+    """Columns id, type, x, y, z, radius, parent; comments start with #."""
+    rows = np.loadtxt(path, comments="#", ndmin=2)
+    if rows.shape[1] != 7:
+        msg = f"anatomy: {path}: got {rows.shape[1]} columns; an SWC line has 7: id type x y z radius parent"
+        raise ValueError(msg)
+    place = {int(i): k for k, i in enumerate(rows[:, 0])}
+    points, radii = rows[:, 2:5], rows[:, 5]
+    edges = np.array(
+        [(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64
+    )
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    # coincident points are one point: an edge of no length has no direction
+    keep = length <= LONGEST_EDGE_MM
+    return _without_repeats(points, radii, edges[keep])
+
+
+def _without_repeats(points: Array, radii: Array, edges: Index) -> Tree:
+    """Merge points that coincide (BraVa repeats branch points), keeping the larger radius."""
+    unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    radius = np.zeros(len(unique))
+    np.maximum.at(radius, inverse, radii)
+    merged = np.sort(inverse[edges], axis=1)
+    merged = np.unique(merged[merged[:, 0] != merged[:, 1]], axis=0)
+    return Tree(unique, radius, merged)
+
+
+def _read_curve(path: Path) -> Tree:
+    """One Slicer curve; RAS coordinates are turned into LPS."""
+    markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
+    points = np.array([p["position"] for p in markup["controlPoints"]], dtype=np.float64)
+    if markup.get("coordinateSystem", "LPS") in ("RAS", 0):
+        points *= [-1.0, -1.0, 1.0]
+    radii = next(
+        (m.get("controlPointValues") for m in markup.get("measurements", []) if m["name"] == "Radius"), None
+    )
+    if radii is None or len(radii) != len(points):
+        msg = f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
+        raise ValueError(msg)
+    chain = np.column_stack([np.arange(len(points) - 1), np.arange(1, len(points))])
+    return Tree(points, np.array(radii, dtype=np.float64), chain)
+
+
+def _joined(trees: list[Tree]) -> Tree:
+    starts = np.cumsum([0, *(len(t.points_mm) for t in trees)])
+    return Tree(
+        np.concatenate([t.points_mm for t in trees]),
+        np.concatenate([t.radii_mm for t in trees]),
+        np.concatenate([t.edges + s for t, s in zip(trees, starts[:-1], strict=True)]),
+        slice(0, len(trees[0].points_mm)),
+    )

@@ -1,0 +1,118 @@
+"""From a scene to a study: truth computed, phantom voxelised, manifest made as inexact as a real one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from data_synthetic.catalogue.limits import Wanted
+from data_synthetic.catalogue.scene import NamedScene, ScannerFactory, Setup
+from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
+from data_synthetic.geometry.vectors import normal_to, rotate, unit
+from data_synthetic.rod.replay import TrueFrame
+from data_synthetic.rod.truth import converged_truth
+from data_synthetic.scanner.phantom import Scan, Wires
+
+ENTRY_ERROR_VOXELS = 0.5
+"""How far the manifest's entry is from the true one: what pointing at a scan achieves."""
+
+DIRECTION_ERROR_DEG = 2.0
+"""How far the manifest's entry direction is from the true one."""
+
+DEPTH_NOISE_MM = 0.2
+"""sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Scans with truth, in memory. ``frame(i)`` makes one volume, the same every time; ``reference`` has no wire.
+
+    manifest : the [[case]] table, [wires] and [case.wall] as nested dicts.     truth : one TrueFrame per frame,
+    in the phantom as the reference shows it (a moved phantom carries its wire along).
+    """
+
+    name: str
+    why: str
+    grid: ScanGrid
+    reference: Scan
+    truth: tuple[TrueFrame, ...]
+    expected: tuple[str, ...]
+    manifest: Mapping[str, Any]
+    quality: Mapping[str, float]
+    setup: Setup
+    frame: Callable[[int], Scan] = field(repr=False)
+
+    def frames(self) -> Iterator[Scan]:
+        """All frames, one at a time."""
+        return (self.frame(i) for i in range(len(self.truth)))
+
+
+def make_study(
+    scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth_step_mm: float | None
+) -> Study:
+    """Build a scene; one in a real scan brings its own voxels and scanner. truth_step_mm : as in converged_truth."""
+    seed, (frames, size, voxel_mm) = wanted.seed, wanted.of(scene)
+    setup = scene.setup(np.random.default_rng([seed, 1]), frames)
+    grid, scanner = scene.scan or (scan_grid(setup, size, voxel_mm), scanner)
+    truth, quality = converged_truth(setup.insertion(), setup.depths_mm, setup.rolls_deg, truth_step_mm)
+    # voxelising is done once per place of the phantom, the last one kept; moving it by +shift moves the grid by -shift
+    at = lru_cache(maxsize=1)(
+        lambda shift: scanner(setup, replace(grid, origin_mm=grid.origin_mm - np.array(shift)))
+    )
+
+    def frame(number: int) -> Scan:
+        shift = np.zeros(3) if setup.motion_mm is None else setup.motion_mm[number]
+        shown = setup.visible is None or setup.visible[number]
+        wires: Wires = [(truth[number].points_mm, setup.wire.radius_mm)] if shown else []
+        return at(tuple(shift.tolist())).scan([*wires, *setup.others], (seed, 3, number))
+
+    return Study(
+        name=scene.name,
+        why=scene.why,
+        grid=grid,
+        reference=at((0.0, 0.0, 0.0)).scan((), (seed, 2)),
+        truth=truth,
+        expected=scene.expected_statuses(frames),
+        manifest=describe_case(scene.name, setup, grid, np.random.default_rng([seed, 4])),
+        quality=quality,
+        setup=setup,
+        frame=frame,
+    )
+
+
+def scan_grid(setup: Setup, size: int, voxel_mm: float) -> ScanGrid:
+    """Voxels of the set-up's proportions about its middle, ``size`` voxels of ``voxel_mm`` along each axis."""
+    ratio = np.array(setup.spacing_ratio)
+    shape = tuple(max(2, round(size / r)) for r in ratio)
+    return centred_grid(setup.centre_mm, shape, voxel_mm * ratio, setup.axes)
+
+
+def describe_case(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:
+    """The case as its user would write it down: entry, direction and depths not quite right."""
+    offset = rng.normal(size=3)
+    offset *= ENTRY_ERROR_VOXELS * grid.voxel_mm / np.linalg.norm(offset)
+    axis = normal_to(rng.normal(size=3), setup.direction)
+    direction = rotate(unit(setup.direction), axis, np.radians(DIRECTION_ERROR_DEG))
+    depths = np.array(setup.depths_mm) + rng.normal(0.0, DEPTH_NOISE_MM, len(setup.depths_mm))
+    wire = {
+        "radius_mm": setup.wire.radius_mm,
+        "bending_stiffness_N_mm2": [list(k) for k in setup.wire.bending_N_mm2],
+        "rest_curvature_per_mm": [list(k) for k in setup.wire.rest_curvature_per_mm],
+        "torsional_stiffness_N_mm2": setup.wire.torsional_N_mm2,
+    }
+    case = {
+        "id": name,
+        "role": "validation",
+        "entry_mm": (setup.entry_mm + offset).round(4).tolist(),
+        "entry_direction": direction.round(6).tolist(),
+        "material_axis": normal_to(setup.material_axis, direction).round(6).tolist(),
+        "wire": "wire",
+        "insertion_mm": depths.round(3).tolist(),
+        "roll_deg": list(setup.rolls_deg) if len(set(setup.rolls_deg)) > 1 else setup.rolls_deg[0],
+        "wall": {"stiffness_N_mm2": setup.stiffness_N_mm2, "friction": setup.friction},
+    }
+    return {"wires": {"wire": wire}, "case": case}

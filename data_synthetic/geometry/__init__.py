@@ -1,0 +1,1 @@
+"""Directions, curves and voxel grids: what every room of the package measures with."""

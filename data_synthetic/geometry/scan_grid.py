@@ -1,0 +1,73 @@
+"""Where the voxels of a scan lie, and which of them are near given points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from data_synthetic._compile import on_disk
+from data_synthetic.geometry.vectors import Array, Index
+
+Volume = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class ScanGrid:
+    """shape (nx, ny, nz); voxel (i, j, k) is centred at ``origin + direction @ (spacing * (i, j, k))``, LPS mm."""
+
+    shape: tuple[int, ...]
+    spacing_mm: Array
+    origin_mm: Array
+    direction: Array
+
+    def to_index(self, points_mm: ArrayLike) -> Array:
+        """Continuous indices (n, 3)."""
+        offset = np.asarray(points_mm, dtype=np.float64) - self.origin_mm
+        return np.asarray(offset @ self.direction / self.spacing_mm)
+
+    def to_mm(self, index: ArrayLike) -> Array:
+        """LPS mm (n, 3)."""
+        return np.asarray((np.asarray(index) * self.spacing_mm) @ self.direction.T + self.origin_mm)
+
+    @property
+    def voxel_mm(self) -> float:
+        """Edge of the cube of a voxel's volume."""
+        return float(np.prod(self.spacing_mm) ** (1.0 / 3.0))
+
+
+def centred_grid(
+    centre_mm: ArrayLike, shape: tuple[int, ...], spacing_mm: ArrayLike, direction: ArrayLike | None = None
+) -> ScanGrid:
+    """The grid of that shape and spacing whose middle lies at ``centre_mm``."""
+    spacing = np.broadcast_to(np.asarray(spacing_mm, dtype=np.float64), 3).copy()
+    axes = np.eye(3) if direction is None else np.asarray(direction, dtype=np.float64)
+    half = axes @ (0.5 * (np.array(shape) - 1) * spacing)
+    return ScanGrid(shape, spacing, np.asarray(centre_mm, dtype=np.float64) - half, axes)
+
+
+def voxels_near(index: Array, radii_mm: Array, grid: ScanGrid) -> Index:
+    """Indices (m, 3) of voxels within radii (n,) mm of points (n, 3), which are given in index coordinates."""
+    mask = np.zeros(grid.shape, dtype=bool)
+    mark_balls(index, radii_mm, grid.spacing_mm, mask)
+    return np.argwhere(mask)
+
+
+@on_disk()
+def mark_balls(centres: Array, radii: Array, spacing: Array, mask: NDArray[np.bool_]) -> None:
+    """Set mask where a voxel centre lies within radii (n,) mm of centres (n, 3) given in index coordinates."""
+    for n in range(len(centres)):
+        r = radii[n]
+        lo, hi = np.empty(3, np.int64), np.empty(3, np.int64)
+        for a in range(3):
+            lo[a] = max(0, int(np.ceil(centres[n, a] - r / spacing[a])))
+            hi[a] = min(mask.shape[a] - 1, int(np.floor(centres[n, a] + r / spacing[a])))
+        for i in range(lo[0], hi[0] + 1):
+            x = (i - centres[n, 0]) * spacing[0]
+            for j in range(lo[1], hi[1] + 1):
+                y = (j - centres[n, 1]) * spacing[1]
+                for k in range(lo[2], hi[2] + 1):
+                    z = (k - centres[n, 2]) * spacing[2]
+                    if x * x + y * y + z * z <= r * r:
+                        mask[i, j, k] = True

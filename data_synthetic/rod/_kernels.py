@@ -1,0 +1,238 @@
+"""Compiled bending, twist and stretch of a discrete Kirchhoff rod: arrays and numbers in, arrays out.
+
+Bergou, Wardetzky, Robinson, Audoly, Grinspun, "Discrete elastic rods", ACM Trans. Graph. 27 (2008) 63, with the
+time-parallel frames of Bergou et al., ACM Trans. Graph. 29 (2010) 116. Unknowns are node positions and edge
+angles, so stretch and twist cost energy instead of being ruled out. Edge 0 is the introducer, which never moves;
+edge j >= 1 ends in node j. Unknowns are interleaved: angle of edge j at 4(j-1), node j at 4(j-1)+1..3.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from data_synthetic._compile import on_disk
+from data_synthetic.geometry.vectors import Array
+
+Vector = tuple[float, float, float]
+
+BANDS = 11
+"""Rows of the lower band matrix: a vertex couples three nodes and two angles, 4 unknowns apart."""
+
+LOCAL = np.eye(8, BANDS, 4) - np.eye(8, BANDS)
+LOCAL[[3, 7]] = np.eye(BANDS)[[3, 7]]
+"""Edges and angles (8,) about a vertex from its unknowns (11,): node v - 1, angle, node v, angle, node v + 1."""
+
+HESSIAN_STEP = 1e-6
+"""Relative step of the central difference of the exact gradient; its error is about 1e-10 of the stiffness."""
+
+
+class Elastic(NamedTuple):
+    """What stays of a rod of n edges while it relaxes; vertex v lies between edges v and v + 1.
+
+    introducer : direction (3,) of edge 0.     lengths (n,) : of the edges at rest, mm.     axial : EA in N.
+    bend, rest, twist (n,) : EI / cell, rest curvature x cell, GJ / cell of every vertex.
+    """
+
+    introducer: Array
+    lengths: Array
+    bend: Array
+    rest: Array
+    twist: Array
+    axial: float
+
+
+class Shape(NamedTuple):
+    """Nodes (n + 1, 3), tangents and directors (n + 1, 3) of the introducer and the n edges."""
+
+    points: Array
+    tangents: Array
+    directors: Array
+
+
+@on_disk()
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@on_disk()
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@on_disk()
+def plus(a: Vector, b: Vector) -> Vector:
+    """Sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@on_disk()
+def row(values: Array, i: int) -> Vector:
+    """Row i of an array (n, 3)."""
+    return values[i, 0], values[i, 1], values[i, 2]
+
+
+@on_disk()
+def transport(m: Vector, a: Vector, b: Vector) -> Vector:
+    """Vector m, normal to unit a, carried by the smallest rotation that takes unit a to unit b."""
+    f = dot(m, b) / (1.0 + dot(a, b))
+    return m[0] - f * (a[0] + b[0]), m[1] - f * (a[1] + b[1]), m[2] - f * (a[2] + b[2])
+
+
+@on_disk()
+def moved_edge(q: Array, k: int, tangent: Vector, director: Vector) -> tuple[float, Vector, Vector]:
+    """Length, tangent and director 1 of the edge ``q[k:k+3]``, turned by ``q[k+3]`` from its tangent and director."""
+    x, y, z = q[k], q[k + 1], q[k + 2]
+    length = np.sqrt(x * x + y * y + z * z)
+    t = (x / length, y / length, z / length)
+    a = transport(director, tangent, t)
+    b = cross(t, a)
+    c, s = np.cos(q[k + 3]), np.sin(q[k + 3])
+    return length, t, (c * a[0] + s * b[0], c * a[1] + s * b[1], c * a[2] + s * b[2])
+
+
+@on_disk()
+def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient: bool) -> float:
+    """Energy of vertex v and its gradient g (8,) for q = (edge before, its angle, edge after, its angle)."""
+    le, e, a = moved_edge(q, 0, row(shape.tangents, v), row(shape.directors, v))
+    lf, f, b = moved_edge(q, 4, row(shape.tangents, v + 1), row(shape.directors, v + 1))
+    chi = 1.0 + dot(e, f)
+    k = cross(e, f)
+    k = (2.0 * k[0] / chi, 2.0 * k[1] / chi, 2.0 * k[2] / chi)
+    c, d = cross(e, a), cross(f, b)
+    k1 = 0.5 * dot(k, plus(c, d))
+    k2 = -0.5 * dot(k, plus(a, b))
+    u = transport(a, e, f)
+    w = cross(u, b)
+    tau = np.arctan2(dot(w, f), dot(u, b))
+    bend, rest, twist = rod.bend[v], rod.rest[v], rod.twist[v]
+    energy: float = 0.5 * bend * ((k1 - rest) ** 2 + k2 * k2) + 0.5 * twist * tau * tau
+    if not want_gradient:
+        return energy
+    p1, p2, pt = bend * (k1 - rest), bend * k2, twist * tau
+    # p1 * director 2 - p2 * director 1 gathers both curvatures into one vector
+    ab, cd = plus(a, b), plus(c, d)
+    both = (
+        p1 * (cd[0] / chi) - p2 * (ab[0] / chi),
+        p1 * (cd[1] / chi) - p2 * (ab[1] / chi),
+        p1 * (cd[2] / chi) - p2 * (ab[2] / chi),
+    )
+    stretch = p1 * k1 + p2 * k2
+    before, after = cross(f, both), cross(e, both)
+    for i in range(3):
+        mean = (e[i] + f[i]) / chi
+        g[i] = (before[i] - stretch * mean + 0.5 * pt * k[i]) / le
+        g[4 + i] = (-after[i] - stretch * mean + 0.5 * pt * k[i]) / lf
+    g[3] = -0.5 * (p1 * dot(k, a) + p2 * dot(k, c)) - pt
+    g[7] = -0.5 * (p1 * dot(k, b) + p2 * dot(k, d)) + pt
+    return energy
+
+
+@on_disk()
+def load_vertex(points: Array, angles: Array, introducer: Array, v: int, q: Array) -> None:
+    """Fill q with the edges and angles around vertex v."""
+    for a in range(3):
+        q[a] = introducer[a] if v == 0 else points[v, a] - points[v - 1, a]
+        q[4 + a] = points[v + 1, a] - points[v, a]
+    q[3] = 0.0 if v == 0 else angles[v - 1]
+    q[7] = angles[v]
+
+
+@on_disk()
+def elastic_energy(points: Array, angles: Array, shape: Shape, rod: Elastic) -> float:
+    """Stored energy, N mm, of nodes (n + 1, 3); angles (n,) are increments from the directors of a shape."""
+    q, g = np.zeros(8), np.zeros(8)
+    total: float = 0.0
+    for v in range(len(rod.bend)):
+        load_vertex(points, angles, rod.introducer, v, q)
+        total += vertex(q, v, shape, rod, g, False)
+        length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
+        total += 0.5 * rod.axial / rod.lengths[v] * (length - rod.lengths[v]) ** 2
+    return total
+
+
+@on_disk()
+def scatter(v: int, g: Array, h: Array, gradient: Array, bands: Array) -> None:
+    """Add the local gradient (8,) and Hessian (8, 8) of vertex v to the system."""
+    full = LOCAL.T @ h @ LOCAL
+    first = 4 * v - 7  # unknown of node v - 1; those of the clamp are negative
+    for i in range(max(0, -first), BANDS):
+        for a in range(8):
+            gradient[first + i] += LOCAL[a, i] * g[a]
+        for j in range(max(0, -first), i + 1):
+            bands[i - j, first + j] += full[i, j]
+
+
+@on_disk()
+def bend_and_twist(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, h: Array) -> None:
+    """Fill gradient g (8,) and Hessian h (8, 8) of vertex v; h by central differences of the exact gradient."""
+    gp, gm = np.zeros(8), np.zeros(8)
+    vertex(q, v, shape, rod, g, True)
+    for a in range(8):
+        step = HESSIAN_STEP if a % 4 == 3 else HESSIAN_STEP * rod.lengths[v]
+        kept = q[a]
+        q[a] = kept + step
+        vertex(q, v, shape, rod, gp, True)
+        q[a] = kept - step
+        vertex(q, v, shape, rod, gm, True)
+        q[a] = kept
+        for b in range(8):
+            h[b, a] = 0.5 * (gp[b] - gm[b]) / step
+    for a in range(8):
+        for b in range(a):
+            h[a, b] = h[b, a] = 0.5 * (h[a, b] + h[b, a])
+
+
+@on_disk()
+def elastic_system(shape: Shape, rod: Elastic, gradient: Array, bands: Array) -> None:
+    """Fill gradient (4n,) and lower-band Hessian (11, 4n) of the stored energy."""
+    q, g, h, angles = np.zeros(8), np.zeros(8), np.zeros((8, 8)), np.zeros(len(rod.bend))
+    gradient[:] = 0.0
+    bands[:] = 0.0
+    for v in range(len(rod.bend)):
+        load_vertex(shape.points, angles, rod.introducer, v, q)
+        bend_and_twist(q, v, shape, rod, g, h)
+        length = np.sqrt(q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
+        strain = 1.0 - rod.lengths[v] / length
+        stiffness = rod.axial / rod.lengths[v]
+        for a in range(3):
+            g[4 + a] += stiffness * strain * q[4 + a]
+            h[4 + a, 4 + a] += stiffness * strain
+            for b in range(3):
+                h[4 + a, 4 + b] += stiffness * (1.0 - strain) * q[4 + a] * q[4 + b] / (length * length)
+        scatter(v, g, h, gradient, bands)
+
+
+@on_disk()
+def set_edge(tangents: Array, directors: Array, j: int, t: Vector, a: Vector) -> None:
+    """Tangent t and director a of edge j, made orthonormal again, so that rounding cannot pile up."""
+    along = dot(a, t)
+    a = (a[0] - along * t[0], a[1] - along * t[1], a[2] - along * t[2])
+    norm = np.sqrt(dot(a, a))
+    for i in range(3):
+        tangents[j, i], directors[j, i] = t[i], a[i] / norm
+
+
+@on_disk()
+def update_directors(
+    points: Array, angles: Array, introducer: Array, tangents: Array, directors: Array
+) -> None:
+    """Tangents and directors (n + 1, 3) after a move of the nodes and a turn of the edges, in place."""
+    q = np.zeros(8)
+    for v in range(len(angles)):
+        load_vertex(points, angles, introducer, v, q)
+        _, t, a = moved_edge(q, 4, row(tangents, v + 1), row(directors, v + 1))
+        set_edge(tangents, directors, v + 1, t, a)
+
+
+@on_disk()
+def twist_free(points: Array, tangents: Array, directors: Array) -> None:
+    """Tangents and directors of every edge carried without twist from edge 0, in place."""
+    q, angles = np.zeros(8), np.zeros(len(points) - 1)
+    for v in range(len(angles)):
+        load_vertex(points, angles, tangents[0], v, q)
+        _, t, a = moved_edge(q, 4, row(tangents, v), row(directors, v))
+        set_edge(tangents, directors, v + 1, t, a)

@@ -1,0 +1,88 @@
+"""The files of a study: its volumes, what is known of it as truth.json, and the manifest by which it is run."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from data_synthetic.catalogue.study import Study
+from data_synthetic.write.earlier import MANIFEST, TRUTH, in_the_way, remove_earlier
+from data_synthetic.write.volumes import FORMATS, manifest_names, write_volume
+
+Progress = Callable[[int, int], None]
+
+
+def write_study(
+    study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None
+) -> Path:
+    """Write reference, frames, truth.json and manifest.toml into ``folder``; returns the manifest's path.
+
+    format : one of FORMATS.     progress : called with (frames done, frames in all).
+    An earlier study in the folder is removed first; ValueError where something else lies in the way.
+    """
+    folder, frames = Path(folder), len(study.truth)
+    if format not in FORMATS:
+        allowed = f"allowed: {', '.join(FORMATS)}; choose one"
+        msg = f"synthetic study {study.name}: format: got {format!r}; {allowed}"
+        raise ValueError(msg)
+    problems = in_the_way(folder, format, frames)
+    if problems:
+        raise ValueError("; ".join(problems))
+    remove_earlier(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_volume(folder, format, 0, study.reference, study.grid)
+    for i, frame in enumerate(study.frames(), 1):
+        write_volume(folder, format, i, frame, study.grid)
+        if progress is not None:
+            progress(i, frames)
+    (folder / TRUTH).write_text(json.dumps(truth_record(study)), encoding="utf-8")
+    manifest = folder / MANIFEST
+    manifest.write_text(manifest_text(study, format), encoding="utf-8")
+    return manifest
+
+
+def truth_record(study: Study) -> dict[str, Any]:
+    """What truth.json holds. points_mm lie in the phantom as the reference scan shows it."""
+    frames = [
+        {
+            "insertion_mm": round(f.depth_mm, 6),
+            "roll_deg": f.roll_deg,
+            "points_mm": f.points_mm.round(6).tolist(),
+            "residual_N": f.residual_N,
+            "tip_jump_mm": f.jump_mm,
+        }
+        for f in study.truth
+    ]
+    if study.setup.motion_mm is not None:
+        for frame, shift in zip(frames, study.setup.motion_mm, strict=True):
+            # in the frame's own scan the points are shifted by this
+            frame["phantom_shift_mm"] = [round(float(s), 6) for s in shift]
+    return {
+        "scene": study.name,
+        "why": study.why,
+        "entry_mm": study.setup.entry_mm.round(6).tolist(),
+        "entry_direction": study.setup.direction.round(9).tolist(),
+        "expected_status": list(study.expected),
+        "quality": dict(study.quality),
+        "frames": frames,
+    }
+
+
+def manifest_text(study: Study, format: str) -> str:
+    """The manifest of a study as TOML."""
+    case = dict(study.manifest["case"])
+    wall = case.pop("wall")
+    case |= {**manifest_names(format, len(study.truth)), "truth": TRUTH}
+    lines = [f"# {study.why}", "schema = 1", ""]
+    for name, wire in study.manifest["wires"].items():
+        lines += [f"[wires.{name}]", *_table(wire), ""]
+    lines += ["[[case]]", *_table(case), "", "[case.wall]", *_table(wall), ""]
+    return "\n".join(lines)
+
+
+def _table(values: Mapping[str, Any]) -> list[str]:
+    """Lines of TOML: numbers, texts and nested lists are written there as in JSON, but for an infinite number."""
+    return [f"{key} = {'inf' if value == math.inf else json.dumps(value)}" for key, value in values.items()]

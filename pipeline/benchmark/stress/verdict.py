@@ -1,0 +1,146 @@
+"""Is what the solver returned sound? Checked from the published state alone, with a second assembly of the statics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.benchmark.stress.plan import Plan
+from pipeline.benchmark.stress.statics import Array, Chain, assemble
+from solver import GuideWire, Solution, VesselWall
+
+STRETCH = 1e-12
+"""Largest change of a segment's length, relative to the larger of the segment and its distance from the origin."""
+RESIDUAL = 1e-4
+"""Largest moment left at a joint of a wire called converged, relative to the largest moment in it: ten times
+what the solver itself asks for, because the last place of a stiff wall is lost in a second assembly."""
+ENERGY_PLACE = 1e-12
+"""Fraction of the energy that nobody can lower: a residual is nothing if even a wire free of wall would gain less."""
+MOMENT_FLOOR_RAD = 1e-6
+"""Joint angle whose moment is called nothing: where the rest shape is the answer there is no moment to compare with."""
+ROSE = 1e-9
+"""Largest rise of the energy over the start, relative."""
+SADDLE = 1e-3
+"""Curvature below minus this fraction of the softest joint's stiffness may be a way down: no minimum."""
+AWAY_RAD = (1e-5, 1e-4, 1e-3)
+"""How far a suspected way down is followed. Differences across a contact that opens are no proof by themselves."""
+FALL = 1e-11
+"""Fall of the energy, relative, averaged over both ways (which cancels the gradient), that proves a way down."""
+HESSIAN_DOFS = 120
+"""Largest number of joint angles whose Hessian is formed by differences."""
+PUBLISHED = (
+    "joints_mm", "frames", "energy_N_mm", "contact_force_N", "reaction_force_N", "reaction_torque_N_mm",
+    "push_force_N", "max_penetration_mm",
+)  # fmt: skip
+"""Fields of a solution that must be finite."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """fault : empty, or what is wrong.     residual : relative moment left.     stretch : relative."""
+
+    fault: str = ""
+    detail: str = ""
+    residual: float = float("nan")
+    stretch: float = float("nan")
+
+
+def judge(
+    plan: Plan, wire: GuideWire, wall: VesselWall | None, solution: Solution, start_energy: float, deep: bool
+) -> Verdict:
+    """Judge one solution.
+
+    start_energy : of the state that the last relaxation began with, NaN where it is not known.
+    deep : also form the Hessian of a small chain and look for a way down.
+    """
+    broken = [name for name in PUBLISHED if not np.all(np.isfinite(getattr(solution, name)))]
+    if broken:
+        return Verdict("nan", ", ".join(broken))
+    if len(solution.joints_mm) < 2:
+        return Verdict()
+    chain = assemble(wire, wall, solution.depth_mm, plan.load_N)
+    # relative to the larger of length and coordinates, whose last place bounds what can be kept
+    steps = np.linalg.norm(np.diff(solution.joints_mm, axis=0), axis=1)
+    reach = np.maximum(chain.length, np.abs(solution.joints_mm).max())
+    stretch = float(np.max(np.abs(steps - chain.length) / reach))
+    if not stretch <= STRETCH:
+        return Verdict("stretched", f"{stretch:.3g}", stretch=stretch)
+    if solution.energy_N_mm > start_energy + ROSE * abs(start_energy) + 1e-15:
+        return Verdict("energy_rose", f"{start_energy!r} to {solution.energy_N_mm!r}", stretch=stretch)
+    known = plan.friction == 0.0 and (plan.hull == "offset" or plan.quadrature == "joints")
+    if not (solution.converged and known):
+        return Verdict(stretch=stretch)
+    return replace(_at_rest(chain, solution, plan.quadrature == "joints", deep), stretch=stretch)
+
+
+def _at_rest(chain: Chain, solution: Solution, at_joints: bool, deep: bool) -> Verdict:
+    """Do the moments of a wire called converged balance, and is there no way down from it?
+
+    at_joints : the solver looks the wall up where the second assembly does; else its own contact forces are taken.
+    """
+    state = (solution.joints_mm, solution.frames)
+    parts = abs(solution.bending_energy_N_mm) + abs(solution.wall_energy_N_mm)
+    energy = chain.energy(*state)
+    if at_joints and abs(energy - solution.energy_N_mm) > 1e-6 * (parts + 1e-9 + abs(energy)):
+        return Verdict("wrong_energy", f"{solution.energy_N_mm!r}, is {energy!r}")
+    gradient, elastic = chain.moments(*state, None if at_joints else np.asarray(solution.contact_force_N))
+    scale = max(float(np.abs(elastic).max()), MOMENT_FLOOR_RAD * float(chain.bend.max()))
+    residual = float(np.abs(gradient).max()) / scale
+    left = float(np.sum(gradient**2 / (2.0 * chain.bend[:, None])))
+    if not (residual <= RESIDUAL + _noise(chain, solution) / scale or left <= ENERGY_PLACE * parts):
+        return Verdict("not_at_rest", f"moment {residual:.3g} of the largest", residual)
+    down = _way_down(chain, solution, parts) if deep and at_joints else ""
+    return Verdict("no_minimum" if down else "", down, residual)
+
+
+def _noise(chain: Chain, solution: Solution) -> float:
+    """Moment that the last place of the coordinates makes through the wall's stiffness, N mm."""
+    if chain.wall is None:
+        return 0.0
+    touching = int(np.count_nonzero(np.any(solution.contact_force_N != 0.0, axis=1)))
+    place = 4 * np.finfo(float).eps * float(np.abs(solution.joints_mm).max())
+    length = chain.length
+    return place * chain.wall.stiffness_N_mm2 * float(length.max()) * touching * float(length.sum())
+
+
+def _way_down(chain: Chain, solution: Solution, parts: float) -> str:
+    """A sentence where the Hessian, by central differences of the second assembly, has a negative direction."""
+    if chain.kinds * len(chain.length) > HESSIAN_DOFS:
+        return ""
+    start = chain.angles(solution.frames)
+    start[:, chain.kinds :] = 0.0
+
+    def state(angles: Array) -> tuple[Array, Array]:
+        return chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
+
+    def energy(angles: Array) -> float:
+        return chain.energy(*state(angles))
+
+    def gradient(angles: Array) -> Array:
+        return chain.moments(*state(angles))[0][:, : chain.kinds].ravel()
+
+    curvature, direction = _lowest(gradient, start, chain.kinds)
+    if curvature > -SADDLE * float(chain.bend.min()):
+        return ""
+    here = energy(start)
+    for away in AWAY_RAD:
+        fall = here - 0.5 * (energy(start + away * direction) + energy(start - away * direction))
+        if fall > FALL * (parts + abs(here)):
+            return f"curvature {curvature:.3g} N mm, the energy falls by {fall:.3g} of {here:.3g}"
+    return ""
+
+
+def _lowest(gradient: Callable[[Array], Array], start: Array, kinds: int) -> tuple[float, Array]:
+    """Smallest eigenvalue and its direction (k, 3) of the Hessian by central differences."""
+    step, free = 1e-6, [(joint, kind) for joint in range(len(start)) for kind in range(kinds)]
+    hessian = np.empty((len(free), len(free)))
+    for row, place in zip(hessian, free, strict=True):
+        moved = np.zeros_like(start)
+        moved[place] = step
+        row[:] = (gradient(start + moved) - gradient(start - moved)) / (2 * step)
+    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    direction = np.zeros_like(start)
+    direction[:, :kinds] = vectors[:, 0].reshape(-1, kinds)
+    return float(values[0]), direction
