@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.lattice import entry_point, grown, kernel, nodes_near, unravelled
 
+Three = tuple[float, float, float]
 BLOCKS = 14
 """Control points that one voxel may see: 5 for one strand, 10 for two in contact, with room for a third."""
 TINTS = 8
@@ -85,18 +86,29 @@ class Equations(NamedTuple):
     square: float
 
 
+@kernel
+def _around(
+    x: float, y: float, z: float, radius: float, spacing: NDArray[Any], shape: tuple[int, int, int]
+) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    """First and stop index, along each axis, of the voxels within ``radius`` mm of a point."""
+    (ni, nj, nk), (hx, hy, hz) = shape, (spacing[0], spacing[1], spacing[2])
+    return (
+        nodes_near(x, x, radius, hx, ni),
+        nodes_near(y, y, radius, hy, nj),
+        nodes_near(z, z, radius, hz, nk),
+    )
+
+
 @entry_point
 def active_voxels(
     slot: NDArray[Any], spacing: NDArray[Any], curve: NDArray[Any], radius: float
 ) -> NDArray[Any]:
     """Flat indices of the voxels within ``radius`` mm of the samples (n, 3); ``slot`` gets their position + 1."""
-    ni, nj, nk = slot.shape
+    _, nj, nk = slot.shape
     found = np.empty(4096, np.int64)
     count = 0
     for x, y, z in curve:
-        i0, i1 = nodes_near(x, x, radius, spacing[0], ni)
-        j0, j1 = nodes_near(y, y, radius, spacing[1], nj)
-        k0, k1 = nodes_near(z, z, radius, spacing[2], nk)
+        (i0, i1), (j0, j1), (k0, k1) = _around(x, y, z, radius, spacing, slot.shape)
         for i in range(i0, i1):
             for j in range(j0, j1):
                 flat = (i * spacing[0] - x) ** 2 + (j * spacing[1] - y) ** 2
@@ -119,9 +131,7 @@ def render(slot: NDArray[Any], spacing: NDArray[Any], count: int, line: Line, bl
     norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
     for m in range(curve.shape[0]):
         x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
-        i0, i1 = nodes_near(x, x, radius, spacing[0], slot.shape[0])
-        j0, j1 = nodes_near(y, y, radius, spacing[1], slot.shape[1])
-        k0, k1 = nodes_near(z, z, radius, spacing[2], slot.shape[2])
+        (i0, i1), (j0, j1), (k0, k1) = _around(x, y, z, radius, spacing, slot.shape)
         for i in range(i0, i1):
             for j in range(j0, j1):
                 flat = (i * spacing[0] - x) ** 2 + (j * spacing[1] - y) ** 2
@@ -146,6 +156,76 @@ def _place(ids: NDArray[Any], used: NDArray[Any], s: int, wanted: int) -> int:
 
 
 @kernel
+def _add_tints(
+    ids: NDArray[Any],
+    used: NDArray[Any],
+    by_tint: NDArray[Any],
+    s: int,
+    first: int,
+    share: float,
+    shade: float,
+) -> None:
+    """Add to a voxel's derivatives by the two amplitude nodes that a sample lies between."""
+    for q in range(2):
+        at = _place(ids, used, s, first + q)
+        if at >= 0:
+            by_tint[s, at] += shade * (share if q else 1.0 - share)
+
+
+@kernel
+def _add_control(
+    ids: NDArray[Any], used: NDArray[Any], by_control: NDArray[Any], s: int, at: int, wanted: int, gain: Three
+) -> int:
+    """Add ``gain`` to a voxel's derivative by the control ``wanted``; returns its column, mostly that after ``at``."""
+    at += 1
+    if at >= used[s] or ids[s, at] != wanted:
+        at = _place(ids, used, s, wanted)
+    if at >= 0:
+        by_control[s, at, 0] += gain[0]
+        by_control[s, at, 1] += gain[1]
+        by_control[s, at, 2] += gain[2]
+    return at
+
+
+@kernel
+def _add(rows: _Rows, line: Line, m: int, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob) -> None:
+    """Add what sample m of the wire gives the voxels around it."""
+    model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
+    curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share) = line
+    (sigma, radius, _), (hx, hy, hz) = blob, (spacing[0], spacing[1], spacing[2])
+    norm, inverse = 1.0 / (np.sqrt(2.0 * np.pi) * sigma), 1.0 / (sigma * sigma)
+    x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
+    vx, vy, vz = velocity[m, 0], velocity[m, 1], velocity[m, 2]
+    (i0, i1), (j0, j1), (k0, k1) = _around(x, y, z, radius, spacing, slot.shape)
+    gz = np.empty(k1 - k0)
+    for k in range(k0, k1):
+        gz[k - k0] = np.exp(-0.5 * inverse * (k * hz - z) ** 2)
+    for i in range(i0, i1):
+        dx = i * hx - x
+        gx = norm * measure[m] * np.exp(-0.5 * inverse * dx * dx)
+        for j in range(j0, j1):
+            dy = j * hy - y
+            if dx * dx + dy * dy > radius * radius:
+                continue
+            gxy = gx * np.exp(-0.5 * inverse * dy * dy)
+            for k in range(k0, k1):
+                dz, s = k * hz - z, slot[i, j, k] - 1
+                square = dx * dx + dy * dy + dz * dz
+                if s < 0 or square > radius * radius:
+                    continue
+                g, at = gxy * gz[k - k0], -1
+                shade, pull = g * speed[m], amplitude[m] * g / speed[m]
+                push = amplitude[m] * shade * inverse
+                model[s] += amplitude[m] * shade
+                for q in range(4):
+                    b, d = push * value[m, q], pull * slope[m, q]
+                    gain = b * dx + d * vx, b * dy + d * vy, b * dz + d * vz
+                    at = _add_control(ids, used, by_control, s, at, first[m] + q, gain)
+                _add_tints(tint_ids, tint_used, by_tint, s, tint_first[m], tint_share[m], shade)
+                by_sigma[s] += amplitude[m] * shade * (square * inverse - 1.0) / sigma
+
+
+@kernel
 def _rows(line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob, total: int) -> _Rows:
     """The model and its derivatives at the ``total`` voxels numbered in ``slot``."""
     rows = _Rows(
@@ -153,55 +233,8 @@ def _rows(line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob, tot
         np.zeros((total, BLOCKS, 3)), np.empty((total, TINTS), np.int32), np.zeros(total, np.int32),
         np.zeros((total, TINTS)),
     )  # fmt: skip
-    model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
-    curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share) = line
-    sigma, radius, _ = blob
-    norm = 1.0 / (np.sqrt(2.0 * np.pi) * sigma)
-    inverse = 1.0 / (sigma * sigma)
-    hx, hy, hz = spacing[0], spacing[1], spacing[2]
-    gz = np.empty(256)
-    for m in range(curve.shape[0]):
-        x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
-        i0, i1 = nodes_near(x, x, radius, hx, slot.shape[0])
-        j0, j1 = nodes_near(y, y, radius, hy, slot.shape[1])
-        k0, k1 = nodes_near(z, z, radius, hz, slot.shape[2])
-        vx, vy, vz = velocity[m, 0], velocity[m, 1], velocity[m, 2]
-        for k in range(k0, k1):
-            gz[k - k0] = np.exp(-0.5 * inverse * (k * hz - z) ** 2)
-        for i in range(i0, i1):
-            dx = i * hx - x
-            gx = norm * measure[m] * np.exp(-0.5 * inverse * dx * dx)
-            for j in range(j0, j1):
-                dy = j * hy - y
-                if dx * dx + dy * dy > radius * radius:
-                    continue
-                gxy = gx * np.exp(-0.5 * inverse * dy * dy)
-                for k in range(k0, k1):
-                    dz = k * hz - z
-                    square = dx * dx + dy * dy + dz * dz
-                    s = slot[i, j, k] - 1
-                    if s < 0 or square > radius * radius:
-                        continue
-                    g = gxy * gz[k - k0]
-                    shade = g * speed[m]
-                    model[s] += amplitude[m] * shade
-                    push = amplitude[m] * shade * inverse
-                    pull = amplitude[m] * g / speed[m]
-                    at = -1
-                    for q in range(4):
-                        at += 1  # mostly the columns follow one another
-                        if at >= used[s] or ids[s, at] != first[m] + q:
-                            at = _place(ids, used, s, first[m] + q)
-                        if at >= 0:
-                            b, d = push * value[m, q], pull * slope[m, q]
-                            by_control[s, at, 0] += b * dx + d * vx
-                            by_control[s, at, 1] += b * dy + d * vy
-                            by_control[s, at, 2] += b * dz + d * vz
-                    for q in range(2):
-                        at = _place(tint_ids, tint_used, s, tint_first[m] + q)
-                        if at >= 0:
-                            by_tint[s, at] += shade * (tint_share[m] if q else 1.0 - tint_share[m])
-                    by_sigma[s] += amplitude[m] * shade * (square * inverse - 1.0) / sigma
+    for m in range(line.curve.shape[0]):
+        _add(rows, line, m, slot, spacing, blob)
     return rows
 
 
