@@ -110,9 +110,10 @@ def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: flo
 
 
 def signed(box: Owned, wall: tuple[Array, Array, Array], outer_mm: float, pad: int) -> NDArray[np.float32]:
-    """Signed distances on a box less its padding, from every voxel's foot, the normal and the curvature there.
+    """Signed distances on a box without its padding, from every voxel's foot and the wall's normal and curvature there.
 
-    They overwrite the feet's numbers (``owner``) that they are read from: one box is held instead of two.
+    wall : feet (n, 3), normals (n, 3), curvatures (n,).  The result lies in the memory of ``box.owner``, whose numbers
+    of feet it replaces one by one: one box is held instead of two.
     """
     shape = tuple(n - 2 * pad for n in box.owner.shape)
     values = box.owner.reshape(-1).view(np.float32)[: int(np.prod(shape))].reshape(shape)
@@ -122,7 +123,9 @@ def signed(box: Owned, wall: tuple[Array, Array, Array], outer_mm: float, pad: i
 
 @dataclass(frozen=True, eq=False)
 class SignedDistance:
-    """values : float32, mm, negative inside, on the site's grid; beyond ``outer_mm`` outside they stay there.
+    """The distance from the wall, and what was learnt on the way.
+
+    values : float32, mm, negative inside, on the site's grid; ``outer_mm`` wherever the wall is further away outside.
 
     level : the grey taken as the wall.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
     """

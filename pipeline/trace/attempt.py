@@ -36,7 +36,10 @@ FIRST_BLUR = 0.9
 
 @dataclass(frozen=True, eq=False)
 class EntryPose:
-    """Where and whither the wire enters, in kernel coordinates, and the insertion depth expected there (mm)."""
+    """The point (3,) at which the wire enters and its direction there (3,), in kernel coordinates; how deep it should be.
+
+    expected_mm : insertion depth that the manifest gives, mm; None where it gives none.
+    """
 
     point: Array
     direction: Array

@@ -1,6 +1,6 @@
-"""The way from a subtraction to the wire's curve: explain the frame in one way or several, judge, take the best.
+"""From a subtraction to the wire's curve: fit the wire in one way or several, judge each, take the best.
 
-It is one tracing back end; another is a function like :func:`explained`.
+This is one tracing back end; another one is a function with the arguments and the result of :func:`explained`.
 """
 
 from __future__ import annotations
@@ -182,8 +182,9 @@ def _faint_for_its_noise(curve: Curve) -> Curve:
     seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
     if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
         return curve
-    note = f"trace: wire: got a wire {seen:.1f} noises bright, noise counted as it is correlated; expected {LEAST_SEEN}"
-    note += " at least; scan with more dose or a smoother reconstruction kernel"
+    got = f"a wire {seen:.1f} noises bright, noise counted as it is correlated"
+    do = "scan with more dose or a smoother reconstruction kernel"
+    note = note_of(got, f"{LEAST_SEEN} at least", do)
     return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
 
 
