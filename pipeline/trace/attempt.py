@@ -36,7 +36,7 @@ FIRST_BLUR = 0.9
 
 @dataclass(frozen=True, eq=False)
 class EntryPose:
-    """The point (3,) at which the wire enters and its direction there (3,), in kernel coordinates; how deep it should be.
+    """The point (3,) at which the wire enters and its direction there (3,), in kernel coordinates; and its depth.
 
     expected_mm : insertion depth that the manifest gives, mm; None where it gives none.
     """
