@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 import SimpleITK as sitk
 
-from pipeline.load import load, read_header, scans
+from pipeline.arrays.placement import corners_mm
+from pipeline.load import load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.segment import segment
 from pipeline.trace import trace
@@ -67,11 +68,11 @@ def work_all(folder, peak=None):
     config, header = LoadConfig(), read_header(folder / "reference.mha")
     reference = timed("load", lambda: load(header))
     lumen = timed("segment", lambda: segment(reference, entry[None]))
-    box = scans.lumen_box(header, lumen)
-    reference = timed("load", lambda: scans.load_crop(header, box, config))
+    box = header.box_of(corners_mm(lumen.distance))
+    reference = timed("load", lambda: load(header, box, config))
     previous = None
     for file in sorted(folder.glob("frame_*.mha")):
-        frame = timed("load", lambda f=file: scans.load_crop(read_header(f), box, config))
+        frame = timed("load", lambda f=file: load(read_header(f), box, config))
         curve = timed(
             "trace",
             lambda f=frame, p=previous: trace(f, lumen, entry, direction, reference=reference, previous=p),
