@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from data_synthetic.anatomy.centrelines import read_tree
-from pipeline.load.centrelines import read_markups_branches
 from pipeline.load.curves import read_curve
+from pipeline.load.lumens import read_markups_branches
 
 POINTS = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [8.0, 8.0, 9.0]])
 

@@ -1,4 +1,4 @@
-"""A wire's curve that the user brings, as points in order: .csv, .vtp, .mrk.json. Out: LPS mm."""
+"""Wires that the user brings (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import LoadError, refused
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
-from pipeline.model import Curve
+from pipeline.model import Array, Curve
 
 _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"))
 
@@ -87,3 +87,17 @@ def read_curve(path: Path) -> Curve:
         msg = f"{path}: got {len(points)} points; expected two or more, all finite; correct the file"
         raise LoadError(msg)
     return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")
+
+
+def read_truth(path: Path, frame_count: int) -> list[Array]:
+    """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip."""
+    try:
+        frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
+        curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in frames]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f'{path}: cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
+        raise LoadError(msg) from None
+    if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
+        msg = f"{path}: holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame"
+        raise LoadError(msg)
+    return curves

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, counts, pooled, skill_of
 from pipeline.model import Array, arc_length
-from pipeline.run.frame import Frame
 from pipeline.run.log import STAGES, Log
 from pipeline.run.stages import Known
+from pipeline.run.stages.known import Frame
 from pipeline.study.schema import Case
 
 TIMED = STAGES[:-1]

@@ -21,8 +21,7 @@ from pipeline.segment._kernels.contact import Inner, along_cores
 from pipeline.segment._kernels.crests import crests
 from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.wall import PAD, dilate
-from pipeline.segment.affinity import noise_after
-from pipeline.segment.connect import connect, neighbours
+from pipeline.segment.connect import connect, neighbours, noise_after
 from pipeline.segment.contact import numbered, parts
 from pipeline.segment.levels import GreyLevels
 from pipeline.segment.region import Index

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.load import LoadError, Source
+from pipeline.load.curves import read_truth
 from pipeline.load.scans import Scans, read_headers
-from pipeline.load.truth import read_truth
 from pipeline.study.config import Config
 from pipeline.study.schema import Case, not_one_per_frame
 

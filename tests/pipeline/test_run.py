@@ -14,8 +14,8 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.model import Curve
-from pipeline.run.frame import Frame
 from pipeline.run.stages.compare import _trusted_before
+from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
 from reports.schema import ERRORS, POINTS, SUMMARY

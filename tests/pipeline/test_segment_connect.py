@@ -11,8 +11,16 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.morphology import reconstruction
 
-from pipeline.segment.affinity import Affinity, binomial_taps, estimate_affinity
-from pipeline.segment.connect import connect, connect_relative, cut_level, neighbours, strength_list
+from pipeline.segment.connect import (
+    Affinity,
+    binomial_taps,
+    connect,
+    connect_relative,
+    cut_level,
+    estimate_affinity,
+    neighbours,
+    strength_list,
+)
 from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 from tests.naive import connectedness as naive

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, blocks, counts, intervals, pooled, skill_of
-from pipeline.run.frame import Frame
+from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 
 

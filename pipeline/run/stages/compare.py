@@ -8,8 +8,7 @@ from dataclasses import replace
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.nulls import Clues, score
 from pipeline.model import Array, Curve
-from pipeline.run.frame import Frame
-from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.status import FrameStatus
 
 

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.model import Clamp
-from pipeline.run.frame import Frame
-from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import insertion_of, measured_clamp, simulate
 from pipeline.status import FrameStatus, StageError
 

@@ -13,9 +13,8 @@ from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Place, counters_of, place_of, put_in_place, said
-from pipeline.run.frame import Frame
 from pipeline.run.projections import grey_window, projections
-from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import trace
 

@@ -9,9 +9,8 @@ import numpy as np
 import SimpleITK as sitk
 from skimage.segmentation import flood as skimage_flood
 
-from pipeline.segment.affinity import estimate_affinity
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.connect import connect, neighbours, strength_list
+from pipeline.segment.connect import connect, estimate_affinity, neighbours, strength_list
 from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 
