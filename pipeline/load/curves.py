@@ -1,4 +1,4 @@
-"""Wires that the user brings (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
+"""Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
 from __future__ import annotations
 
