@@ -12,27 +12,3 @@ follow    a wire moved along its own curve           foresee    a better start f
 passage   what makes tunnelling impossible           advance    the way to a depth, and the one door to all of it
 forces    derivatives of the minimum
 """
-
-from __future__ import annotations
-
-from pathlib import Path
-
-
-def _drop_stale_cache() -> None:
-    """Delete compiled kernels older than any kernel's source.
-
-    numba's cache looks at the file of a function alone: after a change in ``newton`` it would go on running the
-    old one inside ``minimise``.
-    """
-    here = Path(__file__).parent
-    newest = max(p.stat().st_mtime for p in (*here.glob("*.py"), here.parent / "_tolerances.py"))
-    for index in (here / "__pycache__").glob("*.nbi"):
-        try:
-            if index.stat().st_mtime < newest:
-                index.unlink()
-        except OSError:
-            # another process was faster, or the installation is read-only: numba then compiles in memory
-            continue
-
-
-_drop_stale_cache()

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver import _tolerances as tol
 from solver._kernels.energy import hold
-from solver._kernels.flags import door, inlined, kept, kernel, once
+from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
 from solver._kernels.foresee import foresee, note_change
@@ -56,7 +56,7 @@ class Base(NamedTuple):
     margin: float
 
 
-@door
+@entry_point
 def advance(journey: Journey, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome, the iterations and the segments.
 
@@ -118,7 +118,7 @@ def advance(journey: Journey, to_depth: float, to_roll: float, laid: int) -> tup
     return outcome, iterations, k
 
 
-@once
+@merged
 def allowed(problem: Problem, cut: Cut, base: Base, depth: float, ahead: float, turn: float) -> float:
     """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
     fraction = 1.0
@@ -149,7 +149,7 @@ def evenly(fraction: float) -> float:
     return 1.0 / max(math.ceil((1.0 - OVERSHOOT) / fraction), 1.0)
 
 
-@once
+@merged
 def set_out(
     problem: Problem, cut: Cut, base: Base, at: Any, depth: float, roll: float, report: Any, kept: Any
 ) -> int:
@@ -173,7 +173,7 @@ def set_out(
     return k
 
 
-@once
+@merged
 def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> None:
     """Put the last good state back."""
     now = 0 * report.size
@@ -185,13 +185,13 @@ def take_back(problem: Problem, cut: Cut, at: Any, report: Any, kept: Any) -> No
         report[i] = kept[i]
 
 
-@once
+@merged
 def left_grid(problem: Problem, base: Base, k: int) -> bool:
     """Whether a joint is further outside the grid than it may be."""
     return bool(furthest_outside(problem.field, problem.state.x[NOW], k) > base.margin)
 
 
-@once
+@merged
 def clamp(problem: Problem, base: Base, roll: float) -> None:
     """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
     angle = math.radians(roll)
@@ -203,7 +203,7 @@ def clamp(problem: Problem, base: Base, roll: float) -> None:
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, base.frame[a, 2]
 
 
-@kept
+@cached
 def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: float, ahead: float) -> None:
     """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
     chain, state = problem.chain, problem.state
@@ -224,7 +224,7 @@ def lay_along(problem: Problem, cut: Cut, base: Base, was: int, k: int, first: f
         anchor_friction(problem, state.x[LAST_GOOD], was, k, ahead)
 
 
-@once
+@merged
 def begin(base: Base, curve: Any) -> int:
     """Straight on from the entry, as two points."""
     for a in range(3):
@@ -246,7 +246,7 @@ def moved(base: Base, cut: Cut, x: Any, was: int, first: float, ahead: float) ->
     return max(count, 2)
 
 
-@once
+@merged
 def keep_twist(u: Any, was: int, k: int) -> None:
     """Twist stays with the material, which is counted from the tip."""
     common = min(was, k)

@@ -17,7 +17,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import inlined, kept, kernel, once
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.joint import jacobian
 from solver._kernels.judge import MOMENT, ROUND_OFF, admissible, largest_moment, scale_of, stiffest
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
@@ -42,7 +42,7 @@ def keep_direction(jac: Nine, incoming: Three) -> tuple[float, float, float]:
     return v0, v1, incoming[2] + jac[6] * v0 + jac[7] * v1
 
 
-@once
+@merged
 def gradients(problem: Problem, which: int, k: int) -> None:
     """Fill gain[i, 0:2, 0] with minus the gradient and gain[i, 2, 0] with ρ_i - G^P of turning segment i alone.
 
@@ -90,7 +90,7 @@ def after(problem: Problem, which: int, k: int, j: int, axis: int) -> float:
     return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
 
 
-@once
+@merged
 def propose(problem: Problem, which: int, k: int, share: float) -> None:
     """Turn every segment by a share of its a_i, none by more than STEP: the trial state."""
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
@@ -134,7 +134,7 @@ def settled(problem: Problem, which: int, k: int, tolerance: float, report: Any)
     return bool(report[1] <= max(share * largest_moment(problem.chain, problem.state.u[which], k), nothing))
 
 
-@kept
+@cached
 def minimise_closed_form(
     problem: Problem, which: int, k: int, tolerance: float, max_sweeps: int, report: Any
 ) -> tuple[int, int, int, float]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.flags import inlined, kernel, once
+from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.layout import Chain
 from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
 from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
@@ -165,7 +165,7 @@ def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
     return float(math.sqrt(size))
 
 
-@once
+@merged
 def hold(problem: Problem, k: int) -> None:
     """Friction, where there is any, holds every look-up point where it is now."""
     if problem.friction.coefficient == 0.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.flags import door, inlined, kernel
+from solver._kernels.flags import entry_point, inlined, kernel
 from solver._kernels.layout import Chain
 from solver._kernels.rotation import bend_towards, turn, with_twist
 from solver._kernels.small import apply_transposed, load9, store9, times
@@ -32,7 +32,7 @@ def leaving(a: Any, b: Any, centre: Any, radius: float) -> float:
     return float((-ab + math.sqrt(root)) / bb)
 
 
-@door
+@entry_point
 def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, k: int) -> None:
     """Lay k segments along a polyline (m, 3) from x[0], which lies on its start; fill u, x and frames r.
 

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from solver._kernels.energy import slide_of
-from solver._kernels.flags import kept, kernel
+from solver._kernels.flags import cached, kernel
 from solver._kernels.layout import Cut
 from solver._kernels.problem import Problem
 from solver._kernels.rotation import turn
@@ -14,7 +14,7 @@ from solver._kernels.small import load9, store9
 from solver._kernels.spline import Field
 
 
-@kept
+@cached
 def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
 
@@ -54,7 +54,7 @@ def profile_at(at: Any, value: Any, s: float) -> float:
     return float(value[n - 1])
 
 
-@kept
+@cached
 def push_force(problem: Problem, cut: Cut, k: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from solver import _tolerances as tol
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import kernel, once
+from solver._kernels.flags import kernel, merged
 from solver._kernels.passage import crossed
 from solver._kernels.problem import FORESEEN, WALL, Problem
 from solver._kernels.rollout import copy_base, place
@@ -40,7 +40,7 @@ def foresee(problem: Problem, which: int, k: int, share: float, last: float) -> 
     return which
 
 
-@once
+@merged
 def note_change(problem: Problem, which: int, k: int) -> None:
     """Remember how relaxing changed the start of this step."""
     u, scratch = problem.state.u[which], problem.scratch

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from numba import types
 from numba.experimental import structref
 
-from solver._kernels.flags import door
+from solver._kernels.flags import entry_point
 
 
 class Journey(NamedTuple):
@@ -35,7 +35,7 @@ class Handle(structref.StructRefProxy):
 structref.define_proxy(Handle, JourneyType, list(Journey._fields))  # type: ignore[no-untyped-call]
 
 
-@door
+@entry_point
 def bound(problem: Any, cut: Any, base: Any, orders: Any, at: Any, report: Any, force: Any) -> Any:
     """The handle of a journey."""
     return Handle(problem, cut, base, orders, at, report, force)  # type: ignore[no-untyped-call]

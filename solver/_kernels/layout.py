@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import door, kernel
+from solver._kernels.flags import entry_point, kernel
 
 GAUSS = 1 / math.sqrt(3.0)
 
@@ -103,7 +103,7 @@ def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
     return total
 
 
-@door
+@entry_point
 def tabulate(profile: Profile, segment_mm: float, table: Any) -> None:
     """Fill table (m, 2): compliance and rest bend of the whole cell around distance m * segment from the tip."""
     for m in range(table.shape[0]):
@@ -120,7 +120,7 @@ def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
     result[1] -= integral(profile.rest_at, profile.rest, inner, False)
 
 
-@door
+@entry_point
 def segments_at(depth_mm: float, segment_mm: float) -> tuple[int, float]:
     """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
     if depth_mm <= 0.0:
@@ -129,7 +129,7 @@ def segments_at(depth_mm: float, segment_mm: float) -> tuple[int, float]:
     return whole + 1, depth_mm - whole * segment_mm
 
 
-@door
+@entry_point
 def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
     """Fill a chain of k segments whose first one is ``first_mm`` long; return the number of look-up points."""
     profile, table, segment_mm = cut.profile, cut.table, cut.segment

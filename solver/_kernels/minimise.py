@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of
-from solver._kernels.flags import kept
+from solver._kernels.flags import cached
 from solver._kernels.judge import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
 from solver._kernels.moves import ease, finish, leave_saddle, polish, rest_shape, search, still, venture
 from solver._kernels.newton import costate, sweep
@@ -27,7 +27,7 @@ RISE = tol.RISE
 FORETOLD = tol.FORETOLD
 
 
-@kept
+@cached
 def minimise(
     problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
 ) -> tuple[int, int, int, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import kernel, once
+from solver._kernels.flags import kernel, merged
 from solver._kernels.judge import admissible, at_rest
 from solver._kernels.newton import costate, sweep
 from solver._kernels.problem import ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
@@ -50,7 +50,7 @@ def search(
     return math.inf
 
 
-@once
+@merged
 def venture(
     problem: Problem, which: int, k: int, energy: float, decrement: float, rise: float, report: Any
 ) -> tuple[int, float]:
@@ -87,7 +87,7 @@ def venture(
     return which, math.inf
 
 
-@once
+@merged
 def leave_saddle(problem: Problem, which: int, k: int, energy: float, noise: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j = int(report[2])
@@ -111,7 +111,7 @@ def leave_saddle(problem: Problem, which: int, k: int, energy: float, noise: flo
     return math.inf
 
 
-@once
+@merged
 def rest_shape(problem: Problem, which: int, k: int) -> bool:
     """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
     state = problem.state
@@ -124,7 +124,7 @@ def rest_shape(problem: Problem, which: int, k: int) -> bool:
     return parts[WALL] == 0.0 and parts[RUBBING] == 0.0 and admissible(problem, which, k)
 
 
-@once
+@merged
 def finish(problem: Problem, which: int, near: int, k: int, energy: float, report: Any) -> tuple[int, float]:
     """Take the last step, which squares the error, and leave the exact gradient of the result in the report."""
     trial = step(problem, which, near, k, 1.0)
@@ -134,7 +134,7 @@ def finish(problem: Problem, which: int, near: int, k: int, energy: float, repor
     return which, energy
 
 
-@once
+@merged
 def polish(
     problem: Problem, which: int, k: int, energy: float, noise: float, report: Any
 ) -> tuple[int, float]:
@@ -156,7 +156,7 @@ def polish(
     return which, energy
 
 
-@once
+@merged
 def ease(problem: Problem, which: int, k: int, energy: float, noise: float, report: Any) -> tuple[int, float]:
     """Take the damped step where the energy is flat to its last place, if that lowers the moments that are left."""
     costate(problem, which, k, report)
@@ -169,7 +169,7 @@ def ease(problem: Problem, which: int, k: int, energy: float, noise: float, repo
     return which, energy
 
 
-@once
+@merged
 def still(problem: Problem, which: int, k: int) -> int:
     """Joints from the base on that the last step left as they were, all but; 0 where that is no good part of them."""
     new, old = problem.state.u[which], problem.state.u[1 - which]

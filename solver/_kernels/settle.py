@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from solver import _tolerances as tol
 from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.energy import lag_friction, total_energy
-from solver._kernels.flags import once
+from solver._kernels.flags import merged
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
 from solver._kernels.layout import Cut
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
@@ -34,7 +34,7 @@ class Orders(NamedTuple):
     work: int
 
 
-@once
+@merged
 def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) -> tuple[int, int, float]:
     """Relax state ``which``, whose energy is known, in place; return the outcome, iterations and the energy, N mm.
 
@@ -69,7 +69,7 @@ def settle(problem: Problem, which: int, k: int, orders: Orders, report: Any) ->
     return outcome, iterations, energy
 
 
-@once
+@merged
 def measure(problem: Problem, cut: Cut, k: int, report: Any, force: Any) -> None:
     """Forces of the wire at rest in state 0: force (capacity + 1, 3) N per joint; deepest contact and push force."""
     for n in range(k + 1):

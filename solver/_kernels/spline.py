@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver._kernels.flags import door, inlined, kernel
+from solver._kernels.flags import entry_point, inlined, kernel
 from solver._kernels.small import Three
 
 Four = tuple[float, float, float, float]
@@ -46,7 +46,7 @@ def solve_natural(line: Any, scratch: Any) -> None:
         line[i] -= scratch[i] * line[i + 1]
 
 
-@door
+@entry_point
 def prefilter(values: Any) -> None:
     """Turn node values into spline coefficients, in place, along the three axes."""
     nx, ny, nz = values.shape
@@ -233,7 +233,7 @@ def to_world(m: Any, jet: Any) -> None:
         jet[4 + n] = m[0, a] * h0 + m[1, a] * h1 + m[2, a] * h2
 
 
-@door
+@entry_point
 def look_up(field: Field, points: Any, jets: Any) -> None:
     """Value, gradient and second derivatives (n, 10), per mm, at points (n, 3) in mm."""
     weights = np.empty((3, 3, 4))
@@ -245,7 +245,7 @@ def look_up(field: Field, points: Any, jets: Any) -> None:
         to_world(m, jets[n])
 
 
-@door
+@entry_point
 def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients c.
 

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from solver import Grid, GuideWire, Status, VesselWall
 from solver.chain import Buffers, base_frame
 from solver.relax import Settings, buffers_for, relax_buffers, set_loads
-from tests.solver.doors import aim, costate, gradients, jacobian_terms, place, sine_terms, sweep, total_energy
+from tests.solver.entry_points import (
+    aim,
+    costate,
+    gradients,
+    jacobian_terms,
+    place,
+    sine_terms,
+    sweep,
+    total_energy,
+)
 from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
 
 Array = NDArray[np.float64]

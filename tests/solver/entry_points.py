@@ -9,44 +9,44 @@ import numba
 from solver._kernels import closed_form, energy, follow, newton, rollout, rotation
 from solver._kernels.flags import FAST
 
-door = numba.njit(**FAST)
+entry_point = numba.njit(**FAST)
 
 
-@door
+@entry_point
 def total_energy(problem: Any, which: int, k: int) -> float:
     return energy.total_energy(problem, which, 0, k)
 
 
-@door
+@entry_point
 def place(chain: Any, state: Any, which: int, k: int) -> None:
     rollout.place(chain, state, which, k)
 
 
-@door
+@entry_point
 def sweep(problem: Any, which: int, k: int, damping: float, report: Any) -> bool:
     return newton.sweep(problem, which, 0, k, damping, report)
 
 
-@door
+@entry_point
 def costate(problem: Any, which: int, k: int, report: Any) -> None:
     newton.costate(problem, which, k, report)
 
 
-@door
+@entry_point
 def gradients(problem: Any, which: int, k: int) -> None:
     closed_form.gradients(problem, which, k)
 
 
-@door
+@entry_point
 def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
     follow.aim(chain, u, x, r, j)
 
 
-@door
+@entry_point
 def sine_terms(q: float) -> Any:
     return rotation.sine_terms(q)
 
 
-@door
+@entry_point
 def jacobian_terms(q: float, s: float, a: float) -> Any:
     return rotation.jacobian_terms(q, s, a)
