@@ -67,7 +67,9 @@ def on_disk(**options: Any) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         compiled = numba.njit(cache=True, **options)(function)
         if hasattr(compiled, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
-            compiled._cache._cache_file._source_stamp = hash_of(Path(function.__code__.co_filename))
+            index, stamp = compiled._cache._cache_file, hash_of(Path(function.__code__.co_filename))
+            # the version is compared before the index is unpickled, which fails where a class in it has moved since
+            index._version, index._source_stamp = f"{index._version} {stamp}", stamp
         return cast(F, compiled)
 
     return decorate

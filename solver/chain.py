@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.layout import Chain, Cut, Rule, empty_chain, lay_out, tabulate
-from solver._kernels.problem import COUNTERS, REPORT, Friction, Problem, Scratch, State, Switch
-from solver._kernels.spline import Field
+from solver._kernels.chain import Chain, Cut, Rule, empty_chain, lay_out, tabulate
+from solver._kernels.data import COUNTERS, REPORT, Friction, Problem, Scratch, State, Switch
+from solver._kernels.field import Field
 from solver.errors import refuse
 from solver.wall import VesselWall
 from solver.wire import GuideWire

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.advance import AT, DEPTH, ROLL, SHRINK, Base, advance
-from solver._kernels.journey import Journey, bind
-from solver._kernels.problem import Switch
+from solver._kernels.data import Switch
+from solver._kernels.handle import Journey, bind
+from solver._kernels.insertion import AT, DEPTH, ROLL, SHRINK, Base, advance
 from solver.chain import base_frame, unit
 from solver.errors import refuse
 from solver.relax import OUTCOMES, Settings, buffers_for, solution_of

@@ -8,12 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
-from solver._kernels.advance import AT, ENERGY, Base, advance
-from solver._kernels.follow import follow
-from solver._kernels.journey import Journey, bind
-from solver._kernels.layout import Rule
-from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
-from solver._kernels.problem import (
+from solver._kernels.chain import Rule
+from solver._kernels.data import (
     BENDING,
     DEEPEST,
     PUSH,
@@ -22,7 +18,11 @@ from solver._kernels.problem import (
     WALL,
     Switch,
 )
-from solver._kernels.settle import FOLDED, LEFT_GRID, UNSETTLED, Orders
+from solver._kernels.follow import follow
+from solver._kernels.handle import Journey, bind
+from solver._kernels.insertion import AT, ENERGY, Base, advance
+from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
+from solver._kernels.relaxation import FOLDED, LEFT_GRID, UNSETTLED, Orders
 from solver.chain import Buffers, base_frame, unit
 from solver.errors import refuse
 from solver.solution import Solution

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.spline import Field, bounds, look_up, prefilter
+from solver._kernels.field import Field, bounds, look_up, prefilter
 from solver.errors import refuse
 from solver.grid import Grid
 

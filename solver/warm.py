@@ -12,10 +12,10 @@ from typing import Any, cast
 import numba
 import numpy as np
 
-from solver._kernels.advance import lay_along
 from solver._kernels.closed_form import minimise_closed_form
 from solver._kernels.follow import follow
 from solver._kernels.forces import contact_forces, push_force
+from solver._kernels.insertion import lay_along
 from solver._kernels.minimise import minimise
 from solver.grid import Grid
 from solver.insertion import Insertion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from solver._kernels.problem import (
+from solver._kernels.data import (
     CHEAP,
     CLEAR,
     FORESEEN,

@@ -16,17 +16,17 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.algebra import Nine, Three, add3, apply, apply_transposed, load3, load9, store9, times
+from solver._kernels.convergence import MOMENT, ROUND_OFF, admissible, largest_moment, scale_of, stiffest
+from solver._kernels.data import LOAD, ROLLOUTS, START, SWEEPS, Problem
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.joint import jacobian
-from solver._kernels.judge import MOMENT, ROUND_OFF, admissible, largest_moment, scale_of, stiffest
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED, STALLED
 from solver._kernels.newton import costate, sweep
 from solver._kernels.node import node_gradient
-from solver._kernels.problem import LOAD, ROLLOUTS, START, SWEEPS, Problem
 from solver._kernels.rollout import copy_base
 from solver._kernels.rotation import bend_towards, turn
-from solver._kernels.small import Nine, Three, add3, apply, apply_transposed, load3, load9, store9, times
 
 STEP = tol.CLOSED_FORM_ANGLE
 SMALLEST = tol.CLOSED_FORM_SMALLEST

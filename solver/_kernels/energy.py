@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from solver._kernels.chain import Chain
+from solver._kernels.data import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
+from solver._kernels.field import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
 from solver._kernels.flags import inlined, kernel, merged
-from solver._kernels.layout import Chain
-from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
-from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
 
 
 @kernel

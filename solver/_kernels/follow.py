@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from solver._kernels.algebra import apply_transposed, load9, store9, times
+from solver._kernels.chain import Chain
 from solver._kernels.flags import entry_point, inlined, kernel
-from solver._kernels.layout import Chain
 from solver._kernels.rotation import bend_towards, turn, with_twist
-from solver._kernels.small import apply_transposed, load9, store9, times
 
 
 @inlined

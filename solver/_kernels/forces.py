@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from solver._kernels.algebra import load9, store9
+from solver._kernels.chain import Cut
+from solver._kernels.data import Problem
 from solver._kernels.energy import slide_of
+from solver._kernels.field import Field
 from solver._kernels.flags import cached, kernel
-from solver._kernels.layout import Cut
-from solver._kernels.problem import Problem
 from solver._kernels.rotation import turn
-from solver._kernels.small import load9, store9
-from solver._kernels.spline import Field
 
 
 @cached

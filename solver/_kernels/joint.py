@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from solver._kernels.algebra import Nine, Six, Three, add6, conjugate, cross, transpose
+from solver._kernels.chain import Chain
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.layout import Chain
 from solver._kernels.rotation import jacobian_terms, sine_terms
-from solver._kernels.small import Nine, Six, Three, add6, conjugate, cross, transpose
 
 
 @inlined

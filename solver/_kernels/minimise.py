@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.convergence import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
+from solver._kernels.data import IDLE, LEVENBERG, RESTED, RUBBING, START, STILL, SWEEPS, WALL, Problem
+from solver._kernels.descent import ease, finish, leave_saddle, polish, rest_shape, search, still, venture
 from solver._kernels.energy import energy_of
 from solver._kernels.flags import cached
-from solver._kernels.judge import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
-from solver._kernels.moves import ease, finish, leave_saddle, polish, rest_shape, search, still, venture
 from solver._kernels.newton import costate, sweep
-from solver._kernels.problem import IDLE, LEVENBERG, RESTED, RUBBING, START, STILL, SWEEPS, WALL, Problem
 
 # how a relaxation ends
 CONVERGED, EXHAUSTED, STALLED, BROKEN = range(4)

@@ -15,19 +15,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inlined, kernel
-from solver._kernels.joint import (
-    jacobian,
-    joint_hessian,
-    least_curvature,
-    note_direction,
-    solve_block,
-    store_gain,
-)
-from solver._kernels.node import node_gradient, node_hessian
-from solver._kernels.problem import STRAIGHT, Problem
-from solver._kernels.rotation import turn
-from solver._kernels.small import (
+from solver._kernels.algebra import (
     ZERO3,
     ZERO6,
     ZERO9,
@@ -49,7 +37,19 @@ from solver._kernels.small import (
     times_transposed,
     transpose,
 )
-from solver._kernels.straight import sweep_straight
+from solver._kernels.data import STRAIGHT, Problem
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.joint import (
+    jacobian,
+    joint_hessian,
+    least_curvature,
+    note_direction,
+    solve_block,
+    store_gain,
+)
+from solver._kernels.newton_straight import sweep_straight
+from solver._kernels.node import node_gradient, node_hessian
+from solver._kernels.rotation import turn
 
 CURVATURE_FLOOR = tol.CURVATURE_FLOOR
 

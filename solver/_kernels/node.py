@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.energy import slide_of
-from solver._kernels.flags import inlined
-from solver._kernels.problem import Problem
-from solver._kernels.small import (
+from solver._kernels.algebra import (
     ZERO3,
     ZERO6,
     ZERO9,
@@ -28,6 +25,9 @@ from solver._kernels.small import (
     times,
     transpose,
 )
+from solver._kernels.data import Problem
+from solver._kernels.energy import slide_of
+from solver._kernels.flags import inlined
 
 
 @inlined

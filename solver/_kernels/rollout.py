@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.algebra import Nine, Three, apply_transposed, cross, load3, load9, store9, times
+from solver._kernels.chain import Chain
+from solver._kernels.data import Problem, State
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.layout import Chain
-from solver._kernels.problem import Problem, State
 from solver._kernels.rotation import turn
-from solver._kernels.small import Nine, Three, apply_transposed, cross, load3, load9, store9, times
 
 STEP_ANGLE = tol.STEP_ANGLE
 CONTROL_ANGLE = tol.CONTROL_ANGLE

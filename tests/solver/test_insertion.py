@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import GuideWire, Insertion, Status, VesselWall
-from solver._kernels.problem import Switch
+from solver._kernels.data import Switch
 from tests.solver.scenes import bend_grid, fork_grid, last, sampled, sheath_grid, tube_grid
 
 CURVED = [[0, 0.12], [8, 0.12], [8, 0.0]]

@@ -7,7 +7,7 @@ import pytest
 
 from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
 from solver import _tolerances as tol
-from solver._kernels.problem import Switch
+from solver._kernels.data import Switch
 from tests.solver.scenes import tube_grid
 
 METHODS = ("newton", "closed_form")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from solver._kernels.layout import Chain
-from solver._kernels.spline import Field
+from solver._kernels.chain import Chain
+from solver._kernels.field import Field
 
 # places in the work counters
 FULL, CHEAP, CLEAR, SWEEPS, ROLLOUTS, LEVENBERG, IDLE, ROLLS, STRAIGHT, FORESEEN, STILL, SPENT = range(12)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
+from solver._kernels.chain import Cut
 from solver._kernels.closed_form import minimise_closed_form
+from solver._kernels.data import DEEPEST, PUSH, SMOOTH, SPENT, TWISTLESS, Problem
 from solver._kernels.energy import lag_friction, total_energy
 from solver._kernels.flags import merged
 from solver._kernels.forces import contact_forces, copy_state, least_turn_cosine, push_force
-from solver._kernels.layout import Cut
 from solver._kernels.minimise import BROKEN, CONVERGED, minimise
-from solver._kernels.problem import DEEPEST, PUSH, SMOOTH, SPENT, TWISTLESS, Problem
 
 # how a relaxation ends, beyond the ways of ``minimise``
 UNSETTLED, FOLDED, LEFT_GRID = range(BROKEN + 1, BROKEN + 4)

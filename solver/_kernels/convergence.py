@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.chain import Chain
+from solver._kernels.crossing import crossed
+from solver._kernels.data import BENDING, LOAD, RUBBING, WALL, Problem
 from solver._kernels.flags import kernel
-from solver._kernels.layout import Chain
-from solver._kernels.passage import crossed
-from solver._kernels.problem import BENDING, LOAD, RUBBING, WALL, Problem
 
 ROUND_OFF = tol.ROUND_OFF
 FLOOR = tol.ENERGY_FLOOR_ANGLE**2

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from solver import _tolerances as tol
+from solver._kernels.data import Problem
+from solver._kernels.field import Field, indices, locate, value
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.problem import Problem
-from solver._kernels.spline import Field, indices, locate, value
 
 HOP = tol.HOP_VOXELS
 LOOK_AHEAD = tol.LOOK_AHEAD_MM

@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver import _tolerances as tol
+from solver._kernels.chain import Cut, lay_out, segments_at
+from solver._kernels.crossing import free_way
+from solver._kernels.data import ROLLS, SPENT, TABLED, Problem
 from solver._kernels.energy import hold
+from solver._kernels.extrapolation import foresee, note_change
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, furthest_outside
-from solver._kernels.foresee import foresee, note_change
-from solver._kernels.journey import Journey
-from solver._kernels.layout import Cut, lay_out, segments_at
+from solver._kernels.handle import Journey
 from solver._kernels.minimise import BROKEN, CONVERGED, EXHAUSTED
-from solver._kernels.passage import free_way
-from solver._kernels.problem import ROLLS, SPENT, TABLED, Problem
-from solver._kernels.settle import LEFT_GRID, measure, settle
+from solver._kernels.relaxation import LEFT_GRID, measure, settle
 
 # what an insertion remembers between depths
 DEPTH, ROLL, ENERGY, SHRINK, AHEAD = range(5)

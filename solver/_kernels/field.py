@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver._kernels.algebra import Three
 from solver._kernels.flags import entry_point, inlined, kernel
-from solver._kernels.small import Three
 
 Four = tuple[float, float, float, float]
 

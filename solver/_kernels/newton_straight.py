@@ -11,12 +11,25 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.algebra import (
+    ZERO3,
+    ZERO6,
+    Six,
+    Three,
+    add3,
+    add6,
+    apply,
+    conjugate,
+    dot,
+    load9,
+    mix,
+    outer,
+)
+from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.joint import note_direction
 from solver._kernels.node import node_gradient, node_hessian
-from solver._kernels.problem import Problem
 from solver._kernels.rotation import jacobian_terms, sine_terms
-from solver._kernels.small import ZERO3, ZERO6, Six, Three, add3, add6, apply, conjugate, load9
 
 CURVATURE_FLOOR = tol.CURVATURE_FLOOR
 
@@ -133,31 +146,6 @@ def sweep_straight(problem: Problem, which: int, near: int, k: int, damping: flo
         g = (dot(e0, turned), dot(e1, turned))
     report[0] = decrement
     return math.isfinite(decrement)
-
-
-@inlined
-def dot(a: Three, b: Three) -> float:
-    """A · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def mix(s: float, a: Three, t: float, b: Three) -> Three:
-    """S a + t b."""
-    return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
-
-
-@inlined
-def outer(a: Three, b: Three, c: Three, d: Three) -> Six:
-    """The symmetric a bᵀ + c dᵀ."""
-    return (
-        a[0] * b[0] + c[0] * d[0],
-        a[1] * b[1] + c[1] * d[1],
-        a[2] * b[2] + c[2] * d[2],
-        a[0] * b[1] + c[0] * d[1],
-        a[0] * b[2] + c[0] * d[2],
-        a[1] * b[2] + c[1] * d[2],
-    )
 
 
 @inlined

@@ -6,10 +6,10 @@ A wire pushed on goes straight ahead of its tip into the wall and has to be bent
 from __future__ import annotations
 
 from solver import _tolerances as tol
+from solver._kernels.crossing import crossed
+from solver._kernels.data import FORESEEN, WALL, Problem
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import kernel, merged
-from solver._kernels.passage import crossed
-from solver._kernels.problem import FORESEEN, WALL, Problem
 from solver._kernels.rollout import copy_base, place
 
 WORTH_IT = tol.WORTH_FORESEEING

@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels.convergence import admissible, at_rest
+from solver._kernels.data import ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import kernel, merged
-from solver._kernels.judge import admissible, at_rest
 from solver._kernels.newton import costate, sweep
-from solver._kernels.problem import ROLLOUTS, RUBBING, SWEEPS, WALL, Problem
 from solver._kernels.rollout import copy_base, place, rollout
 
 SUFFICIENT = tol.SUFFICIENT
