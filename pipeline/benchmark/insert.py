@@ -53,13 +53,10 @@ class Run:
         return self.status.value
 
 
-def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, switch: Any = None) -> Run:
-    """Push the scene's wire in.
-
-    wall : made already (it costs more than an insertion).     switch : skips of the solver, all by default.
-    """
+def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None) -> Run:
+    """Push the scene's wire in. wall : made already (it costs more than an insertion)."""
     wall = scene.wall(setting.hull) if wall is None else wall
-    solutions = list(_solutions(scene, setting, wall, switch))
+    solutions = list(_solutions(scene, setting, wall))
     last = solutions[-1]
     work: Counter[str] = Counter()
     for solution in solutions:
@@ -79,14 +76,14 @@ def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, 
     )
 
 
-def _solutions(scene: BenchScene, setting: Setting, wall: VesselWall | None, switch: Any) -> Any:
+def _solutions(scene: BenchScene, setting: Setting, wall: VesselWall | None) -> Any:
     wire = scene.wire(setting.segment_mm)
     if wall is None:
         return [_bent(scene, setting)]
     insertion = Insertion(
         wire, wall, scene.entry_mm, scene.direction, setting.method, setting.initial, scene.material_axis,
         tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
-        quadrature=setting.quadrature, switch=switch,
+        quadrature=setting.quadrature,
     )  # fmt: skip
     return insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from solver._kernels.flags import inlined
 
+Pair = tuple[float, float]
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
@@ -127,6 +128,19 @@ def gram(q: Nine, k: Nine) -> Six:
 
 
 @inlined
+def dyad(s: float, n: Three) -> Six:
+    """S n nᵀ."""
+    return (
+        s * n[0] * n[0],
+        s * n[1] * n[1],
+        s * n[2] * n[2],
+        s * n[0] * n[1],
+        s * n[0] * n[2],
+        s * n[1] * n[2],
+    )
+
+
+@inlined
 def outer(a: Three, b: Three, c: Three, d: Three) -> Six:
     """A bᵀ + c dᵀ where that is symmetric."""
     return (
@@ -140,26 +154,36 @@ def outer(a: Three, b: Three, c: Three, d: Three) -> Six:
 
 
 @inlined
-def load3(x: Any) -> Three:
-    """Three entries of an array."""
-    return x[0], x[1], x[2]
+def load3(x: Any, n: int) -> Three:
+    """Row n of an array (m, 3). Rows are never taken as views in a loop: each costs a reference count."""
+    return x[n, 0], x[n, 1], x[n, 2]
 
 
 @inlined
-def store3(x: Any, v: Three) -> None:
-    """Write three entries into an array (3,)."""
-    x[0], x[1], x[2] = v
+def store3(x: Any, n: int, v: Three) -> None:
+    """Write row n of an array (m, 3)."""
+    x[n, 0], x[n, 1], x[n, 2] = v
 
 
 @inlined
-def load9(r: Any) -> Nine:
-    """The nine entries of a (3, 3) array."""
-    return r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]
+def load9(r: Any, n: int) -> Nine:
+    """Matrix n of an array (m, 3, 3)."""
+    return (
+        r[n, 0, 0],
+        r[n, 0, 1],
+        r[n, 0, 2],
+        r[n, 1, 0],
+        r[n, 1, 1],
+        r[n, 1, 2],
+        r[n, 2, 0],
+        r[n, 2, 1],
+        r[n, 2, 2],
+    )
 
 
 @inlined
-def store9(r: Any, a: Nine) -> None:
-    """Write nine entries into a (3, 3) array."""
-    r[0, 0], r[0, 1], r[0, 2] = a[:3]
-    r[1, 0], r[1, 1], r[1, 2] = a[3:6]
-    r[2, 0], r[2, 1], r[2, 2] = a[6:]
+def store9(r: Any, n: int, a: Nine) -> None:
+    """Write matrix n of an array (m, 3, 3)."""
+    r[n, 0, 0], r[n, 0, 1], r[n, 0, 2] = a[:3]
+    r[n, 1, 0], r[n, 1, 1], r[n, 1, 2] = a[3:6]
+    r[n, 2, 0], r[n, 2, 1], r[n, 2, 2] = a[6:]

@@ -1,96 +1,36 @@
 """A wire at one depth, cut into segments: stiffness and rest bend per joint, look-up points per node.
 
-Everything but the first segment is fixed to the wire; the first takes up the remainder of the depth.
+Everything but the first segment is fixed to the wire; the first takes up the remainder of the depth. The cell of a
+joint is the wire from the middle of the segment before it to the middle of the one after it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from solver._kernels.data import Chain, Profile, Rule, WireTable
 from solver._kernels.flags import entry_point, kernel
 
 GAUSS = 1 / math.sqrt(3.0)
 
 
-class Profile(NamedTuple):
-    """Piecewise linear functions of the distance from the tip; two equal abscissae make a jump."""
-
-    stiffness_at: Any
-    stiffness: Any
-    rest_at: Any
-    rest: Any
-    twist: float
-
-
-class Rule(NamedTuple):
-    """Where a segment's wall energy is looked up.
-
-    hull : (h, 2), offsets across the wire in the material frame, mm; one zero row is the smooth limit, no row no wall.
-    reach : added to the distance at each look-up, mm (the wire's radius in the smooth limit, else 0).
-    tip_at, tip_weight : (q,), places along the last segment as a fraction from its tip, and weights (sum 1).
-    """
-
-    hull: Any
-    reach: float
-    tip_at: Any
-    tip_weight: Any
-    zone: int
-
-
-class Cut(NamedTuple):
-    """What a wire is cut from at any depth.
-
-    table : see ``tabulate``.     segment : length of one, mm.     tabled : whether the table is used.
-    """
-
-    profile: Profile
-    rule: Rule
-    table: Any
-    segment: float
-    tabled: bool
-
-
-class Chain(NamedTuple):
-    """A wire of k segments; arrays may be longer than k.
-
-    length, bend, twist, rest : (k,) segment mm, joint stiffness N mm/rad, rest bend rad.
-    load : (k + 1, 3) dead force on each node, N.     first : (k + 2,) first look-up point of each node.
-    offset : (p, 3) mm in the frame of the segment that ends at the node; weight : (p,) mm of wire.
-    """
-
-    length: Any
-    bend: Any
-    twist: Any
-    rest: Any
-    load: Any
-    first: Any
-    offset: Any
-    weight: Any
-    reach: float
-
-
 @kernel
 def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
     """Integral from 0 to s of a piecewise linear function, or of one over it (exact on every piece)."""
-    total = 0.0
-    start = 0.0
+    total, start = 0.0, 0.0
     n = at.size
     for i in range(n + 1):
         stop = s if i == n else min(max(at[i], 0.0), s)
         if stop <= start:
             continue
-        left = value[0] if i == 0 else value[min(i, n) - 1]
-        right = value[n - 1] if i == n else value[i]
+        left = right = value[min(i, n - 1)]
         if 0 < i < n:
-            span = at[i] - at[i - 1]
-            rise = (right - left) / span
-            right = left + rise * (stop - at[i - 1])
-            left = left + rise * (start - at[i - 1])
-        else:
-            left = right = value[0] if i == 0 else value[n - 1]
+            rise = (value[i] - value[i - 1]) / (at[i] - at[i - 1])
+            right = value[i - 1] + rise * (stop - at[i - 1])
+            left = value[i - 1] + rise * (start - at[i - 1])
         width = stop - start
         if not reciprocal:
             total += 0.5 * width * (left + right)
@@ -103,14 +43,6 @@ def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
     return total
 
 
-@entry_point
-def tabulate(profile: Profile, segment_mm: float, table: Any) -> None:
-    """Fill table (m, 2): compliance and rest bend of the whole cell around distance m * segment from the tip."""
-    for m in range(table.shape[0]):
-        outer, inner = (m + 0.5) * segment_mm, max(m - 0.5, 0.0) * segment_mm
-        cell(profile, inner, outer, table[m])
-
-
 @kernel
 def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
     """Compliance 1/c and rest bend of a joint whose cell reaches from ``inner`` to ``outer`` mm from the tip."""
@@ -118,6 +50,13 @@ def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
     result[0] -= integral(profile.stiffness_at, profile.stiffness, inner, True)
     result[1] = integral(profile.rest_at, profile.rest, outer, False)
     result[1] -= integral(profile.rest_at, profile.rest, inner, False)
+
+
+@entry_point
+def tabulate(profile: Profile, segment_mm: float, cells: Any) -> None:
+    """Fill cells (m, 2): compliance and rest bend of the whole cell around distance m * segment from the tip."""
+    for m in range(cells.shape[0]):
+        cell(profile, max(m - 0.5, 0.0) * segment_mm, (m + 0.5) * segment_mm, cells[m])
 
 
 @entry_point
@@ -130,9 +69,9 @@ def segments_at(depth_mm: float, segment_mm: float) -> tuple[int, float]:
 
 
 @entry_point
-def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
-    """Fill a chain of k segments whose first one is ``first_mm`` long; return the number of look-up points."""
-    profile, table, segment_mm = cut.profile, cut.table, cut.segment
+def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
+    """Fill a chain of k segments whose first one is ``first_mm`` long."""
+    profile, cells, segment_mm = table.profile, table.cells, table.segment
     depth = first_mm + (k - 1) * segment_mm
     own = np.empty(2)
     for j in range(k):
@@ -143,18 +82,18 @@ def lay_out(chain: Chain, cut: Cut, k: int, first_mm: float) -> int:
             inner = depth - 0.5 * first_mm
         elif j == 1:
             outer = depth - 0.5 * first_mm
-        if j < 2 or not cut.tabled:
+        if j < 2 or not table.tabled:
             cell(profile, inner, outer, own)
         else:
-            own[0], own[1] = table[k - j, 0], table[k - j, 1]
+            own[0], own[1] = cells[k - j, 0], cells[k - j, 1]
         chain.bend[j] = 1.0 / own[0]
         chain.rest[j] = own[1]
         chain.twist[j] = profile.twist / (outer - inner)
-    return place_points(chain, cut.rule, k)
+    place_points(chain, table.rule, k)
 
 
 @kernel
-def place_points(chain: Chain, rule: Rule, k: int) -> int:
+def place_points(chain: Chain, rule: Rule, k: int) -> None:
     """Fill the look-up points of every node and of the segment that ends there.
 
     A segment is integrated by the trapezium rule (half of it at each end), except the last one, which has the
@@ -172,40 +111,22 @@ def place_points(chain: Chain, rule: Rule, k: int) -> int:
         if n < k and (behind - 1 > rule.zone or not inner):
             share += 0.5 * chain.length[n]
         if share > 0.0:
-            p = place_point(chain, rule, p, 0.0, share)
+            p = place_hull(chain, rule, p, 0.0, share)
         if inner and n == k:
             for t in range(rule.tip_at.size):
-                p = place_point(chain, rule, p, -length * rule.tip_at[t], length * rule.tip_weight[t])
+                p = place_hull(chain, rule, p, -length * rule.tip_at[t], length * rule.tip_weight[t])
         elif behind <= rule.zone:
             for side in (-1.0, 1.0):
-                p = place_point(chain, rule, p, -0.5 * length * (1 + side * GAUSS), 0.5 * length)
+                p = place_hull(chain, rule, p, -0.5 * length * (1 + side * GAUSS), 0.5 * length)
         chain.first[n + 1] = p
-    return p
 
 
 @kernel
-def place_point(chain: Chain, rule: Rule, p: int, along: float, weight: float) -> int:
-    """Fill the points of the hull around one place on the wire; return the next free one."""
+def place_hull(chain: Chain, rule: Rule, p: int, along: float, length: float) -> int:
+    """Fill the points around one place on the wire, which stand for ``length`` mm of it; return the next free one."""
     hulls = rule.hull.shape[0]
     for h in range(hulls):
-        chain.offset[p, 0] = rule.hull[h, 0]
-        chain.offset[p, 1] = rule.hull[h, 1]
-        chain.offset[p, 2] = along
-        chain.weight[p] = weight / hulls
+        chain.offset[p, 0], chain.offset[p, 1], chain.offset[p, 2] = rule.hull[h, 0], rule.hull[h, 1], along
+        chain.weight[p] = length / hulls
         p += 1
     return p
-
-
-def empty_chain(k: int, points: int, reach: float) -> Chain:
-    """A chain with room for k segments and some look-up points."""
-    return Chain(
-        length=np.zeros(k),
-        bend=np.zeros(k),
-        twist=np.zeros(k),
-        rest=np.zeros(k),
-        load=np.zeros((k + 1, 3)),
-        first=np.zeros(k + 2, dtype=np.int64),
-        offset=np.zeros((points, 3)),
-        weight=np.zeros(points),
-        reach=reach,
-    )

@@ -7,43 +7,41 @@ from __future__ import annotations
 
 from solver import _tolerances as tol
 from solver._kernels.crossing import crossed
-from solver._kernels.data import FORESEEN, WALL, Problem
+from solver._kernels.data import Problem
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import kernel, merged
 from solver._kernels.rollout import copy_base, place
 
-WORTH_IT = tol.WORTH_FORESEEING
-
 
 @kernel
-def foresee(problem: Problem, which: int, k: int, share: float, last: float) -> int:
-    """Return the state to start from: ``which``, or the other one, with a share of the last change, if it is lower.
+def extrapolate_start(problem: Problem, slot: int, k: int, share: float, last: float) -> int:
+    """Return the slot to start from: ``slot``, or the other one, with a share of the last change, if it is lower.
 
     Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
-    last : energy of the wire before the step, N mm; what ``which`` has more must at least be halved.
+    last : energy of the wire before the step, N mm; what ``slot`` has more must at least be halved.
     """
     state, scratch = problem.state, problem.scratch
-    u, tried = state.u[which], state.u[1 - which]
+    u, tried = state.u[slot], state.u[1 - slot]
     for j in range(k):
         for a in range(3):
             scratch.start[j, a] = u[j, a]
             tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
-    energy = total_energy(problem, which, 0 * k, k)
-    if share == 0.0 or state.parts[which, WALL] == 0.0:
-        return which
-    copy_base(state, which, 1 - which)
-    place(problem.chain, state, 1 - which, k)
-    better = total_energy(problem, 1 - which, 0 * k, k) - last < WORTH_IT * (energy - last)
-    if better and not crossed(problem, which, k):
-        scratch.counter[FORESEEN] += 1
-        return 1 - which
-    return which
+    energy = total_energy(problem, slot, 0, k)
+    if share == 0.0 or state.energies[slot].wall == 0.0:
+        return slot
+    copy_base(state, slot, 1 - slot)
+    place(problem.chain, state, 1 - slot, k)
+    better = total_energy(problem, 1 - slot, 0, k) - last < tol.WORTH_FORESEEING * (energy - last)
+    if better and not crossed(problem, slot, k):
+        scratch.counters[0].starts_foreseen += 1
+        return 1 - slot
+    return slot
 
 
 @merged
-def note_change(problem: Problem, which: int, k: int) -> None:
+def note_change(problem: Problem, slot: int, k: int) -> None:
     """Remember how relaxing changed the start of this step."""
-    u, scratch = problem.state.u[which], problem.scratch
+    u, scratch = problem.state.u[slot], problem.scratch
     for j in range(k):
         for a in range(3):
             scratch.change[k - 1 - j, a] = u[j, a] - scratch.start[j, a]

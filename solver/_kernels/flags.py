@@ -10,10 +10,12 @@ from collections.abc import Callable
 from typing import Any, NoReturn, TypeVar, cast
 
 import numba
+from numba import types
 
 from solver._compile import on_disk
 
 F = TypeVar("F", bound=Callable[..., Any])
+untyped: Any = types
 
 # Only fused multiply-add may change how sums are rounded: NaN and inf must keep their meaning, because the minimiser
 # recognises a broken state by them.
@@ -26,6 +28,9 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
     def decorate(function: F) -> F:
         compiled: Any = compiler(**options)(function)
+        if compiled is function:  # NUMBA_DISABLE_JIT is set
+            return function
+        template = compiled.get_call_template
 
         def add(overload: Any) -> None:
             compiled.overloads[tuple(overload.signature.args)] = overload
@@ -34,9 +39,13 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
             message = f"{function.__name__} is for compiled code: call an entry point, or write one in a test"
             raise TypeError(message)
 
-        if compiled is not function:
-            # numba would list the overload for Python all the same, and a call from there would end the process
-            compiled.add_overload, compiled._compile_for_args = add, refuse
+        def unliteral(args: tuple[Any, ...], kws: Any) -> Any:
+            return template(tuple(untyped.unliteral(arg) for arg in args), kws)
+
+        # numba would list the overload for Python all the same, and a call from there would end the process
+        compiled.add_overload, compiled._compile_for_args = add, refuse
+        # a literal argument is a type of its own to numba, and would compile the function once more
+        compiled.get_call_template = unliteral
         return cast(F, compiled)
 
     return decorate
@@ -44,8 +53,7 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
 # Called from Python; kept on disk.
 entry_point = on_disk(**FAST)
-# Called by other kernels. A literal argument is a type of its own to numba and compiles the callee once more: pass
-# 0 * k, or a number that is computed.
+# Called by other kernels.
 kernel = _internal()
 # The same, kept on disk as well: another process can compile it meanwhile.
 cached = _internal(on_disk)

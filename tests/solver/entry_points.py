@@ -13,28 +13,28 @@ entry_point = numba.njit(**FAST)
 
 
 @entry_point
-def total_energy(problem: Any, which: int, k: int) -> float:
-    return energy.total_energy(problem, which, 0, k)
+def total_energy(problem: Any, slot: int, k: int) -> float:
+    return energy.total_energy(problem, slot, 0, k)
 
 
 @entry_point
-def place(chain: Any, state: Any, which: int, k: int) -> None:
-    rollout.place(chain, state, which, k)
+def place(chain: Any, state: Any, slot: int, k: int) -> None:
+    rollout.place(chain, state, slot, k)
 
 
 @entry_point
-def sweep(problem: Any, which: int, k: int, damping: float, report: Any) -> bool:
-    return newton.sweep(problem, which, 0, k, damping, report)
+def sweep(problem: Any, slot: int, k: int, damping: float, report: Any) -> bool:
+    return newton.sweep(problem, slot, 0, k, damping, report)
 
 
 @entry_point
-def costate(problem: Any, which: int, k: int, report: Any) -> None:
-    newton.costate(problem, which, k, report)
+def costate(problem: Any, slot: int, k: int, report: Any) -> None:
+    newton.costate(problem, slot, k, report)
 
 
 @entry_point
-def gradients(problem: Any, which: int, k: int) -> None:
-    closed_form.gradients(problem, which, k)
+def gradients(problem: Any, slot: int, k: int) -> None:
+    closed_form.gradients(problem, slot, k)
 
 
 @entry_point
