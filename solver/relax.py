@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from solver import _tolerances as tol
 from solver._kernels.data import CURRENT, Limits
@@ -82,18 +82,21 @@ def relax(
         refuse("relax", "depth_mm", depth_mm, "a positive length", "give the length beyond the entry")
     direction = unit(entry_direction, "entry_direction")
     entry = np.asarray(entry_mm, dtype=np.float64)
-    straight = [entry, entry + direction * depth_mm]
-    curve = np.array(straight if start_mm is None else start_mm, dtype=np.float64)
-    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.all(np.isfinite(curve)):
-        refuse("relax", "start_mm", curve.shape, "(m, 3) finite points, m >= 2", "start at the entry")
+    curve = _polyline([entry, entry + direction * depth_mm] if start_mm is None else start_mm)
     work = Workspace(wire, wall, settings.quadrature, settings.limits)
     work.lay_out(depth_mm)
     if load_N is not None:
         work.load(load_N)
     work.clamp(entry, base_frame(direction, material_axis, roll_deg))
-    state = work.problem.state
-    follow(
-        curve, len(curve), work.problem.chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k
-    )
+    chain, state = work.problem.chain, work.problem.state
+    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k)
     status, iterations = work.advance(depth_mm, 0.0, work.k)
     return work.solution(status, iterations, depth_mm, roll_deg)
+
+
+def _polyline(points: ArrayLike) -> NDArray[np.float64]:
+    """A start shape as an array (m, 3) mm; ValueError where it is none."""
+    curve = np.array(points, dtype=np.float64)
+    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.all(np.isfinite(curve)):
+        refuse("relax", "start_mm", curve.shape, "(m, 3) finite points, m >= 2", "start at the entry")
+    return curve

@@ -13,9 +13,10 @@ from typing import Any
 import numba
 import numpy as np
 
-from solver._kernels import closed_form, newton_method
+from solver._kernels import closed_form
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.insertion import lay_along
+from solver._kernels.minimise import minimise
 from solver.grid import Grid
 from solver.relax import Settings, relax
 from solver.wall import VesselWall
@@ -45,12 +46,13 @@ def warm_up(*, beside: bool = False) -> None:
     """
     with no_collection():
         if not beside or untyped.config.DISABLE_JIT:
-            _relax(_wall())
+            relax(WIRE, _wall(), depth_mm=1.0)
             return
         with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_beside()"]):
             # while the other process makes what ``advance`` needs besides
-            _compile(newton_method.iterate)
-            _relax(None)
+            _compile(minimise)
+            # a wall has no types of its own
+            relax(WIRE, None, depth_mm=1.0)
 
 
 def compile_beside() -> None:
@@ -60,34 +62,24 @@ def compile_beside() -> None:
         _wall()
 
 
-def _workspace() -> Workspace:
-    settings = Settings()
-    work = Workspace(WIRE, None, settings.quadrature, settings.limits)
-    work.clamp(np.zeros(3), np.eye(3))
-    return work
-
-
 def _compile(*kernels: Any) -> None:
     """Compile kernels for arguments of the kinds that their parameters' names say."""
-    work = _workspace()
+    work = Workspace(WIRE, None, "tip", Settings().limits)
+    work.clamp(np.zeros(3), np.eye(3))
     known = {
         "problem": work.problem,
         "table": work.table,
         "introducer": work.introducer,
+        "limits": work.limits,
         "now": work.problem.scratch.descent[0],
         "report": work.report[0],
         "force": work.force,
-        **dict.fromkeys(("k", "was"), 1),
+        **dict.fromkeys(("slot", "k", "was"), 1),
         **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
     }
     for kernel in kernels:
         names = inspect.signature(kernel.py_func).parameters
         kernel.compile(tuple(untyped.typeof(known[name]) for name in names))
-
-
-def _relax(wall: VesselWall | None) -> None:
-    """Go all the way to a solution; a wall has no types of its own."""
-    relax(WIRE, wall, depth_mm=1.0)
 
 
 def _wall() -> VesselWall:

@@ -172,16 +172,10 @@ class Workspace:
 
     def _bind(self) -> None:
         """Take a handle of the arrays, wherever in memory they are now."""
-        contents = (
-            self.problem,
-            self.table,
-            self.introducer,
-            self.limits,
-            self.place,
-            self.report,
-            self.force,
+        settings = self.introducer, self.limits
+        self._handle = handle_of(
+            Contents(self.problem, self.table, *settings, self.place, self.report, self.force)
         )
-        self._handle = handle_of(Contents(*contents))
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from solver._kernels import wall_law
+from solver._kernels.algebra import Three, dot, load3, minus, store3
 from solver._kernels.data import Chain, Problem
 from solver._kernels.field import fill_jet, in_grid, indices, locate, trilinear, value
 from solver._kernels.flags import inlined, kernel
@@ -61,13 +62,7 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     """Eq. 6 and 7: look every point beyond node ``first_free`` up and add its share, N mm; take over the others."""
     total = taken_over(problem, slot, first_free) if first_free > 0 else 0.0
     # bound once: inside the loop every member would be taken out of the tuple again, with its reference count
-    field, skips, chain, state, stiffness = (
-        problem.field,
-        problem.skips,
-        problem.chain,
-        problem.state,
-        problem.stiffness,
-    )
+    field, skips, chain, state = problem.field, problem.skips, problem.chain, problem.state
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
     x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
@@ -80,15 +75,11 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
             at = indices(m, o, q)
             inside = in_grid(c, at)
             clearance = -anchor[p, 3] - reach
-            if skips.clearance and inside and clearance >= 0.0:
-                d0, d1, d2 = q[0] - anchor[p, 0], q[1] - anchor[p, 1], q[2] - anchor[p, 2]
-                # a point that moved less than its clearance at its last look-up cannot touch
-                if slope * slope * (d0 * d0 + d1 * d1 + d2 * d2) <= clearance * clearance:
-                    clear += 1
-                    continue
-            # a point that touched is taken to touch still: its value alone is not asked first
-            touched = clearance < 0.0
-            anchor[p, 0], anchor[p, 1], anchor[p, 2] = q
+            if skips.clearance and inside and still_clear(anchor, p, q, slope, clearance):
+                clear += 1
+                continue
+            touched = clearance < 0.0  # it is taken to touch still: its value alone is not asked first
+            store3(anchor, p, q)
             cell = locate(c, at)
             if skips.cheap and inside and not touched:
                 phi = trilinear(c, cell) + field.gap
@@ -101,17 +92,16 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
             if touched or d > 0.0:
                 fill_jet(c, m, cell, weights, jet[p])
                 d = jet[p, 0] + reach
-            # a point outside the grid is no anchor: the slope is bounded inside only
-            anchor[p, 3] = d - reach if inside else 1.0
+            anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
             if d > 0.0:
                 penetration[p] = d
-                total += wall_law.energy(stiffness, weight[p], d)
+                total += wall_law.energy(problem.stiffness, weight[p], d)
     count(problem, clear, cheap, full)
     return total
 
 
 @inlined
-def placed(x: Any, r: Any, n: int, o0: float, o1: float, o2: float) -> tuple[float, float, float]:
+def placed(x: Any, r: Any, n: int, o0: float, o1: float, o2: float) -> Three:
     """Where a point with offset o in the frame of node n is, mm."""
     q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
     if o0 != 0.0 or o1 != 0.0 or o2 != 0.0:
@@ -119,6 +109,13 @@ def placed(x: Any, r: Any, n: int, o0: float, o1: float, o2: float) -> tuple[flo
         q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
         q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
     return q0, q1, q2
+
+
+@inlined
+def still_clear(anchor: Any, p: int, q: Three, slope: float, clearance: float) -> bool:
+    """Whether a point moved less since its last look-up than it was clear of the wall then: so it cannot touch."""
+    way = minus(q, load3(anchor, p))
+    return bool(clearance >= 0.0 and slope * slope * dot(way, way) <= clearance * clearance)
 
 
 @inlined

@@ -100,7 +100,7 @@ def step(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
     return outcome, used
 
 
-@kernel
+@merged
 def relax_current(handle: Any, k: int, share: float) -> tuple[int, int, float]:
     """Relax the wire as it is laid out, in place; return the outcome, iterations and energy, N mm.
 

@@ -10,6 +10,9 @@ from solver._kernels.data import Chain
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.rotation import jacobian_curvature
 
+Gains = tuple[Three, Nine, Nine]
+"""Of a joint: its step, and its answers to δp and δr."""
+
 
 @inlined
 def joint_hessian(
@@ -86,7 +89,7 @@ def note_direction(q: Six, j: int, least: float, report: Any) -> None:
 
 
 @inlined
-def store_gains(gain: Any, j: int, gains: tuple[Three, Nine, Nine]) -> None:
+def store_gains(gain: Any, j: int, gains: Gains) -> None:
     """Write joint j's gains, (3, 7): column 0 its step, 1-3 the answer to δp, 4-6 to δr."""
     feed, p, r = gains
     gain[j, 0, 0], gain[j, 1, 0], gain[j, 2, 0] = feed

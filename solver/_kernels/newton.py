@@ -42,6 +42,7 @@ from solver._kernels.algebra import (
 from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.joint import (
+    Gains,
     joint_hessian,
     least_curvature,
     note_direction,
@@ -55,8 +56,6 @@ from solver._kernels.rotation import jacobian, turn
 
 Value = tuple[Six, Nine, Six, Three, Three]
 """The value function at a node: p, c, h, f, g."""
-Gains = tuple[Three, Nine, Nine]
-"""Of a joint: its step, and its answers to δp and δr."""
 
 
 @inlined
@@ -113,8 +112,8 @@ def cross_joint(e: Nine, value: Value, q_up: Nine, q_ur: Nine, gains: Gains) -> 
 def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, report: Any) -> bool:
     """One backward Riccati recursion from the tip to joint ``first_free``: fills the gains and report.decrement.
 
-    damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
-    leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
+    damping : Levenberg's term, a share of each joint's stiffness that holds its node in place; the coupling between
+    joints stays, as in a viscous bath, and the wall's negative curvature is left out.
     Returns False and stops at the first block that is not positive (semi-)definite, which the report then describes.
     """
     if problem.straight:

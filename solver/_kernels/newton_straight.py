@@ -16,6 +16,7 @@ from solver._kernels.algebra import (
     ZERO3,
     ZERO6,
     Nine,
+    Pair,
     Six,
     Three,
     add3,
@@ -29,14 +30,12 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.joint import least_curvature, note_direction, stiffened, store_gains
+from solver._kernels.joint import Gains, least_curvature, note_direction, stiffened, store_gains
 from solver._kernels.node import node_gradient, node_hessian
 from solver._kernels.rotation import jacobian_terms, sine_terms
 
-Pair = tuple[float, float]
 Value = tuple[Six, Six, Three, Three, Pair]
 """The value function at a node: p, c, h, f, g."""
-Gains = tuple[Three, Nine, Nine]
 Turn = tuple[Six, Nine]
 """Of a joint: the Jacobian J of its rotation, (3, 2) row by row, and the rotation itself."""
 

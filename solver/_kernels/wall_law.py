@@ -1,8 +1,8 @@
 """The law of the wall: what it costs the wire to be d mm beyond the lumen, d > 0. No other file knows it.
 
 Hooke's law, the seed's eq. 6 and 7: ½ k d² per mm of wire. Arguments: the wall's stiffness k in N/mm per mm of wire,
-the length of wire in mm that a look-up point stands for, and d in mm. A point with d <= 0 costs nothing: no function
-here is asked about it.
+the length of wire in mm that a look-up point stands for, and d in mm. At d = 0 energy and force must be 0; no function
+here is asked about d < 0.
 """
 
 from __future__ import annotations
