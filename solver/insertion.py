@@ -101,7 +101,7 @@ class Insertion:
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
         work = self._work
-        work.counters[:] = 0
+        work.counts.fill(0)
         if not self._started:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
             work.place["roll"], self._started = roll, True

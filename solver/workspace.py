@@ -64,6 +64,8 @@ class Workspace:
         self.round = wire.straight and (wall is None or wall.samples == 0)
         self.k, self.capacity = 0, 0
         self.counters, self.place = np.zeros(1, COUNTERS), np.zeros(1, PLACE)
+        # the same memory without names: to clear a record field by field takes 6 µs
+        self.counts = self.counters.view(np.int64)
         self.place["shrink"] = 1.0
         self.report = np.zeros(2, REPORT)
         self._grow(16)
