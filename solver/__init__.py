@@ -15,7 +15,7 @@ The seed is Alderliesten, Konings & Niessen, MICCAI 2002; equation numbers are i
 | c_i             | Chain.bend = 1/∫ ds/EI over the joint's cell (half a cell at i = 0) | N mm/rad   | 1, 2          |
 | ω_i             | Chain.rest = ∫ κ ds over the joint's cell, about material axis 2    | rad        | 4             |
 | κ_torsion       | GuideWire.torsional_stiffness_N_mm2; Chain.twist, State.u[i, 2]     | N mm²; N mm/rad | 5        |
-| k, d            | VesselWall.stiffness_N_mm2 (per mm of wire); State.depth            | N/mm²; mm  | 6             |
+| k, d            | VesselWall.stiffness_N_mm2 (per mm of wire); State.penetration      | N/mm²; mm  | 6             |
 | U_Tvw           | Solution.wall_energy_N_mm                                           | N mm       | 7             |
 | U_Tb            | Solution.bending_energy_N_mm                                        | N mm       | 2             |
 | hull points     | VesselWall.hull: "samples:N", or their smooth limit "offset"        | -          | section 2.1   |
@@ -26,8 +26,8 @@ The seed is Alderliesten, Konings & Niessen, MICCAI 2002; equation numbers are i
 | forced rotation | Insertion.to_depths(roll_deg=...)                                   | deg        | section 4.2   |
 | force feedback  | Solution.push_force_N, reaction_force_N, reaction_torque_N_mm       | N; N mm    | its outlook   |
 
-What differs from the seed, and why, is said where it happens: ``layout`` (cells), ``newton`` (the fast
-minimiser), ``closed_form`` (eq. 10), ``passage`` (no tunnelling).
+What differs from the seed, and why, is said where it happens, in ``_kernels``: ``chain`` (cells), ``newton`` (the
+fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 """
 
 from __future__ import annotations

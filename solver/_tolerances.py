@@ -44,7 +44,7 @@ SEARCHES = 6
 """Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
 FINE = 1e-5
 """Fall foretold, over the energy, below which whole steps may lead uphill for a while: the shape hardly changes."""
-VENTURES = 8
+WATCHDOG_STEPS = 8
 """Whole steps that may lead uphill before the energy must be lower than where they began."""
 RISE = 0.01
 """How far uphill they may lead, over the energy."""
@@ -65,6 +65,8 @@ CLOSED_FORM_SMALLEST = 1e-12
 CLOSED_FORM_IDLE_ANGLE = 3e-11
 """A moment that would turn the stiffest joint by this angle, rad, is nothing: below it the energy by which the closed
 form accepts its steps no longer shows them (sqrt(2e-16 u), 1.4e-11 rad in a wire bent by 1e-6 rad a joint)."""
+FIRST_CHECK = 32
+"""Sweeps of the closed form before it is first asked whether it is at rest; later after every quarter more."""
 SWEEPS_PER_ITERATION = 500
 """Sweeps of the closed form that max_iterations allows for each of its iterations: it needs O(k²) of them."""
 RISE_RADII = 0.5
@@ -72,10 +74,6 @@ RISE_RADII = 0.5
 only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
 BUDGET_STEPS = 20
 """Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
-NO_FRICTION = 1e-200
-"""Coefficient of friction that is computed and changes nothing: for the test of leaving friction out."""
-RIGID = 1e9
-"""Torsional over bending stiffness of a wire that turns as one: for the test of leaving twist out."""
 WORK = 8_000_000
 """Joints and look-up points that all iterations or sweeps of one depth may pass, whatever max_iterations: 80,000
 sweeps of 50 joints with one look-up each (the closed form needs up to 75,000 for a step in a bend), or 2,000 of

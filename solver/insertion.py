@@ -9,21 +9,17 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
-from solver._kernels.advance import AT, DEPTH, ROLL, SHRINK, Base, advance
-from solver._kernels.journey import Journey, bind
-from solver._kernels.problem import Switch
-from solver.chain import base_frame, unit
 from solver.errors import refuse
-from solver.relax import OUTCOMES, Settings, buffers_for, solution_of
+from solver.introducer import base_frame, unit, vector
+from solver.relax import Settings
 from solver.solution import Solution
 from solver.status import Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
-
-Array = NDArray[np.float64]
+from solver.workspace import Workspace
 
 
 class Insertion:
@@ -55,52 +51,33 @@ class Insertion:
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
-        switch: Switch | None = None,
     ) -> None:
-        self.settings = Settings(method, tolerance, max_iterations, quadrature, switch or Switch())
+        settings = Settings(method, tolerance, max_iterations, quadrature)
         if initial not in ("slide", "translate"):
             refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
-        for name, value in (
-            ("step_mm", step_mm),
-            ("roll_step_deg", roll_step_deg),
-            ("max_joints", max_joints),
-        ):
+        positive = {"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}
+        for name, value in positive.items():
             if not (math.isfinite(value) and value > 0):
                 refuse("insertion", name, value, "a positive number", "leave it out for the default")
         self.wire, self.wall, self.max_joints = wire, wall, max_joints
-        self.buffers = buffers_for(wire, wall, self.settings)
-        self.orders = self.settings.orders
-        direction = unit(entry_direction, "entry_direction")
-        self.base = Base(
-            entry=_vector("entry_mm", entry_mm),
-            frame=np.ascontiguousarray(base_frame(direction, material_axis, 0.0)),
-            load=_vector("tip_load_N", tip_load_N),
-            translate=initial == "translate",
-            idle_roll=self.buffers.rollable and self.settings.switch.roll,
-            step=float(step_mm),
-            turn=float(roll_step_deg),
-            rise=max(tol.RISE_RADII * wire.radius_mm, 0.25 * self.buffers.spacing),
-            margin=float(wire.radius_mm),
-        )
-        self.at = np.zeros(AT)
-        self.at[SHRINK] = 1.0
-        self.buffers.state.x[0, 0] = self.base.entry
-        self.buffers.state.r[0, 0] = self.base.frame
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
+        frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
+        entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
+        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
         self._started = False
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
-        self._journey = self._bound()
-        self._outside = wall is not None and self._entry_is_outside(wall)
+        self._outside = wall is not None and self._is_outside(wall, entry)
 
     @property
     def depth_mm(self) -> float:
         """Where the tip is, mm of wire beyond the entry."""
-        return float(self.at[DEPTH])
+        return float(self._work.place["inserted"][0])
 
     @property
     def roll_deg(self) -> float:
         """Where the base is turned to."""
-        return float(self.at[ROLL])
+        return float(self._work.place["roll"][0])
 
     def to_depths(
         self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0
@@ -114,36 +91,24 @@ class Insertion:
         rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
         for depth, roll in zip(depths, rolls, strict=True):
             if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
-                refuse(
-                    "insertion",
-                    "to_depths",
-                    (depth, roll),
-                    "finite depths >= 0 and rolls",
-                    "mm from the entry",
-                )
-        # room for all of it at once, and a new handle of what is then elsewhere in memory
-        if self.buffers.reserve(max((d for d in depths if d < self._too_long), default=0.0)):
-            self._journey = self._bound()
+                allowed = "finite depths >= 0 and rolls"
+                refuse("insertion", "to_depths", (depth, roll), allowed, "mm from the entry")
+        # room for all of it at once
+        self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
         for depth, roll in zip(depths, rolls, strict=True):
             yield self._go(depth, roll)
 
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
-        b = self.buffers
-        b.counter[:] = 0
+        work = self._work
+        work.counts.fill(0)
         if not self._started:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
-            self.at[ROLL], self._started = roll, True
+            work.place["roll"], self._started = roll, True
         status, iterations = self._refusal(depth), 0
         if status is Status.CONVERGED:
-            outcome, iterations, b.k = advance(self._journey, depth, roll, 0)
-            status = OUTCOMES[outcome]
-        depth, roll, energy, _, _ = self.at.tolist()
-        return solution_of(b, status, iterations, energy, depth, roll)
-
-    def _bound(self) -> Journey:
-        b = self.buffers
-        return bind(Journey(b.problem, b.cut, self.base, self.orders, self.at, b.report, b.force))
+            status, iterations = work.advance(depth, roll)
+        return work.solution(status, iterations, self.depth_mm, self.roll_deg)
 
     def _refusal(self, depth: float) -> Status:
         """A status for depths that need not be tried."""
@@ -151,14 +116,8 @@ class Insertion:
             return Status.TOO_LONG
         return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
 
-    def _entry_is_outside(self, wall: VesselWall) -> bool:
-        """Whether the entry point lies more than a voxel outside the lumen."""
+    @staticmethod
+    def _is_outside(wall: VesselWall, entry: ArrayLike) -> bool:
+        """Whether an entry point lies more than a voxel outside the lumen."""
         diagonal = float(np.linalg.norm(wall.distance.spacing_mm))
-        return bool(wall.look_up(self.base.entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)
-
-
-def _vector(name: str, value: ArrayLike) -> Array:
-    vector = np.array(value, dtype=np.float64)
-    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        refuse("insertion", name, value, "three finite numbers", "LPS, in the unit of its name")
-    return vector
+        return bool(wall.look_up(entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solver._kernels.data import WORK
 from solver.status import Status
-from solver.work import work_of
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,8 @@ class Solution:
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
-    counts : see ``work``.     start_energy_N_mm : what the last relaxation began with.
+    counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
+    start_energy_N_mm : total energy that the last relaxation began with.
     """
 
     joints_mm: Array
@@ -48,7 +49,13 @@ class Solution:
     @property
     def work(self) -> Mapping[str, float]:
         """Counters of what was computed and what was proven unnecessary, by name."""
-        return work_of(self.counts, self.start_energy_N_mm)
+        work = {name: float(count) for name, count in zip(WORK, self.counts, strict=False)}
+        looked = (
+            work["wall_look_ups"] + work["wall_look_ups_cheap"] + work["wall_look_ups_proven_unnecessary"]
+        )
+        work["wall_look_ups_done_fraction"] = work["wall_look_ups"] / looked if looked else 0.0
+        work["start_energy_N_mm"] = self.start_energy_N_mm
+        return work
 
     @property
     def converged(self) -> bool:

@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.spline import Field, bounds, look_up, prefilter
+from solver._kernels.data import Field
+from solver._kernels.field import bounds, look_up, prefilter
 from solver.errors import refuse
 from solver.grid import Grid
 
@@ -64,9 +65,9 @@ class VesselWall:
             line[-1] = 2 * line[-2] - line[-3]
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
         coefficients = padded.astype(np.float32)
-        gap, slope = bounds(coefficients, to_index)
-        origin = np.array(self.distance.origin_mm)
-        object.__setattr__(self, "field", Field(coefficients, to_index, origin, float(gap), float(slope)))
+        gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
+        origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
+        object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing))
 
     @cached_property
     def samples(self) -> int:

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import gc
+import inspect
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import Any
 
 import numba
 import numpy as np
 
-from solver._kernels.advance import lay_along
-from solver._kernels.closed_form import minimise_closed_form
-from solver._kernels.follow import follow
+from solver._kernels import closed_form
 from solver._kernels.forces import contact_forces, push_force
+from solver._kernels.insertion import lay_along
 from solver._kernels.minimise import minimise
 from solver.grid import Grid
-from solver.insertion import Insertion
-from solver.relax import Settings, buffers_for
+from solver.relax import Settings, relax
 from solver.wall import VesselWall
 from solver.wire import GuideWire
+from solver.workspace import Workspace
 
 untyped: Any = numba
-typeof = untyped.typeof
-WHOLE, REAL = numba.int64, numba.float64
-REPORT, FORCES = typeof(np.zeros(1)), typeof(np.zeros((1, 3)))
+WIRE = GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
 
 
 @contextmanager
@@ -44,58 +42,48 @@ def no_collection() -> Iterator[None]:
 def warm_up(*, beside: bool = False) -> None:
     """Compile every kernel (about half a minute, once per installation; later calls read the cache).
 
-    beside : all but the minimiser and the way to a depth is compiled by a process of its own, at the same time.
+    beside : all but Newton's method and the way to a depth is compiled by a process of its own, at the same time.
     """
     with no_collection():
         if not beside or untyped.config.DISABLE_JIT:
-            _insert()
-            _lesser_doors()
+            relax(WIRE, _wall(), depth_mm=1.0)
             return
-        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_the_rest()"]):
-            insertion = Insertion(_wire(), None, [0, 0, 0], [0, 0, 1])
-            problem = typeof(insertion.buffers.problem)
+        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_beside()"]):
             # while the other process makes what ``advance`` needs besides
-            cast(Any, minimise).compile((problem, WHOLE, WHOLE, REAL, WHOLE, REPORT))
-            _insert()
+            _compile(minimise)
+            # a wall has no types of its own
+            relax(WIRE, None, depth_mm=1.0)
 
 
-def compile_the_rest() -> None:
-    """Kernels that are kept on disk and can wait there for ``advance``, then the lesser doors."""
+def compile_beside() -> None:
+    """Compile what is kept on disk and can wait there for ``advance``, then what only a wall needs."""
     with no_collection():
-        insertion = Insertion(_wire(), None, [0, 0, 0], [0, 0, 1])
-        problem, cut, base = (
-            typeof(part) for part in (insertion.buffers.problem, insertion.buffers.cut, insertion.base)
-        )
-        for part, types in (
-            (minimise_closed_form, (problem, WHOLE, WHOLE, REAL, WHOLE, REPORT)),
-            (lay_along, (problem, cut, base, WHOLE, WHOLE, REAL, REAL)),
-            (contact_forces, (problem, WHOLE, FORCES)),
-            (push_force, (problem, cut, WHOLE, REPORT)),
-        ):
-            cast(Any, part).compile(types)
-        _lesser_doors()
+        _compile(closed_form.iterate, lay_along, contact_forces, push_force)
+        _wall()
 
 
-def _wire() -> GuideWire:
-    return GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
+def _compile(*kernels: Any) -> None:
+    """Compile kernels for arguments of the kinds that their parameters' names say."""
+    work = Workspace(WIRE, None, "tip", Settings().limits)
+    work.clamp(np.zeros(3), np.eye(3))
+    known = {
+        "problem": work.problem,
+        "table": work.table,
+        "introducer": work.introducer,
+        "limits": work.limits,
+        "now": work.problem.scratch.descent[0],
+        "report": work.report[0],
+        "force": work.force,
+        **dict.fromkeys(("slot", "k", "was"), 1),
+        **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
+    }
+    for kernel in kernels:
+        names = inspect.signature(kernel.py_func).parameters
+        kernel.compile(tuple(untyped.typeof(known[name]) for name in names))
 
 
-def _insert() -> None:
-    """The way to a depth; a wall has no types of its own."""
-    for _ in Insertion(_wire(), None, [0, 0, 0], [0, 0, 1]).to_depths([1.0]):
-        pass
-
-
-def _lesser_doors() -> None:
-    """Make a wall and ask it, and lay a wire along a curve."""
-    axis = np.arange(-2.0, 2.5, 0.5)
-    x, y, _ = np.meshgrid(axis, axis, np.arange(-1.0, 4.0, 0.5), indexing="ij")
-    grid = Grid(
-        (np.hypot(x - 0.1, y) - 0.5).astype(np.float32), np.full(3, 0.5), np.array([-2.0, -2.0, -1.0])
-    )
-    wall = VesselWall(grid, 1.0, friction=0.1)
+def _wall() -> VesselWall:
+    """Make a wall and ask it."""
+    wall = VesselWall(Grid(np.full((4, 4, 4), -1.0)), 1.0)
     wall.look_up([[0.0, 0.0, 0.0]])
-    buffers = buffers_for(_wire(), wall, Settings())
-    buffers.lay_out(1.0)
-    state = buffers.state
-    follow(np.eye(3)[1:], 2, buffers.chain, state.u[0], state.x[0], state.r[0], buffers.k)
+    return wall

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solver._kernels.layout import Profile, segments_at
+from solver._kernels.chain import segments_at
+from solver._kernels.data import Profile
 from solver.errors import refuse
 from solver.grid import read_only
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from itertools import chain
@@ -16,12 +17,12 @@ import numpy as np
 import pandas as pd
 
 from pipeline.benchmark import scenes
-from pipeline.benchmark.insert import Setting, insert, timed
+from pipeline.benchmark.insert import Run, Setting, insert, timed
 from pipeline.benchmark.reference import reference, shape_error
 from pipeline.benchmark.scenes import BenchScene
 from reports.schema import CLAIMS, ORDERS
 from solver import Insertion, VesselWall
-from solver.relax import Settings
+from solver.skips import Skips, off
 
 CLAIMS_CSV, ORDERS_CSV = "claims.csv", "orders.csv"
 PEERS_RMS_MM = 0.026
@@ -163,8 +164,8 @@ def voxel_order() -> Iterator[Claim]:
     assert scene.box is not None
     (x, y, z), high = scene.box
     for voxel in VOXELS_MM:
-        off = OFF_LATTICE * voxel
-        wall = replace(scene, box=((x - off, y - off, z - off), high)).wall(voxel_mm=voxel)
+        shift = OFF_LATTICE * voxel
+        wall = replace(scene, box=((x - shift, y - shift, z - shift), high)).wall(voxel_mm=voxel)
         shapes.append(insert(scene, Setting(0.5, tolerance=1e-13), wall).last.joints_mm)
     sizes = VOXELS_MM[:-1]
     found = tuple(shape_error(points, shapes[-1])[0] for points in shapes[:-1])
@@ -183,24 +184,30 @@ def in_a_sheath() -> Iterator[Claim]:
         yield Claim(name + "a 1 mm step, mean of all", 1e3 * seconds / run.steps, "ms")
 
 
+def _without(skip: str | None, scene: BenchScene, setting: Setting, wall: VesselWall | None) -> Run:
+    """The insertion with all skips, or with all but one."""
+    with off(skip) if skip else nullcontext():
+        return insert(scene, setting, wall)
+
+
 def skips() -> Iterator[Claim]:
     """Every skip off in turn: the same wire, and what the skip saves."""
-    on = Settings().switch
-    for name in on._fields:
+    for name in Skips._fields:
         hull = MANY_LOOK_UPS if name in ("clearance", "cheap") else "offset"
         # only in a long sheath does what the tip meets die out before it comes to the base
         scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(), 0.5)
-        wall, off = scene.wall(hull), on._replace(**{name: False})
+        wall = scene.wall(hull)
         # wires are compared at a tolerance so tight that where an iteration stops does not show
         tight = Setting(segment, hull=hull, tolerance=1e-13)
-        with_skip, without = (insert(scene, tight, wall, s).last.joints_mm for s in (on, off))
+        with_skip, without = (_without(s, scene, tight, wall).last.joints_mm for s in (None, name))
         apart = float(np.abs(with_skip - without).max())
         aim = "at most 1e-6 (algebraic skips 1e-12)"
         where = f"skip {name} off ({scene.name}, hull {hull})"
         yield Claim(f"{where}: wire apart", apart, "mm", aim, apart <= 1e-6)
         asked = Setting(segment, hull=hull)
         seconds = [
-            [timed(partial(insert, scene, asked, wall, s), 1)[0] for s in (on, off)] for _ in range(PAIRS)
+            [timed(partial(_without, s, scene, asked, wall), 1)[0] for s in (None, name)]
+            for _ in range(PAIRS)
         ]
         quick, slow = np.median(seconds, axis=0)
         yield Claim(f"{where}: time, times", float(slow / quick), "1")

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter, process_time
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.model import Array
@@ -48,10 +48,10 @@ class Run:
     work: dict[str, float]
 
 
-def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, switch: Any = None) -> Run:
+def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None) -> Run:
     """Push the scene's wire in; a free wire is bent by its dead load at once.
 
-    wall : made already (it costs more than an insertion).     switch : skips of the solver, all by default.
+    wall : made already (it costs more than an insertion).
     """
     wall = scene.wall(setting.hull) if wall is None else wall
     wire = scene.wire(setting.segment_mm)
@@ -67,7 +67,7 @@ def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None, 
         insertion = Insertion(
             wire, wall, scene.entry_mm, scene.direction, setting.method, material_axis=scene.material_axis,
             tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
-            quadrature=setting.quadrature, switch=switch,
+            quadrature=setting.quadrature,
         )  # fmt: skip
         solutions = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
     last, work = solutions[-1], Counter[str]()

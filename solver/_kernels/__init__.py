@@ -1,38 +1,16 @@
-"""Every compiled function of the solver: named tuples of arrays and scalars in, numbers out.
+"""Every compiled function of the solver. In: named tuples of arrays and scalars. Out: numbers, or filled arrays.
 
-flags     how everything is compiled                 problem    what the kernels hand to each other
-journey   all of that behind one handle              small      3x3 algebra on scalars
-rotation  exponential map and its derivatives        spline     the interpolated signed distance
-layout    a wire cut into segments                   energy     eq. 1-7, the one place that defines it
-node, joint   their parts of a Newton step           newton     the Riccati sweep; straight, of a straight wire
-rollout   the chain laid out from its bends          judge      when a state counts as a minimum
-moves     from a state to a lower one                minimise   the one loop: acceptance and stopping
-closed_form   the seed's eq. 8-10                    settle     friction's rounds around a relaxation
-follow    a wire moved along its own curve           foresee    a better start from the last step's change
-passage   what makes tunnelling impossible           advance    the way to a depth, and the one door to all of it
-forces    derivatives of the minimum
+flags            the five decorators                    data             what the kernels hand to each other
+handle           all of it behind one pointer           algebra          3x3 matrices as tuples of scalars
+rotation         exponential map and its derivatives    field            the interpolated signed distance
+wall_law         energy, force, curvature of the wall   chain            a wire cut into segments
+friction         Coulomb friction as a potential        energy           total energy (eq. 1-7)
+node, joint      their parts of a Newton step           rollout          joints and frames from the controls
+newton           the step, by a Riccati recursion       newton_straight  the same for a straight round wire
+newton_moves     from a state to a lower one            newton_method    one iteration of Newton's method
+closed_form      one sweep of the seed's eq. 8-10       convergence      when a state counts as a minimum
+minimise         the loop around either method          relaxation       friction's rounds around that loop
+follow           the wire laid along a curve            extrapolation    a better start, from the last step
+crossing         whether a way passes through a wall    forces           forces of a wire at rest
+insertion        the steps to a depth, and the one entry point to all of it
 """
-
-from __future__ import annotations
-
-from pathlib import Path
-
-
-def _drop_stale_cache() -> None:
-    """Delete compiled kernels older than any kernel's source.
-
-    numba's cache looks at the file of a function alone: after a change in ``newton`` it would go on running the
-    old one inside ``minimise``.
-    """
-    here = Path(__file__).parent
-    newest = max(p.stat().st_mtime for p in (*here.glob("*.py"), here.parent / "_tolerances.py"))
-    for index in (here / "__pycache__").glob("*.nbi"):
-        try:
-            if index.stat().st_mtime < newest:
-                index.unlink()
-        except OSError:
-            # another process was faster, or the installation is read-only: numba then compiles in memory
-            continue
-
-
-_drop_stale_cache()

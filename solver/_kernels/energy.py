@@ -1,38 +1,39 @@
 """Eq. 1-7: the total energy of a wire in a wall, the one place that defines it.
 
-U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ ½ k w_p max(0, φ(x_p) + ρ)²  -  Σ F_n · x_n  +  friction
+U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ wall(w_p, φ(x_p) + ρ)  -  Σ F_n · x_n  +  friction
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from solver._kernels.flags import inlined, kernel, once
-from solver._kernels.layout import Chain
-from solver._kernels.problem import BENDING, CHEAP, CLEAR, FULL, LOAD, RUBBING, WALL, Problem
-from solver._kernels.spline import in_grid, indices, locate, set_basis, spline, to_world, trilinear, value
+from solver._kernels import wall_law
+from solver._kernels.algebra import Three, dot, load3, minus, store3
+from solver._kernels.data import Chain, Problem
+from solver._kernels.field import fill_jet, in_grid, indices, locate, trilinear, value
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.friction import friction_energy
 
 
 @kernel
-def total_energy(problem: Problem, which: int, near: int, k: int) -> float:
+def total_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     """Total energy of a state, N mm; its parts go to the state. The wall is not asked where there is none.
 
-    Up to node ``near`` (0 for none) the two states agree, and what the wall said to the other one holds.
+    Up to node ``first_free`` (0 for none) the two states agree, and what the wall said to the other one holds.
     """
-    state = problem.state
-    parts = state.parts[which]
-    parts[BENDING] = bending_energy(problem.chain, state.u[which], k)
-    parts[WALL] = wall_energy(problem, which, near, k) if problem.stiffness > 0.0 else 0.0
-    parts[LOAD] = load_energy(problem.chain, state.x[which], k)
-    parts[RUBBING] = friction_energy(problem, which, k) if problem.friction.coefficient > 0.0 else 0.0
-    return energy_of(parts)
+    state, parts = problem.state, problem.state.energies[slot]
+    parts.bending = bending_energy(problem.chain, state.u[slot], k)
+    parts.wall = wall_energy(problem, slot, first_free, k) if problem.stiffness > 0.0 else 0.0
+    parts.load = load_energy(problem.chain, state.x[slot], k)
+    parts.friction = friction_energy(problem, slot, k) if problem.friction.coefficient > 0.0 else 0.0
+    return energy_of(problem, slot)
 
 
 @inlined
-def energy_of(parts: Any) -> float:
-    """The total of a state's parts, N mm."""
-    return float(parts[BENDING] + parts[WALL] + parts[LOAD] + parts[RUBBING])
+def energy_of(problem: Problem, slot: int) -> float:
+    """Total energy of a state whose parts are known, N mm."""
+    parts = problem.state.energies[slot]
+    return float(parts.bending + parts.wall + parts.load + parts.friction)
 
 
 @kernel
@@ -56,156 +57,85 @@ def load_energy(chain: Chain, x: Any, k: int) -> float:
     return total
 
 
-@inlined
-def point_at(problem: Problem, which: int, n: int, p: int, q: Any) -> None:
-    """Where look-up point p of node n is, mm, into q (3,)."""
-    x, r, o = problem.state.x[which, n], problem.state.r[which, n], problem.chain.offset[p]
-    for a in range(3):
-        q[a] = x[a] + r[a, 0] * o[0] + r[a, 1] * o[1] + r[a, 2] * o[2]
-
-
 @kernel
-def wall_energy(problem: Problem, which: int, near: int, k: int) -> float:
-    """Eq. 6 and 7: look every point beyond node ``near`` up and add its share, N mm; take over the others."""
-    total = taken_over(problem, which, near) if near > 0 else 0.0
+def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
+    """Eq. 6 and 7: look every point beyond node ``first_free`` up and add its share, N mm; take over the others."""
+    total = taken_over(problem, slot, first_free) if first_free > 0 else 0.0
     # bound once: inside the loop every member would be taken out of the tuple again, with its reference count
-    field, switch, chain, state = problem.field, problem.switch, problem.chain, problem.state
+    field, skips, chain, state = problem.field, problem.skips, problem.chain, problem.state
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
-    x, r, depth, anchor = state.x[which], state.r[which], state.depth[which], problem.scratch.anchor
-    jet, weights = state.jet[which], problem.scratch.weights
+    x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
+    anchor, weights = problem.scratch.anchor, problem.scratch.weights
     clear, cheap, full = 0, 0, 0
-    for n in range(near + 1, k + 1):
+    for n in range(first_free + 1, k + 1):
         for p in range(first[n], first[n + 1]):
-            q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
-            o0, o1, o2 = offset[p, 0], offset[p, 1], offset[p, 2]
-            if o0 != 0.0 or o1 != 0.0 or o2 != 0.0:
-                q0 += r[n, 0, 0] * o0 + r[n, 0, 1] * o1 + r[n, 0, 2] * o2
-                q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
-                q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
-            depth[p] = 0.0
-            place = indices(m, o, q0, q1, q2)
-            inside = in_grid(c, place)
-            # a point that moved less than its clearance since its last look-up cannot touch
+            q = placed(x, r, n, offset[p, 0], offset[p, 1], offset[p, 2])
+            penetration[p] = 0.0
+            at = indices(m, o, q)
+            inside = in_grid(c, at)
             clearance = -anchor[p, 3] - reach
-            if switch.clearance and inside and clearance >= 0.0:
-                d0, d1, d2 = q0 - anchor[p, 0], q1 - anchor[p, 1], q2 - anchor[p, 2]
-                if slope * slope * (d0 * d0 + d1 * d1 + d2 * d2) <= clearance * clearance:
-                    clear += 1
-                    continue
-            # a point that touched is taken to touch still: its value alone is not asked first
-            touched = clearance < 0.0
-            anchor[p, 0], anchor[p, 1], anchor[p, 2] = q0, q1, q2
-            i, j, h, u, v, w = locate(c, place)
-            if switch.cheap and inside and not touched:
-                phi = trilinear(c, i, j, h, u, v, w) + field.gap
+            if skips.clearance and inside and still_clear(anchor, p, q, slope, clearance):
+                clear += 1
+                continue
+            touched = clearance < 0.0  # it is taken to touch still: its value alone is not asked first
+            store3(anchor, p, q)
+            cell = locate(c, at)
+            if skips.cheap and inside and not touched:
+                phi = trilinear(c, cell) + field.gap
                 if phi + reach <= 0.0:
                     cheap += 1
                     anchor[p, 3] = phi
                     continue
             full += 1
-            d = -1.0 if touched else value(c, i, j, h, u, v, w) + reach
+            d = -1.0 if touched else value(c, cell) + reach
             if touched or d > 0.0:
-                set_basis(u, v, w, weights)
-                d = penetration(c, m, i, j, h, weights, jet[p], reach)
-            # a point outside the grid is no anchor: the slope is bounded inside only
-            anchor[p, 3] = d - reach if inside else 1.0
+                fill_jet(c, m, cell, weights, jet[p])
+                d = jet[p, 0] + reach
+            anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
             if d > 0.0:
-                depth[p] = d
-                total += 0.5 * problem.stiffness * weight[p] * d * d
-    counter = problem.scratch.counter
-    counter[CLEAR] += clear
-    counter[CHEAP] += cheap
-    counter[FULL] += full
+                penetration[p] = d
+                total += wall_law.energy(problem.stiffness, weight[p], d)
+    count(problem, clear, cheap, full)
     return total
 
 
+@inlined
+def placed(x: Any, r: Any, n: int, o0: float, o1: float, o2: float) -> Three:
+    """Where a point with offset o in the frame of node n is, mm."""
+    q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
+    if o0 != 0.0 or o1 != 0.0 or o2 != 0.0:
+        q0 += r[n, 0, 0] * o0 + r[n, 0, 1] * o1 + r[n, 0, 2] * o2
+        q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
+        q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
+    return q0, q1, q2
+
+
+@inlined
+def still_clear(anchor: Any, p: int, q: Three, slope: float, clearance: float) -> bool:
+    """Whether a point moved less since its last look-up than it was clear of the wall then: so it cannot touch."""
+    way = minus(q, load3(anchor, p))
+    return bool(clearance >= 0.0 and slope * slope * dot(way, way) <= clearance * clearance)
+
+
+@inlined
+def count(problem: Problem, clear: int, cheap: int, full: int) -> None:
+    """Add up how the points were looked up."""
+    counters = problem.scratch.counters[0]
+    counters.wall_look_ups_proven_unnecessary += clear
+    counters.wall_look_ups_cheap += cheap
+    counters.wall_look_ups += full
+
+
 @kernel
-def taken_over(problem: Problem, which: int, near: int) -> float:
-    """Wall energy of nodes 1 to ``near``, as the other state has it, N mm."""
+def taken_over(problem: Problem, slot: int, first_free: int) -> float:
+    """Wall energy of nodes 1 to ``first_free``, as the other state has it, N mm."""
     chain, state, total = problem.chain, problem.state, 0.0
-    depth, jet, source, from_jet = (
-        state.depth[which],
-        state.jet[which],
-        state.depth[1 - which],
-        state.jet[1 - which],
-    )
-    for p in range(chain.first[1], chain.first[near + 1]):
-        d = source[p]
-        depth[p] = d
+    for p in range(chain.first[1], chain.first[first_free + 1]):
+        d = state.penetration[1 - slot, p]
+        state.penetration[slot, p] = d
         if d > 0.0:
-            total += 0.5 * problem.stiffness * chain.weight[p] * d * d
+            total += wall_law.energy(problem.stiffness, chain.weight[p], d)
             for a in range(10):
-                jet[p, a] = from_jet[p, a]
+                state.jet[slot, p, a] = state.jet[1 - slot, p, a]
     return total
-
-
-@inlined
-def penetration(c: Any, m: Any, i: int, j: int, k: int, weights: Any, jet: Any, reach: float) -> float:
-    """How far the wire's hull is beyond the lumen, mm (negative inside); fills the point's jet."""
-    spline(c, i, j, k, weights, jet)
-    to_world(m, jet)
-    return float(jet[0] + reach)
-
-
-@inlined
-def slide_of(problem: Problem, which: int, n: int, p: int, slide: Any) -> float:
-    """Tangential way (3,) of a point since the step began; returns its smoothed length, at least ``slip``."""
-    friction = problem.friction
-    point_at(problem, which, n, p, slide)
-    normal = friction.normal[p]
-    across = 0.0
-    for a in range(3):
-        slide[a] -= friction.start[p, a]
-        across += slide[a] * normal[a]
-    size = friction.slip * friction.slip
-    for a in range(3):
-        slide[a] -= across * normal[a]
-        size += slide[a] * slide[a]
-    return float(math.sqrt(size))
-
-
-@once
-def hold(problem: Problem, k: int) -> None:
-    """Friction, where there is any, holds every look-up point where it is now."""
-    if problem.friction.coefficient == 0.0:
-        return
-    now = 0 * k
-    for n in range(1, k + 1):
-        for p in range(problem.chain.first[n], problem.chain.first[n + 1]):
-            point_at(problem, now, n, p, problem.friction.start[p])
-
-
-@kernel
-def friction_energy(problem: Problem, which: int, k: int) -> float:
-    """Incremental potential of Coulomb's law, N mm: load times coefficient times the way slid in this step."""
-    friction, chain = problem.friction, problem.chain
-    slide = problem.scratch.slide
-    total = 0.0
-    for n in range(1, k + 1):
-        for p in range(chain.first[n], chain.first[n + 1]):
-            if friction.load[p] > 0.0:
-                size = slide_of(problem, which, n, p, slide)
-                total += friction.coefficient * friction.load[p] * (size - friction.slip)
-    return total
-
-
-@kernel
-def lag_friction(problem: Problem, which: int, k: int) -> float:
-    """Take contact loads and normals from a state; return the largest change of a load over the largest load."""
-    friction, chain, state = problem.friction, problem.chain, problem.state
-    change = 0.0
-    largest = 0.0
-    for p in range(chain.first[1], chain.first[k + 1]):
-        d = state.depth[which, p]
-        load = 0.0
-        if d != 0.0:
-            jet = state.jet[which, p]
-            slope = math.sqrt(jet[1] * jet[1] + jet[2] * jet[2] + jet[3] * jet[3])
-            load = problem.stiffness * chain.weight[p] * d * slope
-            for a in range(3):
-                friction.normal[p, a] = jet[1 + a] / max(slope, 1e-12)
-        change = max(change, abs(load - friction.load[p]))
-        largest = max(largest, load)
-        friction.load[p] = load
-    return change / largest if largest > 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""The one place that says how kernels are compiled.
+"""How compiled functions are compiled: five decorators.
 
-Machine code to be called from Python is made for the doors alone. Handing a kernel its forty arrays is code too,
-and making it for every kernel would take as long again as compiling them.
+Machine code that Python can call is made for entry points alone. Unpacking a kernel's forty arrays is code too: made
+for every kernel, it would take as long again as compiling the kernels themselves.
 """
 
 from __future__ import annotations
@@ -10,48 +10,54 @@ from collections.abc import Callable
 from typing import Any, NoReturn, TypeVar, cast
 
 import numba
+from numba import types
+
+from solver._compile import on_disk
 
 F = TypeVar("F", bound=Callable[..., Any])
+untyped: Any = types
 
-# Only fused multiply-add is allowed to reorder arithmetic: NaN and inf must keep their meaning, because
-# the minimiser detects a broken state by them.
+# Only fused multiply-add may change how sums are rounded: NaN and inf must keep their meaning, because the minimiser
+# recognises a broken state by them.
 FAST: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy"}
-LEAN = dict(FAST, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def door(function: F) -> F:
-    """What Python calls; kept on disk."""
-    return cast(F, numba.njit(cache=True, **FAST)(function))
-
-
-def _within(**how: Any) -> Callable[[F], F]:
-    """Compiled into the doors that need it, with no way in from Python."""
-    options = dict(LEAN, **how)
+def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable[[F], F]:
+    """Return a decorator for functions that only compiled code calls."""
+    options = dict(FAST, no_cpython_wrapper=True, no_cfunc_wrapper=True, **how)
 
     def decorate(function: F) -> F:
-        within: Any = numba.njit(**options)(function)
+        compiled: Any = compiler(**options)(function)
+        if compiled is function:  # NUMBA_DISABLE_JIT is set
+            return function
+        template = compiled.get_call_template
 
-        def add(compiled: Any) -> None:
-            within.overloads[tuple(compiled.signature.args)] = compiled
+        def add(overload: Any) -> None:
+            compiled.overloads[tuple(overload.signature.args)] = overload
 
         def refuse(*_: object, **__: object) -> NoReturn:
-            message = f"{function.__name__} is for compiled code: call a door, or write one in a test"
+            message = f"{function.__name__} is for compiled code: call an entry point, or write one in a test"
             raise TypeError(message)
 
-        if within is not function:
-            # numba would list it for Python all the same, and a call would end the process
-            within.add_overload, within._compile_for_args = add, refuse
-        return cast(F, within)
+        def unliteral(args: tuple[Any, ...], kws: Any) -> Any:
+            return template(tuple(untyped.unliteral(arg) for arg in args), kws)
+
+        # numba would list the overload for Python all the same, and a call from there would end the process
+        compiled.add_overload, compiled._compile_for_args = add, refuse
+        # a literal argument is a type of its own to numba, and would compile the function once more
+        compiled.get_call_template = unliteral
+        return cast(F, compiled)
 
     return decorate
 
 
-# For what other kernels call. Mind that a literal argument is a type of its own to numba, and compiles the callee
-# again: pass 0 * k, or a number that is computed.
-kernel = _within()
-# For what another process can compile meanwhile: kept on disk as well.
-kept = _within(cache=True)
-# For what is called per joint or per point: the tuples it takes never leave the registers.
-inlined = _within(forceinline=True)
-# For a part of one other kernel: merged into it before anything is compiled, or it would be compiled twice.
-once = _within(inline="always")
+# Called from Python; kept on disk.
+entry_point = on_disk(**FAST)
+# Called by other kernels.
+kernel = _internal()
+# The same, kept on disk as well: another process can compile it meanwhile.
+cached = _internal(on_disk)
+# Called per joint or per point: inlined by LLVM, so that the tuples it takes never leave the registers.
+inlined = _internal(forceinline=True)
+# A part of one other kernel: merged into it before anything is compiled, or it would be compiled twice.
+merged = _internal(inline="always")

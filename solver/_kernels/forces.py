@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.energy import slide_of
-from solver._kernels.flags import kept, kernel
-from solver._kernels.layout import Cut
-from solver._kernels.problem import Problem
+from solver._kernels import wall_law
+from solver._kernels.algebra import dot, load3, load9, store3, store9
+from solver._kernels.data import CURRENT, Field, Problem, WireTable
+from solver._kernels.flags import cached, kernel, merged
+from solver._kernels.friction import slide
 from solver._kernels.rotation import turn
-from solver._kernels.small import load9, store9
-from solver._kernels.spline import Field
 
 
-@kept
+@cached
 def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
 
@@ -22,23 +21,22 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """
     chain, state, friction = problem.chain, problem.state, problem.friction
     deepest = 0.0
-    slide = problem.scratch.slide
-    now = 0 * k
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
             share = -chain.offset[p, 2] / chain.length[n - 1]
-            d = state.depth[0, p]
+            d = state.penetration[CURRENT, p]
             deepest = max(deepest, d)
             if d != 0.0:
-                size = -problem.stiffness * chain.weight[p] * d
+                size = -wall_law.force(problem.stiffness, chain.weight[p], d)
                 for a in range(3):
-                    force[n, a] += (1 - share) * size * state.jet[0, p, 1 + a]
-                    force[n - 1, a] += share * size * state.jet[0, p, 1 + a]
+                    force[n, a] += (1 - share) * size * state.jet[CURRENT, p, 1 + a]
+                    force[n - 1, a] += share * size * state.jet[CURRENT, p, 1 + a]
             if friction.coefficient > 0.0 and friction.load[p] > 0.0:
-                size = -friction.coefficient * friction.load[p] / slide_of(problem, now, n, p, slide)
+                length, way = slide(problem, CURRENT, n, p)
+                size = -friction.coefficient * friction.load[p] / length
                 for a in range(3):
-                    force[n, a] += (1 - share) * size * slide[a]
-                    force[n - 1, a] += share * size * slide[a]
+                    force[n, a] += (1 - share) * size * way[a]
+                    force[n - 1, a] += share * size * way[a]
     return deepest
 
 
@@ -54,19 +52,19 @@ def profile_at(at: Any, value: Any, s: float) -> float:
     return float(value[n - 1])
 
 
-@kept
-def push_force(problem: Problem, cut: Cut, k: int, report: Any) -> float:
+@cached
+def push_force(problem: Problem, table: WireTable, k: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
     The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
     share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
     """
-    chain, profile, u = problem.chain, cut.profile, problem.state.u
+    chain, profile, u = problem.chain, table.profile, problem.state.u[CURRENT]
     depth = 0.0
     for j in range(k):
         depth += chain.length[j]
-    ahead = problem.state.r[0, 1]
-    force = report[6] * ahead[0, 2] + report[7] * ahead[1, 2] + report[8] * ahead[2, 2]
+    ahead = problem.state.r[CURRENT, 1]
+    force = report.force[0] * ahead[0, 2] + report.force[1] * ahead[1, 2] + report.force[2] * ahead[2, 2]
     inner = depth - 0.5 * chain.length[0]
     flexible = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, inner)
     rest = profile_at(profile.rest_at, profile.rest, inner)
@@ -75,18 +73,18 @@ def push_force(problem: Problem, cut: Cut, k: int, report: Any) -> float:
         if j == 0:
             compliance = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, depth) - compliance
             bend = profile_at(profile.rest_at, profile.rest, depth) - bend
-        moment = chain.bend[j] ** 2 * (u[0, j, 0] ** 2 + u[0, j, 1] ** 2)
+        moment = chain.bend[j] ** 2 * (u[j, 0] ** 2 + u[j, 1] ** 2)
         force -= 0.5 * moment * compliance
         if problem.twisting:
-            force -= 0.25 * (chain.twist[j] * u[0, j, 2]) ** 2 / profile.twist
-        e = turn(0.0, u[0, j, 0], u[0, j, 1], u[0, j, 2])
-        at = 12 + 3 * j
-        force += bend * (report[at] * e[3] + report[at + 1] * e[4] + report[at + 2] * e[5])
+            force -= 0.25 * (chain.twist[j] * u[j, 2]) ** 2 / profile.twist
+        e = turn(0.0, load3(u, j))
+        force += bend * dot(load3(report.turned, j), e[3:6])
     if k > 1:
         # half of node 1's cell lies on the first segment
         for p in range(chain.first[1], chain.first[2]):
             if chain.offset[p, 2] == 0.0:
-                force += 0.25 * problem.stiffness * problem.state.depth[0, p] ** 2 / cut.rule.hull.shape[0]
+                d = problem.state.penetration[CURRENT, p]
+                force += 0.5 * wall_law.energy_per_mm(problem.stiffness, d) / table.rule.hull.shape[0]
     return float(force)
 
 
@@ -121,17 +119,23 @@ def least_turn_cosine(r: Any, k: int) -> float:
 def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
     """Copy one of the states over another."""
     s = problem.state
-    u, x, r, depth, jet = s.u[source], s.x[source], s.r[source], s.depth[source], s.jet[source]
-    to_u, to_x, to_r, to_depth, to_jet = s.u[target], s.x[target], s.r[target], s.depth[target], s.jet[target]
+    u, x, r, penetration, jet = s.u[source], s.x[source], s.r[source], s.penetration[source], s.jet[source]
+    to_u, to_x, to_r, to_jet = s.u[target], s.x[target], s.r[target], s.jet[target]
     for n in range(k + 1):
-        to_x[n, 0], to_x[n, 1], to_x[n, 2] = x[n, 0], x[n, 1], x[n, 2]
-        store9(to_r[n], load9(r[n]))
+        store3(to_x, n, load3(x, n))
+        store9(to_r, n, load9(r, n))
         if n < k:
-            to_u[n, 0], to_u[n, 1], to_u[n, 2] = u[n, 0], u[n, 1], u[n, 2]
-    for a in range(4):
-        s.parts[target, a] = s.parts[source, a]
+            store3(to_u, n, load3(u, n))
+    s.energies[target] = s.energies[source]
     for p in range(problem.chain.first[k + 1]):
-        to_depth[p] = depth[p]
-        if depth[p] != 0.0:
+        s.penetration[target, p] = penetration[p]
+        if penetration[p] != 0.0:
             for a in range(10):
                 to_jet[p, a] = jet[p, a]
+
+
+@merged
+def forget_forces(report: Any) -> None:
+    """Report that there is no gradient, as without a force or a bend."""
+    for a in range(3):
+        report.force[a] = report.torque[a] = report.turned[0, a] = report.turned[1, a] = 0.0

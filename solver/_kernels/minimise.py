@@ -6,122 +6,48 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels import closed_form, newton_method
+from solver._kernels.data import CONVERGED, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of
-from solver._kernels.flags import kept
-from solver._kernels.judge import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
-from solver._kernels.moves import ease, finish, leave_saddle, polish, rest_shape, search, still, venture
-from solver._kernels.newton import costate, sweep
-from solver._kernels.problem import IDLE, LEVENBERG, RESTED, RUBBING, START, STILL, SWEEPS, WALL, Problem
+from solver._kernels.flags import cached, merged
+from solver._kernels.forces import forget_forces
+from solver._kernels.newton import costate
 
-# how a relaxation ends
-CONVERGED, EXHAUSTED, STALLED, BROKEN = range(4)
-
-REST = 0.5 * tol.REST_ANGLE**2
-FIRST_DAMPING = tol.FIRST_DAMPING
-LEAST_DAMPING = tol.LEAST_DAMPING
-WORST_DAMPING = tol.WORST_DAMPING
-SOFTER = tol.SOFTER
-SEARCHES = tol.SEARCHES
-FINE = tol.FINE
-RISE = tol.RISE
-FORETOLD = tol.FORETOLD
+METHODS = ("newton", "closed_form")
+NEWTON, CLOSED_FORM = range(2)
+"""``Limits.method`` of each."""
 
 
-@kept
-def minimise(
-    problem: Problem, which: int, k: int, tolerance: float, max_iterations: int, report: Any
-) -> tuple[int, int, int, float]:
-    """Relax state ``which``, whose energy is known, with Newton's method.
+@cached
+def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -> tuple[int, int, int, float]:
+    """Relax the state in a slot, whose energy is known; the report is that of the result.
 
-    Returns (outcome, iterations, which of the two states holds the result, energy); report as in ``sweep`` and
-    ``costate``, at the result.
+    Returns how it ended (see ``data.OUTCOMES``), the iterations, the slot of the result and its energy, N mm.
     """
-    damping, last, patience, settled = 0.0, FIRST_DAMPING, 0, 0
-    state, counter = problem.state, problem.scratch.counter
-    energy = energy_of(state.parts[which])
-    report[START] = energy
-    if problem.switch.idle and state.parts[which, WALL] == 0.0 and unloaded(problem.chain, k):
-        resting = state.parts[which, RUBBING] == 0.0 and energy <= REST * stiffest(problem.chain, k)
-        if resting or rest_shape(problem, which, k):
-            counter[IDLE] += 1
-            # without a force or a bend there is no gradient
-            for i in range(START):
-                report[i] = 0.0
-            return CONVERGED, 0, which if resting else 1 - which, 0.0
-    near = 0 * k
-    for iteration in range(max_iterations):
-        if not math.isfinite(energy):
-            return BROKEN, iteration, which, energy
-        definite = sweep(problem, which, near, k, damping, report)
-        counter[SWEEPS] += 1
-        counter[STILL] += near
-        scale = scale_of(problem, which, k)
-        noise = noise_of(problem, which, scale)
-        if near > 0 and not definite:
-            near = 0
-            continue
-        if damping == 0.0 and definite and report[0] <= max(tolerance * scale, noise):
-            before = energy
-            which, energy = finish(problem, which, near, k, energy, report)
-            if iteration == 0 and not problem.switch.rest:
-                continue
-            if at_rest(problem, which, k, report):
-                counter[RESTED] += iteration == 0
-                return CONVERGED, iteration, which, energy
-            if near > 0:
-                # the whole gradient says what its part did not
-                near = 0
-                continue
-            if report[0] <= noise:
-                which, energy = polish(problem, which, k, energy, noise, report)
-                flat = report[1] <= rounding_moment(problem, which, k)
-                ended = CONVERGED if flat or at_rest(problem, which, k, report) else STALLED
-                return ended, iteration, which, energy
-            if energy < before:
-                continue
-            # the full step does not help, as where a contact opens and closes again: search as usual
-        if damping > 0.0 and definite and report[0] <= noise and settled < SEARCHES:
-            # nothing left to gain with the wire held back: look at it free, then held less, before it is judged
-            which, energy = ease(problem, which, k, energy, noise, report)
-            damping, patience, settled, last = 0.0, 0, settled + 1, SOFTER * last
-            continue
-        trial = math.inf
-        if definite:
-            trial = search(problem, which, near, k, 1.0, energy, report[0], noise)
-            if trial == math.inf:
-                if damping == 0.0 and near == 0 and report[0] <= FINE * scale:
-                    there, trial = venture(problem, which, k, energy, report[0], RISE * scale, report)
-                    if trial < math.inf:
-                        which, energy = there, trial
-                        continue
-                trial = search(problem, which, near, k, 0.4, energy, report[0], noise)
-        elif damping == 0.0:
-            costate(problem, which, k, report)
-            if at_rest(problem, which, k, report):
-                trial = leave_saddle(problem, which, k, energy, noise, report)
-                if trial == math.inf:
-                    # the way down is shorter than rounding can tell
-                    return CONVERGED, iteration, which, energy
-        if trial <= energy:
-            missed = energy - trial - report[0]
-            foretold = FORETOLD * missed * missed <= tolerance * scale_of(problem, which, k) * report[0]
-            which, energy = 1 - which, trial
-            if foretold and definite and damping == 0.0:
-                costate(problem, which, k, report)
-                if at_rest(problem, which, k, report):
-                    return CONVERGED, iteration + 1, which, energy
-            near = still(problem, which, k) if problem.switch.window and definite and damping == 0.0 else 0
-            last, patience = damping if damping > 0.0 else LEAST_DAMPING, patience - 1
-            if patience <= 0:
-                damping = 0.2 * damping if damping > LEAST_DAMPING else 0.0
-        elif near > 0:
-            near = 0
+    now = problem.scratch.descent[0]
+    begin(now, slot, energy_of(problem, slot))
+    report.start = now.energy
+    if limits.method == NEWTON and newton_method.rests(problem, k, now):
+        forget_forces(report)
+        return CONVERGED, 0, now.slot, now.energy
+    for iteration in range(limits.max_iterations):
+        now.iterations = iteration
+        if not math.isfinite(now.energy):
+            return NON_FINITE, iteration, now.slot, now.energy
+        if limits.method == NEWTON:
+            outcome = newton_method.iterate(problem, k, now, limits.tolerance, report)
         else:
-            counter[LEVENBERG] += 1
-            patience = 2
-            damping = 0.5 * last if damping == 0.0 else 6 * damping
-            if damping > WORST_DAMPING:
-                costate(problem, which, k, report)
-                return STALLED, iteration, which, energy
-    costate(problem, which, k, report)
-    return EXHAUSTED, max_iterations, which, energy
+            outcome = closed_form.iterate(problem, k, now, limits.tolerance, report)
+        if outcome != UNFINISHED:
+            return outcome, now.iterations, now.slot, now.energy
+    costate(problem, now.slot, k, report)
+    return MAX_ITERATIONS, limits.max_iterations, now.slot, now.energy
+
+
+@merged
+def begin(now: Any, slot: int, energy: float) -> None:
+    """Fill the record that the iterations hand on."""
+    now.slot, now.energy, now.iterations = slot, energy, 0
+    now.first_free, now.patience, now.released = 0, 0, 0
+    now.damping, now.last_damping = 0.0, tol.FIRST_DAMPING
+    now.share, now.next_check, now.checked_energy = 1.0, tol.FIRST_CHECK, math.inf

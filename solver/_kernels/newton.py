@@ -2,8 +2,9 @@
 
 The chain is a discrete optimal-control problem: state (x_j, R_j), control u_j, dynamics
     R_{j+1} = R_j B_j exp(û_j),    x_{j+1} = x_j + l_j R_{j+1} e3.
-The value function is expanded to second order in (δp, δr), both in the frame of the node, R -> R exp(δr̂).
-Crossing a segment in its own frame, δp' = δp + A δr with A = l [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], so that
+The value function is expanded to second order in (δp, δr), both in the frame of the node, R -> R exp(δr̂): V_pp (p),
+V_pr (c), V_rr (h), V_p (f) and V_r (g). Crossing a segment in its own frame, δp' = δp + A δr with
+A = l [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], so that
     g = v_r + Aᵀ f,   C = V_pr + V_pp A,   H = V_rr + Aᵀ V_pr + (Aᵀ C)ᵀ + l [½ (f e3ᵀ + e3 fᵀ) - f_3 I]
 with f = v_p; the last term is tension and compression: buckling lives there. Crossing a joint,
     Q_u = Jᵀ g + c u,   Q_uu = Jᵀ H J + c I + g·∂J/∂u,   Q_ur = Jᵀ (H + ½ [g]x),   Q_up = Jᵀ Cᵀ.
@@ -15,19 +16,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.flags import inlined, kernel
-from solver._kernels.joint import (
-    jacobian,
-    joint_hessian,
-    least_curvature,
-    note_direction,
-    solve_block,
-    store_gain,
-)
-from solver._kernels.node import node_gradient, node_hessian
-from solver._kernels.problem import STRAIGHT, Problem
-from solver._kernels.rotation import turn
-from solver._kernels.small import (
+from solver._kernels.algebra import (
     ZERO3,
     ZERO6,
     ZERO9,
@@ -45,18 +34,45 @@ from solver._kernels.small import (
     gram,
     load3,
     load9,
+    store3,
     times,
     times_transposed,
     transpose,
 )
-from solver._kernels.straight import sweep_straight
+from solver._kernels.data import Problem
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.joint import (
+    Gains,
+    joint_hessian,
+    least_curvature,
+    note_direction,
+    solve_block,
+    stiffened,
+    store_gains,
+)
+from solver._kernels.newton_straight import sweep_straight
+from solver._kernels.node import node_gradient, node_hessian
+from solver._kernels.rotation import jacobian, turn
 
-CURVATURE_FLOOR = tol.CURVATURE_FLOOR
+Value = tuple[Six, Nine, Six, Three, Three]
+"""The value function at a node: p, c, h, f, g."""
 
 
 @inlined
-def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) -> tuple[Nine, Six, Three]:
-    """Carry V from the far end of a segment to its near end, at the same frame."""
+def add_node(
+    value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float
+) -> Value:
+    """Add what acts on a node and its segment, see ``node``, and Levenberg's term ``held`` on its position."""
+    p, c, h, f, g = value
+    p = add6(p, hessian[0])
+    p = (p[0] + held, p[1] + held, p[2] + held, p[3], p[4], p[5])
+    return p, add9(c, hessian[1]), add6(h, hessian[2]), add3(f, gradient[0]), add3(g, gradient[1])
+
+
+@inlined
+def cross_segment(length: float, value: Value) -> Value:
+    """Carry the value function from the far end of a segment to its near end, at the same frame."""
+    p, c, h, f, g = value
     # C = V_pr + V_pp A: A moves columns, (M A)[:, 0] = -l M[:, 1], (M A)[:, 1] = l M[:, 0]
     n = (
         c[0] - length * p[3],
@@ -78,49 +94,54 @@ def cross_segment(length: float, p: Six, c: Nine, h: Six, f: Three, g: Three) ->
         h[4] - length * c[5] + 0.5 * length * f[0],
         h[5] + length * c[2] + 0.5 * length * f[1],
     )
-    return n, rr, (g[0] - length * f[1], g[1] + length * f[0], g[2])
+    return p, n, rr, f, (g[0] - length * f[1], g[1] + length * f[0], g[2])
+
+
+@inlined
+def cross_joint(e: Nine, value: Value, q_up: Nine, q_ur: Nine, gains: Gains) -> Value:
+    """Carry the value function over a joint, which takes its best step."""
+    p, c, h, f, g = value
+    feed, gain_p, gain_r = gains
+    p, h = conjugate(e, add6(p, gram(q_up, gain_p))), conjugate(e, add6(h, gram(q_ur, gain_r)))
+    c = times_transposed(times(e, add9(c, times(transpose(q_up), gain_r))), e)
+    f = apply(e, add3(f, apply_transposed(q_up, feed)))
+    return p, c, h, f, apply(e, add3(g, apply_transposed(q_ur, feed)))
 
 
 @kernel
-def sweep(problem: Problem, which: int, near: int, k: int, damping: float, report: Any) -> bool:
-    """One backward Riccati recursion from the tip to joint ``near`` (0 is the base); gains go to scratch.gain.
+def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, report: Any) -> bool:
+    """One backward Riccati recursion from the tip to joint ``first_free``: fills the gains and report.decrement.
 
-    damping holds every node back with that share of its joint's stiffness (Levenberg's term, on positions: it
-    leaves the coupling between joints alone, as a viscous bath would) and leaves the wall's negative curvature out.
-    Returns False and stops at the first block that is not positive (semi-)definite.
-    report: [0] Newton decrement (predicted fall of the energy), [2] joint of that block or -1, [3:5] and
-    [19] its direction of negative curvature (bending, twist), [5] that curvature.
+    damping : Levenberg's term, a share of each joint's stiffness that holds its node in place; the coupling between
+    joints stays, as in a viscous bath, and the wall's negative curvature is left out.
+    Returns False and stops at the first block that is not positive (semi-)definite, which the report then describes.
     """
     if problem.straight:
-        problem.scratch.counter[STRAIGHT] += 1
-        return sweep_straight(problem, which, near, k, damping, report)
+        problem.scratch.counters[0].sweeps_without_roll += 1
+        return sweep_straight(problem, slot, first_free, k, damping, report)
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
-    p, c, h, f, g = ZERO6, ZERO9, ZERO6, ZERO3, ZERO3
+    value = (ZERO6, ZERO9, ZERO6, ZERO3, ZERO3)
     decrement = 0.0
-    report[2] = -1.0
-    for n in range(k, near, -1):
+    for n in range(k, first_free, -1):
         j = n - 1
-        frame = load9(state.r[which, n])
-        df, dg = node_gradient(problem, which, n, frame)
-        dp, dc, dh = node_hessian(problem, which, n, frame, damping > 0.0)
-        p, c, h, f, g = add6(p, dp), add9(c, dc), add6(h, dh), add3(f, df), add3(g, dg)
+        frame = load9(state.r[slot], n)
+        df, dg = node_gradient(problem, slot, n, frame)
+        dp, dc, dh = node_hessian(problem, slot, n, frame, damping > 0.0)
         held = damping * bend[j] / (length[j] * length[j])
-        p = (p[0] + held, p[1] + held, p[2] + held, p[3], p[4], p[5])
-        c, h, g = cross_segment(length[j], p, c, h, f, g)
-        u = load3(state.u[which, j])
-        jac = jacobian(u[0], u[1], u[2])
+        value = cross_segment(length[j], add_node(value, (df, dg), (dp, dc, dh), held))
+        _, c, h, _, g = value
+        u = load3(state.u[slot], j)
+        jac = jacobian(u)
         if not twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
-        q_uu = joint_hessian(chain, j, u, jac, h, g, twisting, 0.01 * damping)
-        floor, least = CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
-        # written so that NaN, from an overflow in a long compressed chain, fails too
+        q_uu = joint_hessian(chain, j, u, jac, (h, g), twisting, 0.01 * damping)
+        floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
         if not least > -floor:
             note_direction(q_uu, j, least, report)
             return False
         if least < floor:
-            # neutral, e.g. turning a buckled wire about its axis: no force there, so any stiffness will do
-            q_uu = (q_uu[0] + 2 * floor, q_uu[1] + 2 * floor, q_uu[2], q_uu[3], q_uu[4], q_uu[5])
+            q_uu = stiffened(q_uu, 2 * floor)
         inverse = solve_block(q_uu, twisting)
         twist = chain.twist[j] * u[2] if twisting else 0.0
         q_u = add3(apply_transposed(jac, g), (bend[j] * u[0], bend[j] * u[1], twist))
@@ -128,43 +149,37 @@ def sweep(problem: Problem, which: int, near: int, k: int, damping: float, repor
         q_up = times_transposed(jac_t, c)
         q_ur = times(jac_t, add9(full(h), cross_matrix((0.5 * g[0], 0.5 * g[1], 0.5 * g[2]))))
         feed, gain_p, gain_r = apply(inverse, q_u), times(inverse, q_up), times(inverse, q_ur)
-        store_gain(gain, j, feed, gain_p, gain_r)
+        store_gains(gain, j, (feed, gain_p, gain_r))
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
-        e = turn(rest[j], u[0], u[1], u[2])
-        p, h = conjugate(e, add6(p, gram(q_up, gain_p))), conjugate(e, add6(h, gram(q_ur, gain_r)))
-        c = times_transposed(times(e, add9(c, times(transpose(q_up), gain_r))), e)
-        f = apply(e, add3(f, apply_transposed(q_up, feed)))
-        g = apply(e, add3(g, apply_transposed(q_ur, feed)))
-    report[0] = decrement
+        value = cross_joint(turn(rest[j], u), value, q_up, q_ur, (feed, gain_p, gain_r))
+    report.decrement = decrement
     return math.isfinite(decrement)
 
 
 @kernel
-def costate(problem: Problem, which: int, k: int, report: Any) -> None:
+def costate(problem: Problem, slot: int, k: int, report: Any) -> None:
     """Exact gradient of the total energy: the first-order part of ``sweep``, without elimination.
 
-    report: [1] largest component with respect to a joint, N mm, [6:9] with respect to the entry point, N,
-    [9:12] to turning the base frame, N mm, [12:15], [15:18] to turning segments 0 and 1, in their own frames.
+    Fills moment, force, torque and turned of the report.
     """
-    chain, state = problem.chain, problem.state
+    chain, controls, frames = problem.chain, problem.state.u[slot], problem.state.r[slot]
     f, g = ZERO3, ZERO3
     largest = 0.0
     for n in range(k, 0, -1):
         j = n - 1
-        df, dg = node_gradient(problem, which, n, load9(state.r[which, n]))
+        df, dg = node_gradient(problem, slot, n, load9(frames, n))
         f, g = add3(f, df), add3(g, dg)
         length = chain.length[j]
         g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
-        u = load3(state.u[which, j])
-        moment = apply_transposed(jacobian(u[0], u[1], u[2]), g)
+        u = load3(controls, j)
+        moment = apply_transposed(jacobian(u), g)
         largest = max(largest, abs(moment[0] + chain.bend[j] * u[0]), abs(moment[1] + chain.bend[j] * u[1]))
         if problem.twisting:
             largest = max(largest, abs(moment[2] + chain.twist[j] * u[2]))
         if j < 2:
-            at = 12 + 3 * j
-            report[at], report[at + 1], report[at + 2] = g
-        e = turn(chain.rest[j], u[0], u[1], u[2])
+            store3(report.turned, j, g)
+        e = turn(chain.rest[j], u)
         f, g = apply(e, f), apply(e, g)
-    report[1] = largest
-    report[6], report[7], report[8] = apply(load9(state.r[which, 0]), f)
-    report[9], report[10], report[11] = g
+    report.moment = largest
+    report.force[0], report.force[1], report.force[2] = apply(load9(frames, 0), f)
+    report.torque[0], report.torque[1], report.torque[2] = g

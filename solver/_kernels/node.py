@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver._kernels.energy import slide_of
-from solver._kernels.flags import inlined
-from solver._kernels.problem import Problem
-from solver._kernels.small import (
+from solver._kernels import wall_law
+from solver._kernels.algebra import (
     ZERO3,
     ZERO6,
     ZERO9,
@@ -23,38 +21,35 @@ from solver._kernels.small import (
     conjugate,
     cross,
     cross_matrix,
+    dyad,
     full,
     load3,
+    outer,
+    scaled,
     times,
     transpose,
 )
+from solver._kernels.data import Problem
+from solver._kernels.flags import inlined
+from solver._kernels.friction import friction_derivatives
 
 
 @inlined
-def point_force(frame: Nine, jet: Any, force: float) -> Three:
-    """The wall's energy gradient at a point in contact, in the frame of its node; force = k w d."""
-    n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
-    return force * n[0], force * n[1], force * n[2]
+def normal_at(frame: Nine, jet: Any) -> Three:
+    """Gradient of the distance at a point, in the frame of its node."""
+    return apply_transposed(frame, (jet[1], jet[2], jet[3]))
 
 
 @inlined
-def point_stiffness(frame: Nine, jet: Any, force: float, curvature: float, project: bool) -> Six:
-    """The wall's energy Hessian at a point in contact, k w (∇φ ∇φᵀ + d ∇²φ), in the frame of its node.
+def wall_hessian(frame: Nine, jet: Any, n: Three, law: tuple[float, float], project: bool) -> Six:
+    """Hessian of the wall's energy at a point in contact, U'' ∇φ ∇φᵀ + U' ∇²φ; law holds U' and U''.
 
     ``project`` leaves out the directions in which ∇²φ is negative: a wire pressed on a convex wall.
     """
-    n = apply_transposed(frame, (jet[1], jet[2], jet[3]))
-    own = (
-        curvature * n[0] * n[0],
-        curvature * n[1] * n[1],
-        curvature * n[2] * n[2],
-        curvature * n[0] * n[1],
-        curvature * n[0] * n[2],
-        curvature * n[1] * n[2],
-    )
-    bend = (force * jet[4], force * jet[5], force * jet[6], force * jet[7], force * jet[8], force * jet[9])
+    f = law[0]
+    bend = (f * jet[4], f * jet[5], f * jet[6], f * jet[7], f * jet[8], f * jet[9])
     bend = conjugate(transpose(frame), bend)
-    return add6(own, without_negative(bend, n) if project else bend)
+    return add6(dyad(law[1], n), without_negative(bend, n) if project else bend)
 
 
 @inlined
@@ -81,28 +76,20 @@ def without_negative(m: Six, n: Three) -> Six:
     one, two = max(mean + radius, 0.0), max(mean - radius, 0.0)
     v = (c * s[0] + d * t[0], c * s[1] + d * t[1], c * s[2] + d * t[2])
     w = (c * t[0] - d * s[0], c * t[1] - d * s[1], c * t[2] - d * s[2])
-    return (
-        one * v[0] * v[0] + two * w[0] * w[0],
-        one * v[1] * v[1] + two * w[1] * w[1],
-        one * v[2] * v[2] + two * w[2] * w[2],
-        one * v[0] * v[1] + two * w[0] * w[1],
-        one * v[0] * v[2] + two * w[0] * w[2],
-        one * v[1] * v[2] + two * w[1] * w[2],
-    )
+    return outer(scaled(one, v), v, scaled(two, w), w)
 
 
 @inlined
-def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six]:
-    """What a point off its node adds to V_pr and V_rr: its place moves by δr x offset, and curves."""
-    d = cross_matrix((-offset[0], -offset[1], -offset[2]))
+def lever(o: Three, f: Three, stiffness: Six) -> tuple[Nine, Six]:
+    """What a force at offset o from the node adds to V_pr and V_rr: its place moves by δr x o, and curves."""
+    d = cross_matrix((-o[0], -o[1], -o[2]))
     c = times(full(stiffness), d)
     h = times(transpose(d), c)
-    f, o = force, offset
-    dot = f[0] * o[0] + f[1] * o[1] + f[2] * o[2]
+    along = f[0] * o[0] + f[1] * o[1] + f[2] * o[2]
     rr = (
-        h[0] + f[0] * o[0] - dot,
-        h[4] + f[1] * o[1] - dot,
-        h[8] + f[2] * o[2] - dot,
+        h[0] + f[0] * o[0] - along,
+        h[4] + f[1] * o[1] - along,
+        h[8] + f[2] * o[2] - along,
         h[1] + 0.5 * (f[0] * o[1] + f[1] * o[0]),
         h[2] + 0.5 * (f[0] * o[2] + f[2] * o[0]),
         h[5] + 0.5 * (f[1] * o[2] + f[2] * o[1]),
@@ -111,64 +98,45 @@ def lever(offset: Three, force: Three, stiffness: Six) -> tuple[Nine, Six]:
 
 
 @inlined
-def node_gradient(problem: Problem, which: int, n: int, frame: Nine) -> tuple[Three, Three]:
+def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Three, Three]:
     """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
     chain, state = problem.chain, problem.state
-    load = apply_transposed(frame, load3(chain.load[n]))
+    load = apply_transposed(frame, load3(chain.load, n))
     f, g = (-load[0], -load[1], -load[2]), ZERO3
-    for i in range(chain.first[n], chain.first[n + 1]):
-        d = state.depth[which, i]
+    for p in range(chain.first[n], chain.first[n + 1]):
+        d = state.penetration[slot, p]
         if d != 0.0:
-            force = point_force(frame, state.jet[which, i], problem.stiffness * chain.weight[i] * d)
-            f, g = add3(f, force), add3(g, cross(load3(chain.offset[i]), force))
-        if problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0:
-            force, _ = rubbing(problem, which, n, i, frame)
-            f, g = add3(f, force), add3(g, cross(load3(chain.offset[i]), force))
+            size = wall_law.force(problem.stiffness, chain.weight[p], d)
+            force = scaled(size, normal_at(frame, state.jet[slot, p]))
+            f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
+        if problem.friction.coefficient > 0.0 and problem.friction.load[p] > 0.0:
+            force, _ = friction_derivatives(problem, slot, n, p, frame)
+            f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
     return f, g
 
 
 @inlined
-def node_hessian(problem: Problem, which: int, n: int, frame: Nine, project: bool) -> tuple[Six, Nine, Six]:
+def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool) -> tuple[Six, Nine, Six]:
     """Hessian of the same: V_pp, V_pr and V_rr."""
-    chain, state = problem.chain, problem.state
+    chain, state, stiffness = problem.chain, problem.state, problem.stiffness
     p, c, h = ZERO6, ZERO9, ZERO6
     for i in range(chain.first[n], chain.first[n + 1]):
-        d = state.depth[which, i]
-        rubs = problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0
-        if d == 0.0 and not rubs:
+        d = state.penetration[slot, i]
+        rubbing = problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0
+        if d == 0.0 and not rubbing:
             continue
         force, hessian = ZERO3, ZERO6
         if d != 0.0:
-            curvature = problem.stiffness * chain.weight[i]
-            jet = state.jet[which, i]
-            force = point_force(frame, jet, curvature * d)
-            hessian = point_stiffness(frame, jet, curvature * d, curvature, project)
-        if rubs:
-            more, stiffer = rubbing(problem, which, n, i, frame)
+            jet, weight = state.jet[slot, i], chain.weight[i]
+            law = wall_law.force(stiffness, weight, d), wall_law.curvature(stiffness, weight, d)
+            normal = normal_at(frame, jet)
+            force, hessian = scaled(law[0], normal), wall_hessian(frame, jet, normal, law, project)
+        if rubbing:
+            more, stiffer = friction_derivatives(problem, slot, n, i, frame)
             force, hessian = add3(force, more), add6(hessian, stiffer)
         p = add6(p, hessian)
-        offset = load3(chain.offset[i])
+        offset = load3(chain.offset, i)
         if offset != ZERO3:
             dc, dh = lever(offset, force, hessian)
             c, h = add9(c, dc), add6(h, dh)
     return p, c, h
-
-
-@inlined
-def rubbing(problem: Problem, which: int, n: int, i: int, frame: Nine) -> tuple[Three, Six]:
-    """Gradient and Hessian of a point's friction, in the frame of its node."""
-    way = problem.scratch.slide
-    size = slide_of(problem, which, n, i, way)
-    s = apply_transposed(frame, load3(way))
-    m = apply_transposed(frame, load3(problem.friction.normal[i]))
-    w = problem.friction.coefficient * problem.friction.load[i] / size
-    q = w / (size * size)
-    hessian = (
-        w * (1 - m[0] * m[0]) - q * s[0] * s[0],
-        w * (1 - m[1] * m[1]) - q * s[1] * s[1],
-        w * (1 - m[2] * m[2]) - q * s[2] * s[2],
-        -w * m[0] * m[1] - q * s[0] * s[1],
-        -w * m[0] * m[2] - q * s[0] * s[2],
-        -w * m[1] * m[2] - q * s[1] * s[2],
-    )
-    return (w * s[0], w * s[1], w * s[2]), hessian

@@ -15,6 +15,11 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 
+def hooke(d: Array) -> Array:
+    """Energy of a mm of wire that is d mm beyond the lumen, over the wall's stiffness (eq. 6 and 7)."""
+    return np.asarray(0.5 * d**2)
+
+
 def joints_of(controls: Array, rest: Array, length: Array, base: Array, entry: ArrayLike) -> Array:
     """Joints (k + 1, 3): at each joint first the rest bend about axis 2, then the control as a rotation vector."""
     frame, x = Rotation.from_matrix(base), [np.asarray(entry, dtype=float)]
@@ -36,6 +41,7 @@ def energy(
     stiffness: float,
     radius: float,
     load: Array,
+    law: Callable[[Array], Array] = hooke,
 ) -> float:
     """Eq. 1-7 with half a weight at the tip, N mm."""
     x = joints_of(controls, rest, length, base, entry)
@@ -44,7 +50,7 @@ def energy(
     if wall is not None:
         weight = 0.5 * (length + np.append(length[1:], 0.0))
         depth = np.maximum(wall(x[1:]) + radius, 0.0)
-        total += 0.5 * stiffness * float(np.sum(weight * depth**2))
+        total += stiffness * float(np.sum(weight * law(depth)))
     return total - float(np.sum(load * x))
 
 

@@ -11,28 +11,37 @@ import pytest
 from numpy.typing import NDArray
 
 from solver import Grid, GuideWire, Status, VesselWall
-from solver.chain import Buffers, base_frame
-from solver.relax import Settings, buffers_for, relax_buffers, set_loads
-from tests.solver.doors import aim, costate, gradients, jacobian_terms, place, sine_terms, sweep, total_energy
+from solver.introducer import base_frame
+from solver.relax import Settings
+from solver.workspace import Workspace
+from tests.solver.entry_points import (
+    aim,
+    costate,
+    gradients,
+    jacobian_terms,
+    place,
+    sine_terms,
+    sweep,
+    total_energy,
+)
 from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
 
 Array = NDArray[np.float64]
 
 
-def buffers(wire: GuideWire, wall: VesselWall | None, depth: float, quadrature: str = "tip") -> Buffers:
-    b = buffers_for(wire, wall, Settings(quadrature=quadrature))
+def workspace(wire: GuideWire, wall: VesselWall | None, depth: float, quadrature: str = "tip") -> Workspace:
+    b = Workspace(wire, wall, quadrature, Settings().limits)
     b.lay_out(depth)
-    b.state.r[:, 0] = base_frame(np.array([0.0, 0.0, 1.0]), None, 30.0)
+    b.clamp(np.zeros(3), base_frame(np.array([0.0, 0.0, 1.0]), None, 30.0))
     return b
 
 
-def energy_of(b: Buffers, controls: Array) -> float:
-    b.state.u[0, : b.k] = controls
-    place(b.chain, b.state, 0, b.k)
+def energy_of(b: Workspace, controls: Array) -> float:
+    b.problem.state.u[0, : b.k] = controls
+    place(b.problem.chain, b.problem.state, 0, b.k)
     return float(total_energy(b.problem, 0, b.k))
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("q", [1e-12, 1e-3, 0.2, 0.2499999, 0.25, 0.3, 4.0])
 def test_rotation_series_meets_its_closed_form(q: float) -> None:
     exact = Fraction(q)
@@ -99,39 +108,39 @@ WIRES = {
 @pytest.mark.parametrize("quadrature", ["tip", "joints", "segments"])
 @pytest.mark.parametrize("name", WIRES)
 def test_gradient_at_the_base_is_the_derivative_of_the_energy(name: str, quadrature: str, hull: str) -> None:
-    b = buffers(WIRES[name], VesselWall(bend_grid(0.5), 0.05, hull=hull), 40.0, quadrature)
+    b = workspace(WIRES[name], VesselWall(bend_grid(0.5), 0.05, hull=hull), 40.0, quadrature)
     components = 3 if b.problem.twisting else 2
     rng = np.random.default_rng(0)
     controls = np.zeros((b.k, 3))
     controls[:, :components] = 0.05 * rng.normal(size=(b.k, components))
     energy_of(b, controls)
-    costate(b.problem, 0, b.k, b.report)
-    force, moment, step = b.report[6:9].copy(), b.report[9:12].copy(), 1e-6
-    frame = b.state.r[0, 0].copy()
+    costate(b.problem, 0, b.k, b.report[0])
+    force, moment, step = b.report[0].force.copy(), b.report[0].torque.copy(), 1e-6
+    frame = b.problem.state.r[0, 0].copy()
     for a in range(3):
         ends = []
         for side in (step, -step):
-            b.state.x[0, 0, a] += side
+            b.problem.state.x[0, 0, a] += side
             ends.append(energy_of(b, controls))
-            b.state.x[0, 0, a] -= side
+            b.problem.state.x[0, 0, a] -= side
         assert force[a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6)
         ends = []
         for side in (step, -step):
             axis = np.zeros(3)
             axis[a] = side
             skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-            b.state.r[0, 0] = frame @ (np.eye(3) + skew + skew @ skew / 2)
+            b.problem.state.r[0, 0] = frame @ (np.eye(3) + skew + skew @ skew / 2)
             ends.append(energy_of(b, controls))
-        b.state.r[0, 0] = frame
+        b.problem.state.r[0, 0] = frame
         assert moment[a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
 
 
 @pytest.mark.parametrize("name", WIRES)
 def test_newton_decrement_is_that_of_the_dense_hessian(name: str) -> None:
     """Near a minimum the recursion must predict what a dense Hessian, by differences, predicts."""
-    b = buffers(WIRES[name], VesselWall(tube_grid(0.5), 0.05), 24.0)
+    b = workspace(WIRES[name], VesselWall(tube_grid(0.5), 0.05), 24.0)
     components = 3 if b.problem.twisting else 2
-    set_loads(b, [2e-3, 1e-3, -2e-3])
+    b.load([2e-3, 1e-3, -2e-3])
     n = components * b.k
     rng = np.random.default_rng(0)
 
@@ -139,13 +148,15 @@ def test_newton_decrement_is_that_of_the_dense_hessian(name: str) -> None:
         return np.column_stack([v.reshape(b.k, components), np.zeros((b.k, 3 - components))])
 
     energy_of(b, np.zeros((b.k, 3)))
-    status, _, _ = relax_buffers(b, Settings())
+    status, _ = b.advance(24.0, 0.0, b.k)
     assert status is Status.CONVERGED
-    v = b.state.u[0, : b.k, :components].ravel() + 1e-5 * rng.normal(size=n)
+    v = b.problem.state.u[0, : b.k, :components].ravel() + 1e-5 * rng.normal(size=n)
     gradient, hessian = dense(lambda w: energy_of(b, padded(w)), v)
     energy_of(b, padded(v))
-    assert sweep(b.problem, 0, b.k, 0.0, b.report)
-    assert b.report[0] == pytest.approx(0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3)
+    assert sweep(b.problem, 0, b.k, 0.0, b.report[0])
+    assert b.report[0].decrement == pytest.approx(
+        0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3
+    )
 
 
 def dense(function: object, v: Array, step: float = 1e-4) -> tuple[Array, Array]:
@@ -166,7 +177,7 @@ def dense(function: object, v: Array, step: float = 1e-4) -> tuple[Array, Array]
 @pytest.mark.parametrize("hull", ["offset", "samples:5"])
 def test_closed_form_turns_against_the_exact_gradient(hull: str) -> None:
     """The numerator of eq. 10, corrected: turning one segment alone, roll handed on to every bend behind it."""
-    b = buffers(WIRES["curved tip"], VesselWall(bend_grid(0.5), 1.0, hull=hull), 50.0)
+    b = workspace(WIRES["curved tip"], VesselWall(bend_grid(0.5), 1.0, hull=hull), 50.0)
     rng = np.random.default_rng(0)
     controls = np.zeros((b.k, 3))
     controls[:, :2] = 0.05 * rng.normal(size=(b.k, 2))
@@ -180,15 +191,15 @@ def test_closed_form_turns_against_the_exact_gradient(hull: str) -> None:
             assert slope[i, a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
 
 
-def turned(b: Buffers, segment: int, axis: int, angle: float) -> float:
+def turned(b: Workspace, segment: int, axis: int, angle: float) -> float:
     """Energy with one segment turned about its own axis 1 or 2, the others keeping their directions."""
-    s = b.state
+    s = b.problem.state
     s.x[1, 0], s.r[1, 0] = s.x[0, 0], s.r[0, 0]
     for j in range(b.k):
         along = s.r[0, j + 1, :, 2].copy()
         if j == segment:
             along += angle * (s.r[0, j + 1, :, 0] if axis == 1 else -s.r[0, j + 1, :, 1])
-        s.x[1, j + 1] = s.x[1, j] + b.chain.length[j] * along
+        s.x[1, j + 1] = s.x[1, j] + b.problem.chain.length[j] * along
         s.u[1, j, 2] = 0.0
-        aim(b.chain, s.u[1], s.x[1], s.r[1], j)
+        aim(b.problem.chain, s.u[1], s.x[1], s.r[1], j)
     return float(total_energy(b.problem, 1, b.k))

@@ -11,7 +11,6 @@ from tests.solver.scenes import sampled, tube_distance, tube_grid
 WIRE = GuideWire(1.0, 0.18, 10.0)
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_grid_must_be_finite(bad: float) -> None:
     values = np.zeros((4, 5, 6))
@@ -22,7 +21,6 @@ def test_grid_must_be_finite(bad: float) -> None:
         VesselWall(Grid(values), 1.0)
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
@@ -43,7 +41,6 @@ def test_wire_refuses_in_five_parts(arguments: dict[str, object], word: str) -> 
         GuideWire(**(good | arguments))  # type: ignore[arg-type]
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize(
     "arguments", [{"stiffness_N_mm2": -1.0}, {"friction": -0.1}, {"hull": "samples:0"}, {"hull": "x"}]
 )
@@ -52,7 +49,6 @@ def test_wall_refuses_in_five_parts(arguments: dict[str, object]) -> None:
         VesselWall(Grid(np.zeros((4, 4, 4))), **({"stiffness_N_mm2": 1.0} | arguments))  # type: ignore[arg-type]
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize(
     "arguments",
     [

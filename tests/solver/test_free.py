@@ -32,7 +32,6 @@ def test_analytic_elastica_has_its_published_values(alpha: float, x: float, y: f
     np.testing.assert_allclose(elastica_tip(alpha), (x, y), atol=1e-8)
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("n", [1, 2, 5, 16])
 def test_hencky_chain_buckles_exactly_at_its_load(n: int) -> None:
     wire = GuideWire(10.0, 0.18, STIFFNESS)
@@ -46,7 +45,6 @@ def test_hencky_chain_buckles_exactly_at_its_load(n: int) -> None:
     assert np.hypot(*above.joints_mm[-1, :2]) > 0.02 * 10.0 * n
 
 
-@pytest.mark.nojit
 @pytest.mark.parametrize("roll", [0.0, 37.0, 180.0, -400.0])
 def test_rest_circle_has_no_energy_and_rolls_rigidly(roll: float) -> None:
     radius = 20.0

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Status, VesselWall
-from solver._kernels.problem import Switch
+from solver import GuideWire, Insertion, Solution, Status, VesselWall, skips
 from tests.solver.scenes import bend_grid, fork_grid, last, sampled, sheath_grid, tube_grid
 
 CURVED = [[0, 0.12], [8, 0.12], [8, 0.0]]
@@ -125,42 +124,43 @@ def test_wire_in_a_long_sheath_comes_to_rest(bore: float, stiffness: float, segm
     assert np.abs(solutions[-1].joints_mm[inside, :2]).max() > 0.5 * (bore - 0.18)
 
 
-SWITCHES = {
-    "clearance": (Switch(clearance=False), "wall_look_ups_proven_unnecessary"),
-    "cheap": (Switch(cheap=False), "wall_look_ups_cheap"),
-    "idle": (Switch(idle=False), "rest_shapes"),
-    "roll": (Switch(roll=False), "rolls_proven_idle"),
-    "direction": (Switch(direction=False), "sweeps_without_roll"),
-    "window": (Switch(window=False), "joints_left_still"),
-    "foresight": (Switch(foresight=False), "starts_foreseen"),
-    "rest": (Switch(roll=False, rest=False), "starts_at_rest"),
-    "friction": (Switch(friction=False), "relaxations_without_friction"),
-    "twist": (Switch(twist=False), "relaxations_without_twist"),
-    "profile": (Switch(profile=False), "joints_without_profile_look_up"),
+SKIPS = {
+    "clearance": "wall_look_ups_proven_unnecessary",
+    "cheap": "wall_look_ups_cheap",
+    "idle": "rest_shapes",
+    "roll": "rolls_proven_idle",
+    "direction": "sweeps_without_roll",
+    "window": "joints_left_still",
+    "foresight": "starts_foreseen",
+    "rest": "starts_at_rest",
+    "profile": "joints_without_profile_look_up",
 }
-
-
+"""What counts how often each skip is taken."""
 EXACT = ("clearance", "cheap", "profile")
-"""Skips of look-ups: bit by bit the same. The others save iterations, or (friction) a second round of them."""
+"""Skips of look-ups: bit by bit the same. The others save iterations."""
 
 
-@pytest.mark.parametrize("skip", SWITCHES)
+def bend_solutions(wire: GuideWire, wall: VesselWall, behind: float = 0.0) -> list[Solution]:
+    """The wire at every millimetre of 55, then rolled; ``behind`` mm of sheath come first."""
+    # tight, so that where an iteration stops does not show: 1e-9, the default, leaves 2e-6 mm
+    insertion = Insertion(wire, wall, [0, 0, -behind], [0, 0, 1], tolerance=1e-13)
+    depths = [*(behind + np.arange(1.0, 56.0)), behind + 55.0]
+    return list(insertion.to_depths(depths, [0.0] * 55 + [77.0]))
+
+
+@pytest.mark.parametrize("skip", SKIPS)
 def test_skips_change_nothing_and_are_counted(skip: str) -> None:
-    off, counter = SWITCHES[skip]
     # what the tip meets dies out on its way to the base in a long sheath, and hardly anywhere else
     behind = 150.0 if skip == "window" else 0.0
     wall = VesselWall(sheath_grid(0.25, behind) if behind else bend_grid(), 1.0)
     wire = GuideWire(1.0, 0.18, 10.0)
-    depths = [*(behind + np.arange(1.0, 56.0)), behind + 55.0]
-    rolls = [0.0] * 55 + [77.0]
-    both = []
     # a wire that is rolled though it is round starts each step at rest
-    on = Switch(roll=skip != "rest")
-    for switch in (on, off):
-        # tight, so that where an iteration stops does not show: 1e-9, the default, leaves 2e-6 mm
-        insertion = Insertion(wire, wall, [0, 0, -behind], [0, 0, 1], tolerance=1e-13, switch=switch)
-        both.append(list(insertion.to_depths(depths, rolls)))
-    on_count, off_count = (sum(s.work[counter] for s in run) for run in both)
+    always_off = ["roll"] if skip == "rest" else []
+    both = []
+    for names in ([], [skip]):
+        with skips.off(*always_off, *names):
+            both.append(bend_solutions(wire, wall, behind))
+    on_count, off_count = (sum(s.work[SKIPS[skip]] for s in run) for run in both)
     assert on_count > off_count == 0
     # look-ups are skipped exactly; iterations are saved within the solver's tolerance
     tolerance = 1e-12 if skip in EXACT else 1e-6
@@ -171,6 +171,25 @@ def test_skips_change_nothing_and_are_counted(skip: str) -> None:
     if skip in ("clearance", "cheap"):
         saved = [sum(s.work["wall_look_ups"] for s in run) for run in both]
         assert saved[0] < saved[1]
+
+
+ALMOST_NOTHING = {
+    "friction": ({"friction": 1e-200}, {}, "relaxations_without_friction"),
+    "twist": ({}, {"torsional_stiffness_N_mm2": 1e10}, "relaxations_without_twist"),
+}
+"""Friction that is computed and moves nothing; torsion 1e9 times as stiff as bending, which turns as one."""
+
+
+@pytest.mark.parametrize("what", ALMOST_NOTHING)
+def test_friction_and_twist_are_left_out_where_there_is_none(what: str) -> None:
+    """None at all gives the wire that almost none gives, without the work."""
+    of_wall, of_wire, counter = ALMOST_NOTHING[what]
+    without = bend_solutions(GuideWire(1.0, 0.18, 10.0), VesselWall(bend_grid(), 1.0))
+    with_it = bend_solutions(GuideWire(1.0, 0.18, 10.0, **of_wire), VesselWall(bend_grid(), 1.0, **of_wall))
+    counts = [sum(s.work[counter] for s in run) for run in (without, with_it)]
+    assert counts[0] > counts[1] == 0
+    for a, b in zip(without, with_it, strict=True):
+        np.testing.assert_allclose(a.joints_mm, b.joints_mm, atol=1e-6)
 
 
 def test_depth_zero_and_repeated_depths_are_no_work() -> None:

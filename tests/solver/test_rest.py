@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
+from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax, skips
 from solver import _tolerances as tol
-from solver._kernels.problem import Switch
 from tests.solver.scenes import tube_grid
 
 METHODS = ("newton", "closed_form")
@@ -49,10 +48,8 @@ def test_closed_form_far_from_the_origin_does_as_at_the_origin() -> None:
     wire = GuideWire(1.0, 0.18, STIFFNESS, rest_curvature_per_mm=0.05)
     for at in ([0.0, 0.0, 0.0], [2.0**20, -(2.0**20), 2.0**19]):
         # from straight to the rest shape, with no short cut
-        solution = relax(
-            wire, depth_mm=LENGTH, entry_mm=at, method="closed_form", max_iterations=2000,
-            switch=Switch(idle=False),
-        )  # fmt: skip
+        with skips.off("idle"):
+            solution = relax(wire, depth_mm=LENGTH, entry_mm=at, method="closed_form", max_iterations=2000)
         assert solution.converged, solution.sentence
         assert solution.work["start_energy_N_mm"] > 0.05
         # 3e-11 rad at each joint, see CLOSED_FORM_IDLE_ANGLE

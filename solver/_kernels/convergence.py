@@ -5,28 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 from solver import _tolerances as tol
+from solver._kernels import wall_law
+from solver._kernels.crossing import crossed
+from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import kernel
-from solver._kernels.layout import Chain
-from solver._kernels.passage import crossed
-from solver._kernels.problem import BENDING, LOAD, RUBBING, WALL, Problem
 
-ROUND_OFF = tol.ROUND_OFF
 FLOOR = tol.ENERGY_FLOOR_ANGLE**2
-FLOOR_ANGLE = tol.ENERGY_FLOOR_ANGLE
-MOMENT = tol.MOMENT
 
 
 @kernel
-def scale_of(problem: Problem, which: int, k: int) -> float:
+def scale_of(problem: Problem, slot: int, k: int) -> float:
     """The energy that tolerances are relative to, N mm."""
-    parts = problem.state.parts[which]
-    return float(parts[BENDING] + parts[WALL] + parts[RUBBING] + FLOOR * stiffest(problem.chain, k))
+    parts = problem.state.energies[slot]
+    return float(parts.bending + parts.wall + parts.friction + FLOOR * stiffest(problem.chain, k))
 
 
 @kernel
-def noise_of(problem: Problem, which: int, scale: float) -> float:
+def noise_of(problem: Problem, slot: int, scale: float) -> float:
     """Energy below which a difference is rounding, N mm. scale : see ``scale_of``."""
-    return float(ROUND_OFF * (scale + abs(problem.state.parts[which, LOAD])))
+    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load)))
 
 
 @kernel
@@ -43,14 +40,15 @@ def largest_moment(chain: Chain, u: Any, k: int) -> float:
     """Largest bending moment in the wire, N mm, with a floor."""
     largest = 0.0
     for j in range(k):
-        largest = max(largest, chain.bend[j] * max(abs(u[j, 0]), abs(u[j, 1]), FLOOR_ANGLE))
+        angle = max(abs(u[j, 0]), abs(u[j, 1]), tol.ENERGY_FLOOR_ANGLE)
+        largest = max(largest, chain.bend[j] * angle)
     return largest
 
 
 @kernel
-def admissible(problem: Problem, which: int, k: int) -> bool:
+def admissible(problem: Problem, slot: int, k: int) -> bool:
     """Whether the trial state can be reached from the current one without passing through a wall."""
-    return problem.stiffness == 0.0 or not crossed(problem, which, k)
+    return problem.stiffness == 0.0 or not crossed(problem, slot, k)
 
 
 @kernel
@@ -63,20 +61,20 @@ def unloaded(chain: Chain, k: int) -> bool:
 
 
 @kernel
-def at_rest(problem: Problem, which: int, k: int, report: Any) -> bool:
-    """Whether the residual moments that ``costate`` left are nothing beside the moments in the wire."""
-    return bool(report[1] <= MOMENT * largest_moment(problem.chain, problem.state.u[which], k))
+def at_rest(problem: Problem, slot: int, k: int, report: Any) -> bool:
+    """Whether the moments that ``costate`` found left are nothing beside the moments in the wire."""
+    return bool(report.moment <= tol.MOMENT * largest_moment(problem.chain, problem.state.u[slot], k))
 
 
 @kernel
-def rounding_moment(problem: Problem, which: int, k: int) -> float:
+def rounding_moment(problem: Problem, slot: int, k: int) -> float:
     """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
-    chain, depth = problem.chain, problem.state.depth
+    chain, penetration = problem.chain, problem.state.penetration[slot]
     force, lever = 0.0, 0.0
     for n in range(1, k + 1):
         lever += chain.length[n - 1]
         for a in range(3):
             force += abs(chain.load[n, a])
-        for i in range(chain.first[n], chain.first[n + 1]):
-            force += problem.stiffness * chain.weight[i] * depth[which, i]
-    return ROUND_OFF * force * lever
+        for p in range(chain.first[n], chain.first[n + 1]):
+            force += wall_law.force(problem.stiffness, chain.weight[p], penetration[p])
+    return tol.ROUND_OFF * force * lever

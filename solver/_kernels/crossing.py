@@ -8,43 +8,35 @@ from typing import Any
 import numpy as np
 
 from solver import _tolerances as tol
+from solver._kernels.algebra import dot, load3, minus
+from solver._kernels.data import Field, Problem
+from solver._kernels.field import indices, locate, value
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.problem import Problem
-from solver._kernels.spline import Field, indices, locate, value
-
-HOP = tol.HOP_VOXELS
-LOOK_AHEAD = tol.LOOK_AHEAD_MM
 
 
 @kernel
-def crossed(problem: Problem, which: int, k: int) -> bool:
-    """Whether a joint, moving straight from one state to the other, would pass through wall.
+def crossed(problem: Problem, slot: int, k: int) -> bool:
+    """Whether a joint, moving straight from a state to the other one, would pass through wall.
 
     Passing through means that the distance on the way is positive and above both ends. Moves below half a
     voxel cannot hop over a wall that the grid resolves, so they are not looked up.
     """
-    x, limit = problem.state.x, 0.25 * problem.spacing * problem.spacing
-    old, new = x[which], x[1 - which]
+    field, old, new = problem.field, problem.state.x[slot], problem.state.x[1 - slot]
+    limit = 0.25 * field.spacing * field.spacing
     for n in range(1, k + 1):
-        d0, d1, d2 = new[n, 0] - old[n, 0], new[n, 1] - old[n, 1], new[n, 2] - old[n, 2]
-        square = d0 * d0 + d1 * d1 + d2 * d2
-        if square > limit and hops(problem, old[n], new[n], math.sqrt(square)):
+        d = minus(load3(new, n), load3(old, n))
+        square = dot(d, d)
+        if square > limit and free_fraction(field, old[n], new[n], math.sqrt(square)) < 1.0:
             return True
     return False
 
 
 @kernel
-def hops(problem: Problem, a: Any, b: Any, way: float) -> bool:
-    """Whether the straight way from a to b passes through wall."""
-    return free_fraction(problem.field, a, b, way, problem.spacing) < 1.0
-
-
-@kernel
-def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float) -> float:
+def free_fraction(field: Field, a: Any, b: Any, way: float) -> float:
     """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
     here, last = distance_at(field, a, 0.0, b), distance_at(field, a, 1.0, b)
-    limit = max(here, last, 0.0) + HOP * spacing
-    steps = math.ceil(2 * way / spacing)
+    limit = max(here, last, 0.0) + tol.HOP_VOXELS * field.spacing
+    steps = math.ceil(2 * way / field.spacing)
     i = 1 + proven(field, here, way / steps) if steps > 0 else 1
     while i < steps:
         here = distance_at(field, a, i / steps, b)
@@ -57,13 +49,13 @@ def free_fraction(field: Field, a: Any, b: Any, way: float, spacing: float) -> f
 @kernel
 def distance_at(field: Field, a: Any, t: float, b: Any) -> float:
     """Signed distance, mm, at a + t (b - a)."""
-    x, y, z = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])
-    i, j, k, u, v, w = locate(field.coefficients, indices(field.to_index, field.origin, x, y, z))
-    return float(value(field.coefficients, i, j, k, u, v, w))
+    q = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]))
+    c = field.coefficients
+    return float(value(c, locate(c, indices(field.to_index, field.origin, q))))
 
 
 @kernel
-def free_way(field: Field, tip: Any, along: Any, step: float, spacing: float, rise: float) -> float:
+def free_way(field: Field, tip: Any, along: Any, step: float, rise: float) -> float:
     """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall (or beyond it).
 
     Never less than a quarter of that, so that a jammed tip still presses on.
@@ -71,21 +63,21 @@ def free_way(field: Field, tip: Any, along: Any, step: float, spacing: float, ri
     end = np.empty(3)
     for a in range(3):
         end[a] = tip[a] + step * along[a]
-    free = way_below(field, tip, end, step, spacing, rise)
+    free = way_below(field, tip, end, step, rise)
     # where no other vessel lies ahead there is nothing to tunnel into, and four times as deep is allowed
-    if free < 1.0 and not ridge_ahead(field, tip, end, step, spacing):
-        free = way_below(field, tip, end, step, spacing, 4 * rise)
+    if free < 1.0 and not ridge_ahead(field, tip, end, step):
+        free = way_below(field, tip, end, step, 4 * rise)
     for a in range(3):
         end[a] = tip[a] + free * step * along[a]
-    free *= step * free_fraction(field, tip, end, free * step, spacing)
+    free *= step * free_fraction(field, tip, end, free * step)
     return max(free, min(step, 0.25 * rise))
 
 
 @kernel
-def way_below(field: Field, a: Any, b: Any, way: float, spacing: float, rise: float) -> float:
+def way_below(field: Field, a: Any, b: Any, way: float, rise: float) -> float:
     """Fraction of the way from a to b until it is ``rise`` mm deeper in the wall than it began."""
     before = distance_at(field, a, 0.0, b)
-    steps = 1 + math.ceil(2 * way / spacing)
+    steps = 1 + math.ceil(2 * way / field.spacing)
     limit = max(0.0, before) + rise
     i = 1 + proven(field, before, way / steps)
     while i <= steps:
@@ -98,15 +90,15 @@ def way_below(field: Field, a: Any, b: Any, way: float, spacing: float, rise: fl
 
 
 @kernel
-def ridge_ahead(field: Field, a: Any, b: Any, step: float, spacing: float) -> bool:
+def ridge_ahead(field: Field, a: Any, b: Any, step: float) -> bool:
     """Whether the distance on the ray from a through b rises above the surface and falls again, 2 mm past b."""
-    top, i, last = 0.0, 1, 1 + math.ceil(2 * (step + LOOK_AHEAD) / spacing)
+    top, i, last = 0.0, 1, 1 + math.ceil(2 * (step + tol.LOOK_AHEAD_MM) / field.spacing)
     while i <= last:
-        here = distance_at(field, a, 0.5 * i * spacing / step, b)
-        if top > 0.0 and here < top - HOP * spacing:
+        here = distance_at(field, a, 0.5 * i * field.spacing / step, b)
+        if top > 0.0 and here < top - tol.HOP_VOXELS * field.spacing:
             return True
         top = max(top, here)
-        i += 1 + proven(field, here, 0.5 * spacing)
+        i += 1 + proven(field, here, 0.5 * field.spacing)
     return False
 
 

@@ -7,31 +7,20 @@ vanish on the faces; the linear continuation outside is therefore C² as well, a
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from solver._kernels.flags import door, inlined, kernel
-from solver._kernels.small import Three
+from solver._kernels.algebra import Three
+from solver._kernels.data import Field
+from solver._kernels.flags import entry_point, inlined, kernel
 
 Four = tuple[float, float, float, float]
+Cell = tuple[int, int, int, float, float, float]
+"""Indices of a cell, and a place in it: 0 to 1 along each axis, below or above where it is outside the grid."""
 
 # Cells along an edge of the blocks over which bounds are taken: small enough to stay local, large enough to be cheap.
 BLOCK = 4
-
-
-class Field(NamedTuple):
-    """An interpolated scalar field.
-
-    coefficients : (nx + 2, ny + 2, nz + 2) float32.     to_index : (3, 3), index per mm.     origin : (3,) mm.
-    gap : bound on |trilinear look-up - spline|, mm.     slope : bound on |gradient|, mm per mm.
-    """
-
-    coefficients: Any
-    to_index: Any
-    origin: Any
-    gap: float
-    slope: float
 
 
 @kernel
@@ -46,43 +35,22 @@ def solve_natural(line: Any, scratch: Any) -> None:
         line[i] -= scratch[i] * line[i + 1]
 
 
-@door
+@entry_point
 def prefilter(values: Any) -> None:
-    """Turn node values into spline coefficients, in place, along the three axes."""
-    nx, ny, nz = values.shape
-    scratch = np.empty(max(nx, ny, nz))
-    line = np.empty(max(nx, ny, nz))
-    for i in range(nx):
-        for j in range(ny):
-            solve_natural(values[i, j], scratch)
-    for i in range(nx):
-        for k in range(nz):
-            for j in range(ny):
-                line[j] = values[i, j, k]
-            solve_natural(line[:ny], scratch)
-            for j in range(ny):
-                values[i, j, k] = line[j]
-    for j in range(ny):
-        for k in range(nz):
-            for i in range(nx):
-                line[i] = values[i, j, k]
-            solve_natural(line[:nx], scratch)
-            for i in range(nx):
-                values[i, j, k] = line[i]
+    """Turn node values (nx, ny, nz) into spline coefficients, in place, along one axis after the other."""
+    flat, scratch = values.reshape(values.size), np.empty(max(values.shape))
+    stride = 1
+    for n in values.shape[::-1]:
+        for start in range(0, flat.size, n * stride):
+            for first in range(start, start + stride):
+                solve_natural(flat[first : first + n * stride : stride], scratch)
+        stride *= n
 
 
 @inlined
-def cell_of(f: float, last: int) -> tuple[int, float]:
-    """Cell and place in it of a continuous index; places outside 0 to 1 are outside the grid."""
-    # the clip also catches what does not fit an integer
-    i = int(min(max(f, 0.0), float(last)))
-    return i, f - i
-
-
-@inlined
-def indices(m: Any, o: Any, x: float, y: float, z: float) -> Three:
+def indices(m: Any, o: Any, q: Three) -> Three:
     """Continuous indices of a point in mm; m and o are a field's to_index and origin."""
-    d0, d1, d2 = x - o[0], y - o[1], z - o[2]
+    d0, d1, d2 = q[0] - o[0], q[1] - o[1], q[2] - o[2]
     return (
         m[0, 0] * d0 + m[0, 1] * d1 + m[0, 2] * d2,
         m[1, 0] * d0 + m[1, 1] * d1 + m[1, 2] * d2,
@@ -91,13 +59,16 @@ def indices(m: Any, o: Any, x: float, y: float, z: float) -> Three:
 
 
 @inlined
-def locate(c: Any, f: Three) -> tuple[int, int, int, float, float, float]:
-    """Cell of continuous indices in a field's coefficients c, and the place in it."""
-    shape = c.shape
-    i, r = cell_of(f[0], shape[0] - 4)
-    j, s = cell_of(f[1], shape[1] - 4)
-    k, t = cell_of(f[2], shape[2] - 4)
-    return i, j, k, r, s, t
+def clipped(f: float, last: int) -> int:
+    """The cell of a continuous index; the clip also catches what does not fit an integer."""
+    return int(min(max(f, 0.0), float(last)))
+
+
+@inlined
+def locate(c: Any, f: Three) -> Cell:
+    """The cell of continuous indices among a field's coefficients c."""
+    i, j, k = clipped(f[0], c.shape[0] - 4), clipped(f[1], c.shape[1] - 4), clipped(f[2], c.shape[2] - 4)
+    return i, j, k, f[0] - i, f[1] - j, f[2] - k
 
 
 @inlined
@@ -108,13 +79,45 @@ def in_grid(c: Any, f: Three) -> bool:
 
 
 @inlined
-def trilinear(c: Any, i: int, j: int, k: int, r: float, s: float, t: float) -> float:
+def trilinear(c: Any, cell: Cell) -> float:
     """Trilinear look-up among the coefficients: within ``field.gap`` of the spline, at a tenth of its cost."""
+    i, j, k, r, s, t = cell
     low = (c[i + 1, j + 1, k + 1] * (1 - t) + c[i + 1, j + 1, k + 2] * t) * (1 - s)
     low += (c[i + 1, j + 2, k + 1] * (1 - t) + c[i + 1, j + 2, k + 2] * t) * s
     high = (c[i + 2, j + 1, k + 1] * (1 - t) + c[i + 2, j + 1, k + 2] * t) * (1 - s)
     high += (c[i + 2, j + 2, k + 1] * (1 - t) + c[i + 2, j + 2, k + 2] * t) * s
     return float(low * (1 - r) + high * r)
+
+
+@inlined
+def cubic(t: float) -> Four:
+    """Weights of the four coefficients around a place in a cell: linear beyond the grid."""
+    if t < 0.0 or t > 1.0:
+        return 0.0, 1 - t, t, 0.0
+    r = 1 - t
+    return r * r * r / 6, 2.0 / 3 - t * t * (1 - 0.5 * t), 2.0 / 3 - r * r * (1 - 0.5 * r), t * t * t / 6
+
+
+@inlined
+def row(c: Any, i: int, j: int, k: int, r: Four) -> float:
+    """Four coefficients along the last axis, weighted."""
+    return float(c[i, j, k] * r[0] + c[i, j, k + 1] * r[1] + c[i, j, k + 2] * r[2] + c[i, j, k + 3] * r[3])
+
+
+@inlined
+def plane(c: Any, i: int, j: int, k: int, q: Four, r: Four) -> float:
+    """Four rows, weighted."""
+    low = row(c, i, j, k, r) * q[0] + row(c, i, j + 1, k, r) * q[1]
+    return low + row(c, i, j + 2, k, r) * q[2] + row(c, i, j + 3, k, r) * q[3]
+
+
+@kernel
+def value(c: Any, cell: Cell) -> float:
+    """The spline alone, without derivatives: a third of the cost."""
+    i, j, k, u, v, w = cell
+    p, q, r = cubic(u), cubic(v), cubic(w)
+    low = plane(c, i, j, k, q, r) * p[0] + plane(c, i + 1, j, k, q, r) * p[1]
+    return low + plane(c, i + 2, j, k, q, r) * p[2] + plane(c, i + 3, j, k, q, r) * p[3]
 
 
 @inlined
@@ -130,23 +133,21 @@ def basis(t: float, weights: Any) -> None:
     weights[1, 1] = t * (1.5 * t - 2)
     weights[1, 2] = r * (2 - 1.5 * r)
     weights[1, 3] = 0.5 * t * t
-    weights[2, 0] = r
-    weights[2, 1] = 3 * t - 2
-    weights[2, 2] = 1 - 3 * t
-    weights[2, 3] = t
+    weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3] = r, 3 * t - 2, 1 - 3 * t, t
 
 
 @kernel
-def set_basis(r: float, s: float, t: float, weights: Any) -> None:
+def set_basis(cell: Cell, weights: Any) -> None:
     """Fill (3, 3, 4) weights for a place in a cell."""
-    basis(r, weights[0])
-    basis(s, weights[1])
-    basis(t, weights[2])
+    basis(cell[3], weights[0])
+    basis(cell[4], weights[1])
+    basis(cell[5], weights[2])
 
 
 @kernel
-def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
+def spline(c: Any, cell: Cell, weights: Any, jet: Any) -> None:
     """Fill jet (10,): value, gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
+    i, j, k, _, _, _ = cell
     p, q, r = weights[0], weights[1], weights[2]
     v = gx = gy = gz = hxx = hyy = hzz = hxy = hxz = hyz = 0.0
     for a in range(4):
@@ -180,44 +181,6 @@ def spline(c: Any, i: int, j: int, k: int, weights: Any, jet: Any) -> None:
 
 
 @inlined
-def cubic(t: float) -> Four:
-    """Weights of the four coefficients around t, the first row of ``basis``: linear beyond the grid."""
-    if t < 0.0 or t > 1.0:
-        return 0.0, 1 - t, t, 0.0
-    r = 1 - t
-    return r * r * r / 6, 2.0 / 3 - t * t * (1 - 0.5 * t), 2.0 / 3 - r * r * (1 - 0.5 * r), t * t * t / 6
-
-
-@inlined
-def row(c: Any, i: int, j: int, k: int, r: Four) -> float:
-    """Four coefficients along the last axis, weighted."""
-    return float(c[i, j, k] * r[0] + c[i, j, k + 1] * r[1] + c[i, j, k + 2] * r[2] + c[i, j, k + 3] * r[3])
-
-
-@inlined
-def plane(c: Any, i: int, j: int, k: int, q: Four, r: Four) -> float:
-    """Four rows, weighted."""
-    return (
-        row(c, i, j, k, r) * q[0]
-        + row(c, i, j + 1, k, r) * q[1]
-        + row(c, i, j + 2, k, r) * q[2]
-        + row(c, i, j + 3, k, r) * q[3]
-    )
-
-
-@kernel
-def value(c: Any, i: int, j: int, k: int, u: float, v: float, w: float) -> float:
-    """The spline alone at a place in a cell, without derivatives: a third of the cost."""
-    p, q, r = cubic(u), cubic(v), cubic(w)
-    return (
-        plane(c, i, j, k, q, r) * p[0]
-        + plane(c, i + 1, j, k, q, r) * p[1]
-        + plane(c, i + 2, j, k, q, r) * p[2]
-        + plane(c, i + 3, j, k, q, r) * p[3]
-    )
-
-
-@inlined
 def to_world(m: Any, jet: Any) -> None:
     """Turn the derivatives of a jet from per index into per mm, in place: g <- Mᵀ g, H <- Mᵀ H M."""
     g0, g1, g2 = jet[1], jet[2], jet[3]
@@ -233,19 +196,25 @@ def to_world(m: Any, jet: Any) -> None:
         jet[4 + n] = m[0, a] * h0 + m[1, a] * h1 + m[2, a] * h2
 
 
-@door
+@inlined
+def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> None:
+    """Fill jet (10,) as ``spline``, but per mm; m is a field's to_index, weights (3, 3, 4) is work space."""
+    set_basis(cell, weights)
+    spline(c, cell, weights, jet)
+    to_world(m, jet)
+
+
+@entry_point
 def look_up(field: Field, points: Any, jets: Any) -> None:
     """Value, gradient and second derivatives (n, 10), per mm, at points (n, 3) in mm."""
     weights = np.empty((3, 3, 4))
     c, m, o = field.coefficients, field.to_index, field.origin
     for n in range(points.shape[0]):
-        i, j, k, r, s, t = locate(c, indices(m, o, points[n, 0], points[n, 1], points[n, 2]))
-        set_basis(r, s, t, weights)
-        spline(c, i, j, k, weights, jets[n])
-        to_world(m, jets[n])
+        cell = locate(c, indices(m, o, (points[n, 0], points[n, 1], points[n, 2])))
+        fill_jet(c, m, cell, weights, jets[n])
 
 
-@door
+@entry_point
 def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     """Return (gap, slope) of a Field: proven bounds, from differences of the coefficients c.
 
@@ -256,47 +225,33 @@ def bounds(c: Any, to_index: Any) -> tuple[float, float]:
     clear of the wall: a point that starts clear meets such a cell's bound before it can touch.
     """
     gap, slope = 0.0, 0.0
-    first, second = np.empty(3), np.empty(3)
+    n = BLOCK + 3
     for i in range(0, c.shape[0] - 3, BLOCK):
         for j in range(0, c.shape[1] - 3, BLOCK):
             for k in range(0, c.shape[2] - 3, BLOCK):
-                if largest_differences(c, i, j, k, first, second) > 0.0:
+                block = c[i : i + n, j : j + n, k : k + n]
+                if block.min() > 0.0:
                     continue
-                square = 0.0
+                square, second = 0.0, 0.0
                 for a in range(3):
-                    scale = to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2
-                    square += first[a] ** 2 * scale
-                slope = max(slope, math.sqrt(square))
-                gap = max(gap, (second[0] + second[1] + second[2]) / 6)
+                    first, bent = largest_differences(block, a)
+                    second += bent
+                    square += first**2 * (to_index[a, 0] ** 2 + to_index[a, 1] ** 2 + to_index[a, 2] ** 2)
+                slope, gap = max(slope, math.sqrt(square)), max(gap, second / 6)
     return gap, slope
 
 
 @kernel
-def largest_differences(c: Any, i0: int, j0: int, k0: int, first: Any, second: Any) -> float:
-    """Largest first and second differences (3,) in the support of a block of cells; return its least value."""
-    n = BLOCK + 3
-    i1, j1, k1 = min(i0 + n, c.shape[0]), min(j0 + n, c.shape[1]), min(k0 + n, c.shape[2])
-    least = math.inf
-    for a in range(3):
-        first[a] = second[a] = 0.0
-    for i in range(i0, i1):
-        for j in range(j0, j1):
-            for k in range(k0, k1):
-                here = float(c[i, j, k])
-                least = min(least, here)
-                if i > i0:
-                    step = here - c[i - 1, j, k]
-                    first[0] = max(first[0], abs(step))
-                    if i > i0 + 1:
-                        second[0] = max(second[0], abs(step - c[i - 1, j, k] + c[i - 2, j, k]))
-                if j > j0:
-                    step = here - c[i, j - 1, k]
-                    first[1] = max(first[1], abs(step))
-                    if j > j0 + 1:
-                        second[1] = max(second[1], abs(step - c[i, j - 1, k] + c[i, j - 2, k]))
-                if k > k0:
-                    step = here - c[i, j, k - 1]
-                    first[2] = max(first[2], abs(step))
-                    if k > k0 + 1:
-                        second[2] = max(second[2], abs(step - c[i, j, k - 1] + c[i, j, k - 2]))
-    return least
+def largest_differences(block: Any, axis: int) -> tuple[float, float]:
+    """Largest first and second difference of a block of coefficients along an axis."""
+    first, second = 0.0, 0.0
+    di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
+    for i in range(di, block.shape[0]):
+        for j in range(dj, block.shape[1]):
+            for k in range(dk, block.shape[2]):
+                before = float(block[i - di, j - dj, k - dk])
+                step = block[i, j, k] - before
+                first = max(first, abs(step))
+                if i * di + j * dj + k * dk > 1:
+                    second = max(second, abs(step - before + block[i - 2 * di, j - 2 * dj, k - 2 * dk]))
+    return first, second

@@ -1,0 +1,253 @@
+"""The way to a depth: steps of the base, each laid along the wire's own curve, relaxed, and taken back if it fails.
+
+One compiled loop, because a step costs a few microseconds per joint and entering a kernel costs ten.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels.chain import lay_out, segments_at
+from solver._kernels.crossing import free_way
+from solver._kernels.data import (
+    CONVERGED,
+    CURRENT,
+    LAST_GOOD,
+    LEFT_GRID,
+    MAX_ITERATIONS,
+    NON_FINITE,
+    TRIAL,
+    Introducer,
+    Problem,
+    WireTable,
+)
+from solver._kernels.extrapolation import extrapolate_start, note_change
+from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
+from solver._kernels.follow import follow
+from solver._kernels.forces import copy_state, forget_forces, furthest_outside
+from solver._kernels.friction import anchor_friction, anchor_friction_behind
+from solver._kernels.relaxation import measure, relax_with_friction
+
+
+@entry_point
+def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
+    """Step to a depth (mm) and roll (degrees); return the outcome, the iterations and the number of segments.
+
+    Place, report, force and state 0 of the handle are those of the wire reached.
+    laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
+    """
+    problem, table, k = handle.problem, handle.table, laid
+    if laid > 0:
+        anchor_friction(problem, k)
+        outcome, iterations, energy = relax_current(handle, k, 0.0)
+        arrive(handle, to_depth, to_roll, energy, k)
+    else:
+        outcome, iterations = go(handle, to_depth, to_roll)
+        k, _ = segments_at(handle.place[0].inserted, table.segment)
+    measure(problem, table, k, handle.report[0], handle.force)
+    return outcome, iterations, k
+
+
+@merged
+def go(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
+    """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
+    at, introducer, limits = handle.place[0], handle.introducer, handle.limits
+    counters = handle.problem.scratch.counters[0]
+    # a cap on the time that a hopeless scene can take
+    steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
+    limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
+    outcome, iterations = CONVERGED, 0
+    if introducer.idle_roll and at.roll != to_roll:
+        at.roll = to_roll
+        counters.rolls_proven_idle += 1
+    while abs(to_depth - at.inserted) >= tol.MATCH_DEPTH_MM or at.roll != to_roll:
+        outcome, used = step(handle, to_depth, to_roll)
+        iterations += used
+        if iterations > limit or counters.passed >= limits.work:
+            outcome = MAX_ITERATIONS
+            break
+        if outcome == CONVERGED:
+            at.shrink = min(1.0, 2 * at.shrink)
+        elif at.shrink > tol.SMALLEST_STEP and outcome != LEFT_GRID and outcome != NON_FINITE:
+            at.shrink *= 0.5
+        else:
+            # outside the grid or without a finite energy a shorter step does not help either
+            break
+    at.shrink = max(at.shrink, 8 * tol.SMALLEST_STEP)
+    return outcome, iterations
+
+
+@merged
+def step(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
+    """Take one step towards a depth and roll, or take it back where it fails; return outcome and iterations."""
+    problem, introducer, at = handle.problem, handle.introducer, handle.place[0]
+    ahead, turn = to_depth - at.inserted, to_roll - at.roll
+    share = evenly(at.shrink * allowed(problem, handle.table, introducer, at.inserted, ahead, turn))
+    depth, roll = at.inserted + share * ahead, at.roll + share * turn
+    k = set_out(handle, depth, roll)
+    outcome, used, energy = CONVERGED, 0, 0.0
+    if k > 0:
+        outcome, used, energy = relax_current(handle, k, likeness(problem, at, depth, roll))
+    walled = outcome == CONVERGED and problem.stiffness > 0.0
+    if walled and furthest_outside(problem.field, problem.state.x[CURRENT], k) > introducer.margin:
+        outcome = LEFT_GRID
+    if outcome == CONVERGED:
+        arrive(handle, depth, roll, energy, k)
+    else:
+        take_back(handle)
+    return outcome, used
+
+
+@merged
+def relax_current(handle: Any, k: int, share: float) -> tuple[int, int, float]:
+    """Relax the wire as it is laid out, in place; return the outcome, iterations and energy, N mm.
+
+    share : how much of the last step's change to begin with, see ``extrapolation``.
+    """
+    problem = handle.problem
+    start = extrapolate_start(problem, CURRENT, k, share, handle.place[0].energy)
+    outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
+    if start != CURRENT:
+        copy_state(problem, start, CURRENT, k)
+    return outcome, used, energy
+
+
+@merged
+def arrive(handle: Any, depth: float, roll: float, energy: float, k: int) -> None:
+    """Make the wire as it is the one that the next step begins with."""
+    at = handle.place[0]
+    note_change(handle.problem, CURRENT, k)
+    at.last_step = depth - at.inserted if roll == at.roll else 0.0
+    at.inserted, at.roll, at.energy = depth, roll, energy
+
+
+@merged
+def allowed(
+    problem: Problem, table: WireTable, introducer: Introducer, depth: float, ahead: float, turn: float
+) -> float:
+    """Fraction of the way that one step may take: the longest step and roll, and what the tip can see."""
+    fraction = 1.0
+    if turn != 0.0:
+        fraction = min(fraction, introducer.turn / abs(turn))
+    if ahead != 0.0:
+        longest = min(introducer.step, abs(ahead))
+        if ahead > 0.0 and problem.stiffness > 0.0:
+            k, _ = segments_at(depth, table.segment)
+            tip, along = problem.state.x[CURRENT, k], problem.state.r[CURRENT, k, :, 2]
+            longest = free_way(problem.field, tip, along, longest, introducer.rise)
+        fraction = min(fraction, longest / abs(ahead))
+    return fraction
+
+
+@inlined
+def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
+    """How long this step is over the last one, or 0 where it is of another kind: rolled, back, or much longer."""
+    if not problem.skips.foresight or at.last_step == 0.0 or roll != at.roll:
+        return 0.0
+    share = (depth - at.inserted) / at.last_step
+    return share if 0.0 < share <= tol.MOST_FORESEEN else 0.0
+
+
+@inlined
+def evenly(fraction: float) -> float:
+    """One share of the way in equal steps, none longer than ``fraction`` of it but for a small overshoot."""
+    return 1.0 / max(math.ceil((1.0 - tol.OVERSHOOT) / fraction), 1.0)
+
+
+@merged
+def set_out(handle: Any, depth: float, roll: float) -> int:
+    """Keep the last good state and lay the wire out at a new depth and roll; return its number of segments."""
+    problem, table, introducer = handle.problem, handle.table, handle.introducer
+    inserted, report = handle.place[0].inserted, handle.report[0]
+    was, _ = segments_at(inserted, table.segment)
+    copy_state(problem, CURRENT, LAST_GOOD, was)
+    handle.report[1] = report
+    k, first = segments_at(depth, table.segment)
+    clamp(problem, introducer, roll)
+    if k > 2 and table.tabled:
+        problem.scratch.counters[0].joints_without_profile_look_up += k - 2
+    if k > 0:
+        lay_along(problem, table, introducer, was, k, first, depth - inserted)
+        return k
+    forget_forces(report)
+    report.start = 0.0
+    parts = problem.state.energies[CURRENT]
+    parts.bending = parts.wall = parts.load = parts.friction = 0.0
+    return k
+
+
+@merged
+def take_back(handle: Any) -> None:
+    """Put the last good state back."""
+    was, first = segments_at(handle.place[0].inserted, handle.table.segment)
+    if was > 0:
+        lay_out(handle.problem.chain, handle.table, was, first)
+    copy_state(handle.problem, LAST_GOOD, CURRENT, was)
+    handle.report[0] = handle.report[1]
+
+
+@merged
+def clamp(problem: Problem, introducer: Introducer, roll: float) -> None:
+    """Put the base frame, rolled right-handed about the wire by ``roll`` degrees, at the entry."""
+    angle = math.radians(roll)
+    c, s = math.cos(angle), math.sin(angle)
+    x, r = problem.state.x[CURRENT], problem.state.r[CURRENT]
+    for a in range(3):
+        x[0, a] = introducer.entry[a]
+        one, two = introducer.frame[a, 0], introducer.frame[a, 1]
+        r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, introducer.frame[a, 2]
+
+
+@cached
+def lay_along(
+    problem: Problem, table: WireTable, introducer: Introducer, was: int, k: int, first: float, ahead: float
+) -> None:
+    """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
+    chain, state = problem.chain, problem.state
+    before = chain.length[0]
+    lay_out(chain, table, k, first)
+    if problem.twisting:
+        keep_twist(state.u, was, k)
+    for n in range(k + 1):
+        for a in range(3):
+            chain.load[n, a] = introducer.load[a] if n == k else 0.0
+    source, count = LAST_GOOD, was + 1
+    if was == 0:
+        source, count = TRIAL, begin(introducer, state.x[TRIAL])
+    elif introducer.translate and ahead != 0.0:
+        source, count = TRIAL, moved(introducer, table, state.x, was, before, ahead)
+    follow(state.x[source], count, chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], k)
+    if problem.friction.coefficient > 0.0:
+        anchor_friction_behind(problem, state.x[LAST_GOOD], was, k, ahead)
+
+
+@merged
+def begin(introducer: Introducer, curve: Any) -> int:
+    """Straight on from the entry, as two points."""
+    for a in range(3):
+        curve[0, a] = introducer.entry[a]
+        curve[1, a] = introducer.entry[a] + introducer.frame[a, 2]
+    return 2
+
+
+@kernel
+def moved(introducer: Introducer, table: WireTable, x: Any, was: int, first: float, ahead: float) -> int:
+    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
+    curve, count = x[TRIAL], begin(introducer, x[TRIAL]) - 1
+    for n in range(was + 1):
+        arc = first + (n - 1) * table.segment if n > 0 else 0.0
+        if ahead > 0.0 or arc > -ahead:
+            for a in range(3):
+                curve[count, a] = x[LAST_GOOD, n, a] + ahead * introducer.frame[a, 2]
+            count += 1
+    return max(count, 2)
+
+
+@merged
+def keep_twist(u: Any, was: int, k: int) -> None:
+    """Twist stays with the material, which is counted from the tip."""
+    common = min(was, k)
+    for j in range(k):
+        u[CURRENT, j, 2] = u[LAST_GOOD, was - k + j, 2] if j >= k - common else 0.0

@@ -1,0 +1,235 @@
+"""A wire in memory: the arrays that the kernels work on, grown as the wire goes in, and the way into the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solver import _tolerances as tol
+from solver import skips
+from solver._kernels.chain import lay_out, tabulate
+from solver._kernels.data import (
+    COUNTERS,
+    CURRENT,
+    DESCENT,
+    ENERGIES,
+    OUTCOMES,
+    PLACE,
+    REPORT,
+    Chain,
+    Field,
+    Friction,
+    Introducer,
+    Limits,
+    Problem,
+    Scratch,
+    State,
+    WireTable,
+)
+from solver._kernels.handle import Contents, handle_of
+from solver._kernels.insertion import advance
+from solver._kernels.minimise import CLOSED_FORM
+from solver.errors import refuse
+from solver.quadrature import look_up_rule
+from solver.solution import Solution
+from solver.status import Status
+from solver.wall import VesselWall
+from solver.wire import GuideWire
+
+Array = NDArray[np.float64]
+
+NO_FIELD = Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
+"""A stand-in where there is no wall; it is never looked up."""
+
+
+class Workspace:
+    """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
+
+    problem, table, limits, place, report, force : see ``_kernels.handle.Contents``.
+    """
+
+    problem: Problem
+    table: WireTable
+    introducer: Introducer | None = None
+    force: Array
+
+    def __init__(self, wire: GuideWire, wall: VesselWall | None, quadrature: str, limits: Limits) -> None:
+        if limits.method == CLOSED_FORM and wire.twists:
+            name, got = "torsional_stiffness_N_mm2", wire.torsional_stiffness_N_mm2
+            refuse("solver", name, got, "inf with method closed_form", "use method newton")
+        self.wire, self.wall, self.limits, self.skips = wire, wall, limits, skips.current()
+        self.rule = look_up_rule(wire, wall, quadrature)
+        self.field = wall.field if wall is not None else NO_FIELD
+        # rolling a straight wire with one bending stiffness and a round hull changes nothing
+        self.round = wire.straight and (wall is None or wall.samples == 0)
+        self.k, self.capacity = 0, 0
+        self.counters, self.place = np.zeros(1, COUNTERS), np.zeros(1, PLACE)
+        # the same memory without names: to clear a record field by field takes 6 µs
+        self.counts = self.counters.view(np.int64)
+        self.place["shrink"] = 1.0
+        self.report = np.zeros(2, REPORT)
+        self._grow(16)
+
+    def _grow(self, capacity: int) -> None:
+        """Make room for more segments, keeping joints, frames and controls of the current state."""
+        points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
+        state, scratch = self._empty_state(capacity, points), self._empty_scratch(capacity, points)
+        if self.capacity:
+            old = self.problem
+            pairs = [(state.u, old.state.u), (state.x, old.state.x), (state.r, old.state.r)]
+            for new, was in pairs:
+                new[:, : was.shape[1]] = was
+            scratch.change[: self.capacity] = old.scratch.change
+        self.problem = Problem(
+            field=self.field,
+            stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
+            friction=self._empty_friction(points),
+            chain=self._empty_chain(capacity, points),
+            state=state,
+            scratch=scratch,
+            skips=self.skips,
+            twisting=self.wire.twists,
+            straight=self.round and self.skips.direction and not self.wire.twists,
+        )
+        segment = float(self.wire.segment_mm)
+        cells = np.zeros((capacity + 1, 2))
+        tabulate(self.wire.profile, segment, cells)
+        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile)
+        self.force = np.zeros((capacity + 1, 3))
+        self.capacity = capacity
+
+    def _empty_state(self, k: int, points: int) -> State:
+        return State(
+            u=np.zeros((3, k, 3)),
+            x=np.zeros((3, k + 1, 3)),
+            r=np.zeros((3, k + 1, 3, 3)),
+            penetration=np.zeros((3, points)),
+            jet=np.zeros((3, points, 10)),
+            energies=np.zeros(3, ENERGIES),
+        )
+
+    def _empty_scratch(self, k: int, points: int) -> Scratch:
+        return Scratch(
+            gain=np.zeros((k, 3, 7)),
+            anchor=np.ones((points, 4)),
+            weights=np.zeros((3, 3, 4)),
+            counters=self.counters,
+            descent=np.zeros(1, DESCENT),
+            start=np.zeros((k, 3)),
+            change=np.zeros((k, 3)),
+            keep=np.zeros((k, 3)),
+        )
+
+    def _empty_chain(self, k: int, points: int) -> Chain:
+        return Chain(
+            length=np.zeros(k),
+            bend=np.zeros(k),
+            twist=np.zeros(k),
+            rest=np.zeros(k),
+            load=np.zeros((k + 1, 3)),
+            first=np.zeros(k + 2, dtype=np.int64),
+            offset=np.zeros((points, 3)),
+            weight=np.zeros(points),
+            reach=self.rule.reach,
+        )
+
+    def _empty_friction(self, points: int) -> Friction:
+        coefficient = float(self.wall.friction) if self.wall is not None else 0.0
+        n = points if coefficient else 0
+        return Friction(coefficient, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
+
+    def clamp(
+        self,
+        entry: Array,
+        frame: Array,
+        tip_load: ArrayLike = (0.0, 0.0, 0.0),
+        translate: bool = False,
+        step_mm: float = 1.0,
+        roll_step_deg: float = 1.0,
+    ) -> None:
+        """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
+        self.introducer = Introducer(
+            entry=entry,
+            frame=np.ascontiguousarray(frame),
+            load=np.array(tip_load, dtype=np.float64),
+            translate=translate,
+            idle_roll=self.round and self.skips.roll,
+            step=float(step_mm),
+            turn=float(roll_step_deg),
+            rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
+            margin=float(self.wire.radius_mm),
+        )
+        self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
+        self._bind()
+
+    def load(self, load_N: ArrayLike) -> None:
+        """Put dead loads on the joints, or one on the tip."""
+        k, loads = self.k, self.problem.chain.load
+        load = np.asarray(load_N, dtype=np.float64)
+        if load.shape not in ((3,), (k + 1, 3)) or not np.all(np.isfinite(load)):
+            allowed = f"(3,) on the tip or ({k + 1}, 3)"
+            refuse("relax", "load_N", load.shape, allowed, "see GuideWire.segments_at")
+        loads[:] = 0.0
+        loads[k if load.ndim == 1 else slice(0, k + 1)] = load
+
+    def _bind(self) -> None:
+        """Take a handle of the arrays, wherever in memory they are now."""
+        settings = self.introducer, self.limits
+        self._handle = handle_of(
+            Contents(self.problem, self.table, *settings, self.place, self.report, self.force)
+        )
+
+    def reserve(self, depth_mm: float) -> None:
+        """Make sure that there is room for the wire at a depth and one point more."""
+        if depth_mm >= (self.capacity - 1) * self.wire.segment_mm:
+            self._grow(max(2 * self.capacity, self.wire.segments_at(depth_mm)[0] + 2))
+            if self.introducer is not None:
+                self._bind()
+
+    def lay_out(self, depth_mm: float) -> None:
+        """Cut the wire at a depth into segments."""
+        self.reserve(depth_mm)
+        self.k, first = self.wire.segments_at(depth_mm)
+        if self.k:
+            lay_out(self.problem.chain, self.table, self.k, first)
+
+    def advance(self, depth_mm: float, roll_deg: float, laid: int = 0) -> tuple[Status, int]:
+        """Go to a depth and roll, see ``_kernels.insertion.advance``; return the status and the iterations."""
+        outcome, iterations, self.k = advance(self._handle, depth_mm, roll_deg, laid)
+        return Status[OUTCOMES[outcome]], iterations
+
+    def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
+        """The wire as it lies now."""
+        n, state = self.k + 1, self.problem.state
+        start, penetration, push, force, torque, *_ = self.report.item(0)
+        bending, wall, _, friction = state.energies.item(CURRENT)
+        arrays = [
+            state.x[CURRENT, :n].copy(),
+            state.r[CURRENT, :n].copy(),
+            self.force[:n].copy(),
+            force.copy(),
+        ]
+        for array in arrays:
+            array.setflags(write=False)
+        solution = object.__new__(Solution)
+        # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take
+        vars(solution).update(
+            joints_mm=arrays[0],
+            frames=arrays[1],
+            energy_N_mm=self.place["energy"].item(0),
+            bending_energy_N_mm=bending,
+            wall_energy_N_mm=wall,
+            friction_energy_N_mm=friction,
+            status=status,
+            iterations=iterations,
+            contact_force_N=arrays[2],
+            reaction_force_N=arrays[3],
+            reaction_torque_N_mm=float(torque[2]),
+            push_force_N=push,
+            max_penetration_mm=penetration,
+            depth_mm=depth_mm,
+            roll_deg=roll_deg,
+            counts=self.counters.item(0),
+            start_energy_N_mm=start,
+        )
+        return solution

@@ -1,0 +1,52 @@
+"""Ways from Python into kernels that have none of their own; compiled anew in every session, so never stale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from solver._kernels import closed_form, energy, follow, newton, rollout, rotation
+from solver._kernels.flags import FAST
+
+entry_point = numba.njit(**FAST)
+
+
+@entry_point
+def total_energy(problem: Any, slot: int, k: int) -> float:
+    return energy.total_energy(problem, slot, 0, k)
+
+
+@entry_point
+def place(chain: Any, state: Any, slot: int, k: int) -> None:
+    rollout.place(chain, state, slot, k)
+
+
+@entry_point
+def sweep(problem: Any, slot: int, k: int, damping: float, report: Any) -> bool:
+    return newton.sweep(problem, slot, 0, k, damping, report)
+
+
+@entry_point
+def costate(problem: Any, slot: int, k: int, report: Any) -> None:
+    newton.costate(problem, slot, k, report)
+
+
+@entry_point
+def gradients(problem: Any, slot: int, k: int) -> None:
+    closed_form.gradients(problem, slot, k)
+
+
+@entry_point
+def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
+    follow.aim(chain, u, x, r, j)
+
+
+@entry_point
+def sine_terms(q: float) -> Any:
+    return rotation.sine_terms(q)
+
+
+@entry_point
+def jacobian_terms(q: float, s: float, a: float) -> Any:
+    return rotation.jacobian_terms(q, s, a)
