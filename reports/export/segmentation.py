@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,19 +11,6 @@ import SimpleITK as sitk
 from numpy.typing import ArrayLike, NDArray
 
 from reports.atomic import replacing
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Labels:
-    """A label map indexed x, y, z with its geometry in LPS mm; ``segments`` names the labels 1, 2, ..."""
-
-    values: NDArray[Any]
-    spacing_mm: Array
-    origin_mm: Array
-    direction: Array
-    segments: tuple[str, ...]
 
 
 def write_segmentation_nrrd(
@@ -53,16 +39,6 @@ def write_segmentation_nrrd(
         image.SetMetaData(key, text)
     with replacing(path) as temporary:
         sitk.WriteImage(image, str(temporary), useCompression=True)
-
-
-def read_segmentation_nrrd(path: Path) -> Labels:
-    """Read back a segmentation, indexed x, y, z."""
-    image: Any = sitk.ReadImage(str(path))
-    keys = sorted(k for k in image.GetMetaDataKeys() if k.startswith("Segment") and k.endswith("_Name"))
-    values = sitk.GetArrayFromImage(image).T
-    spacing, origin = np.array(image.GetSpacing()), np.array(image.GetOrigin())
-    direction = np.array(image.GetDirection()).reshape(3, 3)
-    return Labels(values, spacing, origin, direction, tuple(image.GetMetaData(k) for k in keys))
 
 
 def _metadata(
