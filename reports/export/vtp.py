@@ -89,20 +89,16 @@ def _write(
     piece = ET.SubElement(ET.SubElement(root, "PolyData"), "Piece", counts)
     data = ET.SubElement(piece, "PointData")
     for name, values in point_arrays.items():
-        _append(data, name, _checked_array(values, name, len(points), path), "Float64")
+        array, n = np.asarray(values, dtype=np.float64), len(points)
+        if array.shape not in ((n,), (n, 3)):
+            msg = f"{path}: point array {name} has shape {array.shape}; give ({n},) or ({n}, 3)"
+            raise ValueError(msg)
+        _append(data, name, array, "Float64")
     _append(ET.SubElement(piece, "Points"), "Points", points, "Float64")
     block = ET.SubElement(piece, kind)
     for name, indices in zip(("connectivity", "offsets"), cells, strict=True):
         _append(block, name, indices, "Int64")
     write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-
-
-def _checked_array(values: ArrayLike, name: str, n_points: int, path: Path) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((n_points,), (n_points, 3)):
-        msg = f"{path}: point array {name} has shape {array.shape}; give ({n_points},) or ({n_points}, 3)"
-        raise ValueError(msg)
-    return array
 
 
 def _append(parent: ET.Element, name: str, values: NDArray[Any], kind: str) -> None:
