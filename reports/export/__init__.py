@@ -5,11 +5,10 @@ Slicer: ``.mrk.json`` curves, ``.seg.nrrd`` label maps, ``.vtp`` models. ParaVie
 
 from reports.export.markups import write_markups_curve
 from reports.export.segmentation import write_segmentation_nrrd
-from reports.export.vtp import PolyData, read_vtp, write_polyline_vtp, write_surface_vtp
+from reports.export.vtp import read_surface_vtp, write_polyline_vtp, write_surface_vtp
 
 __all__ = [
-    "PolyData",
-    "read_vtp",
+    "read_surface_vtp",
     "write_markups_curve",
     "write_polyline_vtp",
     "write_segmentation_nrrd",
