@@ -30,7 +30,7 @@ DIAMETERS_MM = {
     "vertebral": (2.8, 0.6),
 }
 SPREAD_LIMIT = 1.0
-"""Diameters are drawn within this many published sd: a vessel far from its mean would be another scene."""
+"""Diameters are normal, cut at this many published sd: a vessel far from its mean would be another scene."""
 
 CENTRELINES = Path(__file__).with_name("willis.csv")
 """Control points of every vessel in its own direction, LPS mm: of the right side (x < 0) where it has two."""
@@ -61,7 +61,9 @@ class WillisPlan:
 def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -> Anatomy:
     """A seeded anatomy; the right carotid is the tube ``right.ICA``, entered from below."""
     plan = plan or WillisPlan()
-    radius = {name: 0.5 * _draw(rng, mean, sd, plan.spread) for name, (mean, sd) in DIAMETERS_MM.items()}
+    mean, sd = np.array(list(DIAMETERS_MM.values())).T
+    drawn = mean + sd * np.clip(rng.normal(0.0, plan.spread, len(mean)), -SPREAD_LIMIT, SPREAD_LIMIT)
+    radius = dict(zip(DIAMETERS_MM, (0.5 * drawn).tolist(), strict=True))
     rows = np.loadtxt(CENTRELINES, dtype=str, delimiter=",", skiprows=1)
     points = {
         name: rows[rows[:, 0] == name, 1:].astype(np.float64) for name in np.unique(rows[:, 0]).tolist()
@@ -85,11 +87,6 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     tubes.append(sweep("basilar", points["basilar"], np.linspace(1.1, 1.0, 5) * radius["basilar"]))
     tubes += _aneurysm(plan, tubes[0], points["ACoA"][1], radius)
     return Anatomy(tuple(t for t in tubes if t.name not in plan.missing))
-
-
-def _draw(rng: np.random.Generator, mean: float, sd: float, spread: float) -> float:
-    """A diameter from a normal distribution, cut at SPREAD_LIMIT."""
-    return mean + sd * float(np.clip(rng.normal(0.0, spread), -SPREAD_LIMIT, SPREAD_LIMIT))
 
 
 def _aneurysm(plan: WillisPlan, carotid: Tube, acoa_mm: Array, radius: dict[str, float]) -> list[Tube]:
