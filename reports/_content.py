@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from reports.case_files import GOOD
-from reports.schema import ERRORS, SUMMARY, Column
+from reports.schema import SUMMARY, Column
 
 Grid = dict[str, Any]
 NOTHING = "–"
@@ -98,11 +97,6 @@ def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
     return [*first, groups] if first else []
 
 
-def frames(errors: pd.DataFrame) -> Grid:
-    """One row per frame; columns without any value are left out."""
-    return grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
-
-
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
     """One row per case, linked to its page."""
     table = grid(summary, SUMMARY.shown("cases"), bad=(summary["frames_failed"] > 0).fillna(value=False))
@@ -124,7 +118,8 @@ def grid(
         {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
         for record, mark in zip(table.to_dict("records"), marks, strict=True)
     ]
-    heads = [{"name": c.name, "meaning": _meaning(c), "text": c.kind == "text"} for c in kept]
+    units = {c.name: f" [{c.unit}]" if c.unit not in ("-", "1") else "" for c in kept}
+    heads = [{"name": c.name, "meaning": c.meaning + units[c.name], "text": c.kind == "text"} for c in kept]
     return {"columns": heads, "rows": rows}
 
 
@@ -137,10 +132,6 @@ def _interval(record: Mapping[Any, Any], column: Column) -> str:
     """The 95 % interval of rms_mm, tip_median_mm, ...: what rms_low_mm, tip_low_mm, ... hold; empty without."""
     low, high = (column.with_word(end).replace("_median_", "_") for end in ("low", "high"))
     return interval(record.get(low), record.get(high))
-
-
-def _meaning(column: Column) -> str:
-    return f"{column.meaning} [{column.unit}]" if column.unit not in ("-", "1") else column.meaning
 
 
 def _text(value: Any) -> str:

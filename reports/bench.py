@@ -21,21 +21,14 @@ TARGETS_MM = (0.1, 0.01)
 
 
 def render_bench(
-    bench_csv: Path,
-    out_dir: Path,
-    stress_csv: Path | None = None,
-    claims_csv: Path | None = None,
-    orders_csv: Path | None = None,
-    *,
-    note: str = "",
-    embed: bool = False,
+    bench_csv: Path, out_dir: Path, *others: Path | None, note: str = "", embed: bool = False
 ) -> Path:
     """Draw the figures and write bench.html into ``out_dir``; returns its path.
 
-    note : what the reader must know of machine and reference. Also writes recommended.csv: the fastest setting of
-    each scene whose shape error is at most 0.1 mm and 0.01 mm.
+    others : as for ``read_bench``.     note : what the reader must know of machine and reference.
+    Also writes recommended.csv: the fastest setting of each scene whose shape error is at most 0.1 mm and 0.01 mm.
     """
-    bench = read_bench(bench_csv, stress_csv, claims_csv, orders_csv)
+    bench = read_bench(bench_csv, *others)
     best = recommended(bench.rows)
     write_csv(out_dir / "recommended.csv", best)
     outcomes = bench.outcomes().astype(int)
@@ -55,20 +48,18 @@ def render_bench(
     return write_page("bench.html.j2", page, out_dir / "bench.html")
 
 
-def read_bench(
-    bench_csv: Path,
-    stress_csv: Path | None = None,
-    claims_csv: Path | None = None,
-    orders_csv: Path | None = None,
-) -> BenchFiles:
-    """Read the rows of a benchmark, marking the Pareto front of each scene, and what else there is of it."""
+def read_bench(bench_csv: Path, *others: Path | None) -> BenchFiles:
+    """Read the rows of a benchmark, marking the Pareto front of each scene, and what else there is of it.
+
+    others : the files of its stress study, claims and orders, in this order, as far as there are any.
+    """
     rows = _numeric(read(bench_csv, BENCH)).assign(on_front=False)
     for _, mine in rows.groupby("scene", sort=False):
         front = pareto_front(mine["shape_error_mm"].to_numpy(), mine["ms_per_mm"].to_numpy())
         rows.loc[mine.index, "on_front"] = front
-    stress = read_if_there(stress_csv, STRESS)
+    stress, claims, orders = map(read_if_there, (*others, None, None, None), (STRESS, CLAIMS, ORDERS))
     stress["count"] = stress["count"].fillna(1).astype(int)
-    return BenchFiles(rows, stress, read_if_there(claims_csv, CLAIMS), read_if_there(orders_csv, ORDERS))
+    return BenchFiles(rows, stress, claims, orders)
 
 
 def pareto_front(

@@ -112,9 +112,13 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
     old, new = ({row["frame"]: row for row in table.to_dict("records")} for table in (before, after))
     for frame in sorted({*old, *new}):
         if frame in old and frame in new:
-            yield frame, *_status(old[frame]["status"], new[frame]["status"])
+            was, now = old[frame]["status"], new[frame]["status"]
+            verdict = "same" if was == now else "better" if now in GOOD else "regression"
+            yield frame, "status", was, now, math.nan, math.nan, verdict
             for name, allowed in tolerance.items():
-                yield frame, *_value(name, old[frame][name], new[frame][name], allowed)
+                pair = (old[frame][name], new[frame][name])
+                a, b = (math.nan if pd.isna(value) else float(value) for value in pair)
+                yield frame, name, a, b, b - a, allowed, _verdict(name, a, b, allowed)
         else:
             yield frame, *_one_sided("frame", frame in old)
 
@@ -123,16 +127,6 @@ def _one_sided(what: str, was_there: bool) -> Row:
     """A case or frame that only one of the runs has: column, before, after, change, allowed, verdict."""
     sides = ("present", "missing") if was_there else ("missing", "present")
     return what, *sides, math.nan, math.nan, "regression" if was_there else "new"
-
-
-def _status(before: object, after: object) -> Row:
-    verdict = "same" if before == after else "better" if after in GOOD else "regression"
-    return "status", before, after, math.nan, math.nan, verdict
-
-
-def _value(name: str, before: Any, after: Any, allowed: float) -> Row:
-    old, new = (math.nan if pd.isna(value) else float(value) for value in (before, after))
-    return name, old, new, new - old, allowed, _verdict(name, old, new, allowed)
 
 
 def _verdict(name: str, old: float, new: float, allowed: float) -> str:

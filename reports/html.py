@@ -13,7 +13,7 @@ from reports._pages import draw_sections, write_page
 from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import RunFiles, declared
 from reports.scene3d import write_scene
-from reports.schema import FAILURES, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, SUMMARY, SWEEP
 from reports.tables import read_if_there
 
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
@@ -28,7 +28,8 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
     case = read_case(case_dir)
     sections = draw_sections("case", case, case_dir, embed)
     scene, scene_note = write_scene(case)
-    result = case.result
+    result, errors = case.result, case.errors
+    frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
         "title": f"{case.name} - wireval",
         "name": case.name,
@@ -40,11 +41,11 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "cards": _content.cards(declared("cards"), case.statistics),
         "points": (case_dir / "points.csv.gz").exists(),
-        "compared": bool(case.errors["rms_mm"].notna().any()),
+        "compared": bool(errors["rms_mm"].notna().any()),
         "scene": scene.name if scene else "",
         "scene_note": scene_note,
         "sections": sections,
-        "frames": _content.frames(case.errors) if len(case.errors) else None,
+        "frames": frames if len(errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
         "physics": list(flatten({k: result.get(k, {}) for k in ("wire", "wall", "entry", "geometry")})),
         "config": settings(result.get("config", {})),

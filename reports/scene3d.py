@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from reports.atomic import write_text
 from reports.case_files import CaseFiles, thinned
-from reports.export import PolyData, read_vtp
+from reports.export import read_surface_vtp
 from reports.figures._style import SIMULATED, TRACED, TRUTH
 
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 MISSING = "No 3D scene: plotly is not installed; `pip install wireval[report3d]` adds it."
 _SCRIPT = "plotly.min.js"
 _MAX_TRIANGLES = 30_000  # about 1 MB of page
@@ -36,7 +38,7 @@ def write_scene(case: CaseFiles) -> tuple[Path | None, str]:
     if not case.frames and not surface.exists():
         return None, ""
     wires = _wires(case, go)
-    lumen = [_lumen(decimate(read_vtp(surface)), go)] if surface.exists() else []
+    lumen = [_lumen(*decimate(*read_surface_vtp(surface)), go)] if surface.exists() else []
     traces = [*lumen, *(line for lines in wires.values() for line in lines)]
     figure = go.Figure(traces, _layout({frame: len(lines) for frame, lines in wires.items()}, len(lumen)))
     # the run's folder where the case lies in one (OUT/cases/ID), else the case's own
@@ -51,21 +53,21 @@ def write_scene(case: CaseFiles) -> tuple[Path | None, str]:
     return path, ""
 
 
-def decimate(surface: PolyData, max_triangles: int = _MAX_TRIANGLES) -> PolyData:
-    """Merge vertices on ever coarser lattices until few enough triangles are left. For looking, not measuring."""
-    vertices, triangles = surface.points_mm, surface.triangles
+def decimate(points_mm: Array, corners: Index, max_triangles: int = _MAX_TRIANGLES) -> tuple[Array, Index]:
+    """Merge vertices (n, 3) of triangles (t, 3) on ever coarser lattices until few enough are left; for looking."""
+    vertices, triangles = points_mm, corners
     size = float(np.ptp(vertices, axis=0).max()) / 400 if len(vertices) else 1.0
     while len(triangles) > max_triangles:
-        keys = np.floor(surface.points_mm / size).astype(np.int64)
+        keys = np.floor(points_mm / size).astype(np.int64)
         _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
         vertices = np.zeros((len(counts), 3))
-        np.add.at(vertices, inverse.ravel(), surface.points_mm)
+        np.add.at(vertices, inverse.ravel(), points_mm)
         vertices /= counts[:, None]
-        corners = inverse.ravel()[surface.triangles]
-        a, b, c = corners.T
-        triangles = corners[(a != b) & (b != c) & (c != a)].astype(np.int64)
+        merged = inverse.ravel()[corners]
+        a, b, c = merged.T
+        triangles = merged[(a != b) & (b != c) & (c != a)].astype(np.int64)
         size *= 1.25
-    return PolyData(vertices, triangles=triangles)
+    return vertices, triangles
 
 
 def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
@@ -82,15 +84,15 @@ def _wires(case: CaseFiles, go: Any) -> dict[int, list[Any]]:
     return wires
 
 
-def _line(points: NDArray[np.float64], name: str, go: Any) -> Any:
+def _line(points: Array, name: str, go: Any) -> Any:
     x, y, z = np.round(points, 3).T
     style = {"color": _COLOURS[name], "width": 6 if name != "true" else 3}
     return go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line=style, visible=False)
 
 
-def _lumen(surface: PolyData, go: Any) -> Any:
-    x, y, z = np.round(surface.points_mm, 3).T
-    i, j, k = surface.triangles.T
+def _lumen(vertices: Array, triangles: Index, go: Any) -> Any:
+    x, y, z = np.round(vertices, 3).T
+    i, j, k = triangles.T
     return go.Mesh3d(
         x=x, y=y, z=z, i=i, j=j, k=k, color="#9AA5B1", opacity=0.25, name="lumen", hoverinfo="skip"
     )

@@ -36,8 +36,11 @@ def read_tree(path: str | Path) -> Tree:
     if path.name.endswith(".swc"):
         return _read_swc(path)
     if path.name.endswith(".mrk.json"):
-        others = sorted(p for p in path.parent.glob("*.mrk.json") if p != path)
-        return _joined([_read_curve(path), *(_read_curve(p) for p in others)])
+        curves = [_read_curve(p) for p in (path, *sorted(set(path.parent.glob("*.mrk.json")) - {path}))]
+        points, radii = (np.concatenate(parts) for parts in zip(*curves, strict=True))
+        ends = np.cumsum([len(own) for own, _ in curves])
+        starts = np.setdiff1d(np.arange(ends[-1]), ends - 1)  # of the edges: a curve's last point begins none
+        return Tree(points, radii, np.column_stack([starts, starts + 1]), slice(0, int(ends[0])))
     msg = f"anatomy: {path}: got {path.suffix!r}; allowed: .swc, .mrk.json (with a Radius measurement); convert it"
     raise ValueError(msg)
 
@@ -54,24 +57,18 @@ def _read_swc(path: Path) -> Tree:
         [(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64
     )
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-    # coincident points are one point: an edge of no length has no direction
-    keep = length <= LONGEST_EDGE_MM
-    return _without_repeats(points, radii, edges[keep])
-
-
-def _without_repeats(points: Array, radii: Array, edges: Index) -> Tree:
-    """Merge points that coincide (BraVa repeats branch points), keeping the larger radius."""
+    # points that coincide (BraVa repeats branch points) are one, of the larger radius: an edge between them has no way
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
     inverse = inverse.ravel()
     radius = np.zeros(len(unique))
     np.maximum.at(radius, inverse, radii)
-    merged = np.sort(inverse[edges], axis=1)
+    merged = np.sort(inverse[edges[length <= LONGEST_EDGE_MM]], axis=1)
     merged = np.unique(merged[merged[:, 0] != merged[:, 1]], axis=0)
     return Tree(unique, radius, merged)
 
 
-def _read_curve(path: Path) -> Tree:
-    """One Slicer curve; RAS coordinates are turned into LPS."""
+def _read_curve(path: Path) -> tuple[Array, Array]:
+    """Points (n, 3) and radii (n,) of one Slicer curve; RAS coordinates are turned into LPS."""
     markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
     points = np.array([p["position"] for p in markup["controlPoints"]], dtype=np.float64)
     if markup.get("coordinateSystem", "LPS") in ("RAS", 0):
@@ -82,15 +79,4 @@ def _read_curve(path: Path) -> Tree:
     if radii is None or len(radii) != len(points):
         msg = f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
         raise ValueError(msg)
-    chain = np.column_stack([np.arange(len(points) - 1), np.arange(1, len(points))])
-    return Tree(points, np.array(radii, dtype=np.float64), chain)
-
-
-def _joined(trees: list[Tree]) -> Tree:
-    starts = np.cumsum([0, *(len(t.points_mm) for t in trees)])
-    return Tree(
-        np.concatenate([t.points_mm for t in trees]),
-        np.concatenate([t.radii_mm for t in trees]),
-        np.concatenate([t.edges + s for t, s in zip(trees, starts[:-1], strict=True)]),
-        slice(0, len(trees[0].points_mm)),
-    )
+    return points, np.array(radii, dtype=np.float64)

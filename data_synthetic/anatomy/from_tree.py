@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
@@ -88,7 +87,10 @@ def _widest_path(tree: Tree) -> Index:
         root = ends[np.argmax(tree.radii_mm[ends])]
         before = dijkstra(graph, directed=False, indices=root, return_predecessors=True)[1]
         for end in ends:
-            path = _usable(tree, _walk(before, int(root), int(end)))
+            walk = [int(end)]
+            while walk[-1] != root:
+                walk.append(int(before[walk[-1]]))
+            path = _usable(tree, np.array(walk[::-1], dtype=np.int64))
             if len(path) > 3:
                 score = min(_length(tree, path), LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
                 best = max(best, (score, path), key=lambda found: found[0])
@@ -96,14 +98,6 @@ def _widest_path(tree: Tree) -> Index:
         msg = f"anatomy: got no path with radii from {WIDEST_MM} down to {NARROWEST_MM} mm; check the file's units (mm)"
         raise ValueError(msg)
     return best[1]
-
-
-def _walk(before: NDArray[np.int32], root: int, end: int) -> Index:
-    """The shortest path from root to end; ``before`` holds each point's predecessor on the way from the root."""
-    path = [end]
-    while path[-1] != root:
-        path.append(int(before[path[-1]]))
-    return np.array(path[::-1], dtype=np.int64)
 
 
 def _usable(tree: Tree, path: Index) -> Index:

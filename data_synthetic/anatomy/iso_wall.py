@@ -50,29 +50,17 @@ def iso_wall(values: Volume, grid: ScanGrid, threshold: float) -> IsoWall:
     # linear interpolation at half voxels
     inside = zoom(smooth, [(2 * n - 1) / n for n in smooth.shape], order=1) > threshold
     fine = ScanGrid(inside.shape, 0.5 * grid.spacing_mm, grid.origin_mm, grid.direction)
-    distance = np.full(fine.shape, BAND_MM)
-    near, places = _near_surface(triangles, fine)
-    distance[tuple(near.T)] = np.minimum(_to_triangles(places, triangles), BAND_MM)
-    return IsoWall(fine, spline_filter(np.where(inside, -distance, distance), order=3, mode="mirror"))
-
-
-def _near_surface(triangles: Array, fine: ScanGrid) -> tuple[Index, Array]:
-    """Nodes (n, 3) within the band of the surface, and their places in the grid's own mm (no origin, no turn)."""
     centres = triangles.mean(axis=1)
     # one ball per cell of half the band is enough to cover the band
     _, first = np.unique((centres / (0.5 * BAND_MM)).astype(np.int64), axis=0, return_index=True)
     near = voxels_near(centres[first] / fine.spacing_mm, np.full(len(first), 1.9 * BAND_MM), fine)
-    return near, near * fine.spacing_mm
-
-
-def _to_triangles(points: Array, triangles: Array) -> Array:
-    """Distance (n,) of points (n, 3) to the nearest of triangles (m, 3, 3)."""
-    candidates = np.asarray(
-        cKDTree(triangles.mean(axis=1)).query(points, k=NEAREST_TRIANGLES)[1], dtype=np.int64
-    )
-    out = np.empty(len(points))
-    triangle_distance(points, triangles, candidates, out)
-    return out
+    places = near * fine.spacing_mm  # in the grid's own mm: no origin, no turn
+    candidates = np.asarray(cKDTree(centres).query(places, k=NEAREST_TRIANGLES)[1], dtype=np.int64)
+    apart = np.empty(len(places))
+    triangle_distance(places, triangles, candidates, apart)
+    distance = np.full(fine.shape, BAND_MM)
+    distance[tuple(near.T)] = np.minimum(apart, BAND_MM)
+    return IsoWall(fine, spline_filter(np.where(inside, -distance, distance), order=3, mode="mirror"))
 
 
 @on_disk()

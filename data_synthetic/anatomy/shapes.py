@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry.vectors import Array, ends_of
 
 INLET_MM = 12.0
 """Straight vessel below the origin, so that the entry lies well inside it."""
@@ -21,15 +21,13 @@ def straight(length_mm: float = 40.0, radius_mm: float = 2.0) -> Anatomy:
     return Anatomy((sweep("vessel", points, radius_mm),))
 
 
-def bend(
-    angle_deg: float = 90.0, turn_mm: float = 12.0, radius_mm: float = 2.0, outlet_mm: float = 18.0
-) -> Anatomy:
+def bend(angle_deg: float = 90.0, turn_mm: float = 12.0, radius_mm: float = 2.0) -> Anatomy:
     """A bend towards +x by ``angle_deg`` on a circle of radius ``turn_mm``, then straight on."""
     angle = np.radians(np.linspace(0.0, angle_deg, max(8, int(angle_deg / 6))))
     zero = np.zeros_like(angle)
     arc = np.column_stack([turn_mm * (1 - np.cos(angle)), zero, turn_mm * np.sin(angle)])
     out = np.array([np.sin(angle[-1]), 0.0, np.cos(angle[-1])])
-    tail = arc[-1] + np.linspace(1.0, outlet_mm, 12)[:, None] * out
+    tail = arc[-1] + np.linspace(1.0, 18.0, 12)[:, None] * out
     return Anatomy((sweep("vessel", np.concatenate([_inlet(), arc, tail]), radius_mm),))
 
 
@@ -43,29 +41,24 @@ def s_curve(turn_mm: float = 10.0, angle_deg: float = 70.0, radius_mm: float = 2
     return Anatomy((sweep("vessel", np.concatenate([_inlet(), first, second, tail]), radius_mm),))
 
 
-def helix(
-    turn_mm: float = 8.0, pitch_mm: float = 24.0, turns: float = 1.25, radius_mm: float = 1.8
-) -> Anatomy:
-    """A helix about an axis along z, entered along its own tangent."""
+def helix() -> Anatomy:
+    """A helix about an axis along z, entered along its own tangent: 1.25 turns of 8 mm radius, 24 mm apart."""
+    turn_mm, turns, rise = 8.0, 1.25, 24.0 / (2.0 * np.pi)
     angle = np.linspace(0.0, 2.0 * np.pi * turns, int(24 * turns))
-    rise = pitch_mm / (2.0 * np.pi)
     curve = np.column_stack([turn_mm * (1 - np.cos(angle)), turn_mm * np.sin(angle), rise * angle])
     tangent = np.array([0.0, turn_mm, rise]) / np.hypot(turn_mm, rise)
     inlet = np.linspace(-INLET_MM, -1.0, 9)[:, None] * tangent
-    return Anatomy((sweep("vessel", np.concatenate([inlet, curve]), radius_mm),))
+    return Anatomy((sweep("vessel", np.concatenate([inlet, curve]), 1.8),))
 
 
-def bifurcation(
-    angle_deg: float = 35.0, radius_mm: float = 2.2, branch_mm: float = 1.6, length_mm: float = 28.0
-) -> Anatomy:
+def bifurcation(angle_deg: float = 35.0, branch_mm: float = 1.6) -> Anatomy:
     """A Y in the x-z plane: the trunk ends at the origin, branches ``right`` and ``left`` leave towards +x and -x."""
-    angle = np.radians(angle_deg)
-    steps = np.linspace(0.0, length_mm, 14)
+    radius_mm, angle, steps = 2.2, np.radians(angle_deg), np.linspace(0.0, 28.0, 14)
     tubes = [sweep("trunk", np.concatenate([_inlet(), [[0.0, 0.0, 0.0]]]), radius_mm)]
+    bent = angle * np.clip(steps / 8.0, 0.0, 1.0)
+    middle = 0.5 * (bent[1:] + bent[:-1])
+    x, z = (ends_of(np.diff(steps) * part) for part in (np.sin(middle), np.cos(middle)))
     for name, side in (("right", 1.0), ("left", -1.0)):
-        bent = angle * np.clip(steps / 8.0, 0.0, 1.0)
-        x = np.concatenate([[0.0], np.cumsum(np.diff(steps) * np.sin(0.5 * (bent[1:] + bent[:-1])))])
-        z = np.concatenate([[0.0], np.cumsum(np.diff(steps) * np.cos(0.5 * (bent[1:] + bent[:-1])))])
         points = np.concatenate([[[0.0, 0.0, -2.0]], np.column_stack([side * x, 0 * x, z])])
         tubes.append(sweep(name, points, np.r_[radius_mm * 0.9, np.full(len(x), branch_mm)]))
     return Anatomy(tuple(tubes))
@@ -73,13 +66,8 @@ def bifurcation(
 
 def stenosed(radius_mm: float = 2.0, left: float = 0.3, at_mm: float = 8.0) -> Anatomy:
     """A gently bent tube whose radius falls to ``left`` of itself over a few mm."""
-    z = np.concatenate(
-        [
-            np.linspace(-INLET_MM, at_mm - 5.0, 10),
-            at_mm + np.array([-3.0, 0.0, 3.0]),
-            np.linspace(at_mm + 5.0, 34.0, 12),
-        ]
-    )
+    before, behind = np.linspace(-INLET_MM, at_mm - 5.0, 10), np.linspace(at_mm + 5.0, 34.0, 12)
+    z = np.concatenate([before, at_mm + np.array([-3.0, 0.0, 3.0]), behind])
     x = np.where(z > 0, 0.006 * np.maximum(z, 0.0) ** 2, 0.0)
     radii = np.where(np.abs(z - at_mm) < 0.1, left * radius_mm, radius_mm)
     return Anatomy((sweep("vessel", np.column_stack([x, 0 * x, z]), radii),))
@@ -110,9 +98,5 @@ def kissing(radius_mm: float = 1.8, wall_mm: float = 0.15) -> Anatomy:
     half = radius_mm + 0.5 * wall_mm
     vessels = [np.column_stack([side * (half + away), 0 * z, z]) for side in (1.0, -1.0)]
     # a blend width of next to nothing: a shared wall, not a junction
-    return Anatomy(
-        tuple(
-            sweep(n, v, radius_mm, blend_mm=1e-3)
-            for n, v in zip(("vessel", "neighbour"), vessels, strict=True)
-        )
-    )
+    named = zip(("vessel", "neighbour"), vessels, strict=True)
+    return Anatomy(tuple(sweep(name, points, radius_mm, blend_mm=1e-3) for name, points in named))

@@ -9,8 +9,6 @@ P1 2.14 (length 5), P2 2.10, basilar length 29. Where no spread is given, 15 % i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import groupby
-from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +30,7 @@ DIAMETERS_MM = {
     "vertebral": (2.8, 0.6),
 }
 SPREAD_LIMIT = 1.0
-"""Diameters are drawn within this many published sd: a vessel far from its mean would be another scene."""
+"""Diameters are normal, cut at this many published sd: a vessel far from its mean would be another scene."""
 
 CENTRELINES = Path(__file__).with_name("willis.csv")
 """Control points of every vessel in its own direction, LPS mm: of the right side (x < 0) where it has two."""
@@ -63,8 +61,13 @@ class WillisPlan:
 def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -> Anatomy:
     """A seeded anatomy; the right carotid is the tube ``right.ICA``, entered from below."""
     plan = plan or WillisPlan()
-    radius = {name: 0.5 * _draw(rng, mean, sd, plan.spread) for name, (mean, sd) in DIAMETERS_MM.items()}
-    points = _control_points()
+    mean, sd = np.array(list(DIAMETERS_MM.values())).T
+    drawn = mean + sd * np.clip(rng.normal(0.0, plan.spread, len(mean)), -SPREAD_LIMIT, SPREAD_LIMIT)
+    radius = dict(zip(DIAMETERS_MM, (0.5 * drawn).tolist(), strict=True))
+    rows = np.loadtxt(CENTRELINES, dtype=str, delimiter=",", skiprows=1)
+    points = {
+        name: rows[rows[:, 0] == name, 1:].astype(np.float64) for name in np.unique(rows[:, 0]).tolist()
+    }
     if plan.tortuous_vertebrals:
         points["vertebral"] += SWING_MM
     wide, end = radius["cavernous"], radius["terminus"]
@@ -84,20 +87,6 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     tubes.append(sweep("basilar", points["basilar"], np.linspace(1.1, 1.0, 5) * radius["basilar"]))
     tubes += _aneurysm(plan, tubes[0], points["ACoA"][1], radius)
     return Anatomy(tuple(t for t in tubes if t.name not in plan.missing))
-
-
-def _control_points() -> dict[str, Array]:
-    """Points (n, 3) of every vessel."""
-    rows = [line.split(",") for line in CENTRELINES.read_text(encoding="utf-8").splitlines()[1:]]
-    return {
-        name: np.array([row[1:] for row in vessel], dtype=np.float64)
-        for name, vessel in groupby(rows, key=itemgetter(0))
-    }
-
-
-def _draw(rng: np.random.Generator, mean: float, sd: float, spread: float) -> float:
-    """A diameter from a normal distribution, cut at SPREAD_LIMIT."""
-    return mean + sd * float(np.clip(rng.normal(0.0, spread), -SPREAD_LIMIT, SPREAD_LIMIT))
 
 
 def _aneurysm(plan: WillisPlan, carotid: Tube, acoa_mm: Array, radius: dict[str, float]) -> list[Tube]:

@@ -5,9 +5,6 @@ A new scene is one function in ``plain``, ``hard`` or ``willis``, below the deco
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 from data_synthetic.catalogue import hard, plain, willis
 from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.own_anatomy import from_anatomy
@@ -17,7 +14,7 @@ from data_synthetic.catalogue.study import Study, make_study
 from data_synthetic.scanner import PsfScanner
 from data_synthetic.scanner.conebeam import ConeBeamScanner
 
-__all__ = ["Wanted", "background_scene", "build", "describe", "from_anatomy", "from_background", "names"]
+__all__ = ["Wanted", "background_scene", "build", "describe", "from_anatomy", "names"]
 
 SCANNERS: dict[str, ScannerFactory] = {"psf": PsfScanner.of, "conebeam": ConeBeamScanner.of}
 """What turns a phantom into grey values: the ideal scanner, and 3D rotational X-ray (needs the extra [conebeam])."""
@@ -41,11 +38,6 @@ def describe(name: str) -> NamedScene:
         msg = f"synthetic scene: got {name!r}; allowed: {', '.join(_BY_NAME)}; choose one of these"
         raise KeyError(msg)
     return _BY_NAME[name]
-
-
-def from_background(path: str | Path, *, voxel_mm: float | None = None, **wanted: Any) -> Study:
-    """A study in the real voxels of a scan; ``wanted``: frames, seed, truth_step_mm."""
-    return build(background_scene(path, voxel_mm), **wanted)
 
 
 def build(

@@ -103,8 +103,8 @@ def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient
     k = cross(e, f)
     k = (2.0 * k[0] / chi, 2.0 * k[1] / chi, 2.0 * k[2] / chi)
     c, d = cross(e, a), cross(f, b)
-    k1 = 0.5 * dot(k, plus(c, d))
-    k2 = -0.5 * dot(k, plus(a, b))
+    ab, cd = plus(a, b), plus(c, d)
+    k1, k2 = 0.5 * dot(k, cd), -0.5 * dot(k, ab)
     u = transport(a, e, f)
     w = cross(u, b)
     tau = np.arctan2(dot(w, f), dot(u, b))
@@ -114,7 +114,6 @@ def vertex(q: Array, v: int, shape: Shape, rod: Elastic, g: Array, want_gradient
         return energy
     p1, p2, pt = bend * (k1 - rest), bend * k2, twist * tau
     # p1 * director 2 - p2 * director 1 gathers both curvatures into one vector
-    ab, cd = plus(a, b), plus(c, d)
     both = (
         p1 * (cd[0] / chi) - p2 * (ab[0] / chi),
         p1 * (cd[1] / chi) - p2 * (ab[1] / chi),
@@ -217,22 +216,14 @@ def set_edge(tangents: Array, directors: Array, j: int, t: Vector, a: Vector) ->
 
 
 @on_disk()
-def update_directors(
-    points: Array, angles: Array, introducer: Array, tangents: Array, directors: Array
-) -> None:
-    """Tangents and directors (n + 1, 3) after a move of the nodes and a turn of the edges, in place."""
+def carry(points: Array, angles: Array, tangents: Array, directors: Array, along: bool) -> None:
+    """Tangents and directors (n + 1, 3) of moved nodes, in place; edge 0, the introducer, stays.
+
+    Each edge's are its own, turned by angles (n,), or, ``along`` the wire, without twist those of the edge before it.
+    """
     q = np.zeros(8)
     for v in range(len(angles)):
-        load_vertex(points, angles, introducer, v, q)
-        _, t, a = moved_edge(q, 4, row(tangents, v + 1), row(directors, v + 1))
-        set_edge(tangents, directors, v + 1, t, a)
-
-
-@on_disk()
-def twist_free(points: Array, tangents: Array, directors: Array) -> None:
-    """Tangents and directors of every edge carried without twist from edge 0, in place."""
-    q, angles = np.zeros(8), np.zeros(len(points) - 1)
-    for v in range(len(angles)):
         load_vertex(points, angles, tangents[0], v, q)
-        _, t, a = moved_edge(q, 4, row(tangents, v), row(directors, v))
+        old = v if along else v + 1
+        _, t, a = moved_edge(q, 4, row(tangents, old), row(directors, old))
         set_edge(tangents, directors, v + 1, t, a)

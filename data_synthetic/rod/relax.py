@@ -108,7 +108,7 @@ def _line_search(
         trial = _energy(rod, shape, points, angles)
         if trial <= energy + 1e-4 * share * slope + noise:
             tangents, directors = shape.tangents.copy(), shape.directors.copy()
-            kernels.update_directors(points, angles, rod.elastic.introducer, tangents, directors)
+            kernels.carry(points, angles, tangents, directors, False)
             return Shape(points, tangents, directors), trial, share
         share *= 0.5
     return None

@@ -79,7 +79,9 @@ def replay(
     depths = [float(d) for d in depths_mm]
     rolls = np.broadcast_to(np.array(roll_deg, dtype=np.float64), len(depths)).tolist()
     depth, roll = min((TIP_EDGES + 2) * insertion.step_mm, depths[0]), rolls[0]
-    state = _begin(insertion, depth, roll)
+    rod = _rod(insertion, depth, roll)
+    straight = insertion.entry_mm + ends_of(rod.lengths)[:, None] * rod.elastic.introducer
+    state = relax(rod, shape_from_points(rod, straight), REPLAY_FORCE_N)
     for target, target_roll in zip(depths, rolls, strict=True):
         jump, effort = 0.0, 0
         for depth_next, roll_next in _advances(insertion, (depth, target), (roll, target_roll)):
@@ -102,13 +104,6 @@ def replay(
             jump_mm=jump,
             iterations=effort + state.iterations,
         )
-
-
-def _begin(insertion: TrueInsertion, depth: float, roll: float) -> Equilibrium:
-    """The first few edges, straight, relaxed."""
-    rod = _rod(insertion, depth, roll)
-    points = insertion.entry_mm + ends_of(rod.lengths)[:, None] * rod.elastic.introducer
-    return relax(rod, shape_from_points(rod, points), REPLAY_FORCE_N)
 
 
 def _advances(

@@ -9,7 +9,7 @@ import numpy as np
 from data_synthetic.anatomy.iso_wall import IsoWall
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry.vectors import Array, ends_of
-from data_synthetic.rod._kernels import Elastic, Shape, twist_free
+from data_synthetic.rod._kernels import Elastic, Shape, carry
 from data_synthetic.rod.sliders import Sliders
 from data_synthetic.rod.wire import RIGID_TORSION_N_MM2, TrueWire, cell_means
 
@@ -72,5 +72,5 @@ def shape_from_points(rod: Rod, points: Array) -> Shape:
     points = np.ascontiguousarray(points)
     tangents, directors = np.empty_like(points), np.empty_like(points)
     tangents[0], directors[0] = rod.elastic.introducer, rod.director
-    twist_free(points, tangents, directors)
+    carry(points, np.zeros(len(points) - 1), tangents, directors, True)
     return Shape(points, tangents, directors)

@@ -29,17 +29,13 @@ def wire_particles(points_mm: Array, radius_mm: float, step_mm: float) -> tuple[
     first = np.cross(tangent, seed)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(tangent, first)
-    disc = _disc(radius_mm)
-    filled = centre[:, None] + disc[None, :, :1] * first[:, None] + disc[None, :, 1:] * second[:, None]
-    volume = np.pi * radius_mm**2 * arc[-1] / (count * len(disc))
-    return filled.reshape(-1, 3), float(volume)
-
-
-def _disc(radius_mm: float) -> Array:
-    """Points (n, 2) of equal area over a disc."""
-    ring = radius_mm * np.sqrt((np.arange(RINGS) + 0.5) / RINGS)
+    # the cross-section: rings of equal area, every other one turned by half a point
+    ring = radius_mm * np.sqrt((np.arange(RINGS)[:, None] + 0.5) / RINGS)
     angle = 2.0 * np.pi * (np.arange(RING_POINTS)[None] + 0.5 * (np.arange(RINGS)[:, None] % 2)) / RING_POINTS
-    return np.column_stack([(ring[:, None] * np.cos(angle)).ravel(), (ring[:, None] * np.sin(angle)).ravel()])
+    x, y = (ring * np.cos(angle)).reshape(-1, 1), (ring * np.sin(angle)).reshape(-1, 1)
+    filled = centre[:, None] + x * first[:, None] + y * second[:, None]
+    volume = np.pi * radius_mm**2 * arc[-1] / (count * len(x))
+    return filled.reshape(-1, 3), float(volume)
 
 
 @on_disk()

@@ -65,17 +65,12 @@ class PsfScanner:
         white = rng.standard_normal(self.grid.shape, dtype=np.float32)
         correlation = self.greys.correlation_voxels
         gaussian_filter(white, correlation, truncate=CUT, mode="wrap", output=white)
-        white *= np.float32(sd / _kernel_norm(correlation))
+        # what is left of the sd: the root of the sum of squares of the three-dimensional kernel
+        kernel = gaussian_filter(np.eye(1, 64, 32)[0], correlation, truncate=CUT)
+        white *= np.float32(sd / float(np.sum(kernel**2) ** 1.5))
         return white
 
 
 def _psf_voxels(grid: ScanGrid, greys: Greys) -> Array:
     """sd of the point spread along each axis, voxels: isotropic in mm."""
     return np.asarray(greys.psf_voxels * grid.voxel_mm / grid.spacing_mm)
-
-
-def _kernel_norm(sigma: float) -> float:
-    """Root of the sum of squares of the three-dimensional smoothing kernel."""
-    impulse = np.zeros(64)
-    impulse[32] = 1.0
-    return float(np.sum(gaussian_filter(impulse, sigma, truncate=CUT) ** 2) ** 1.5)

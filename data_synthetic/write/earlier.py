@@ -44,11 +44,8 @@ def in_the_way(folder: Path, format: str, frames: int) -> list[str]:
     names = volume_names(format, frames)
     there = {*folder.glob(f"frames/*.{format}"), *(p for name in names for p in folder.glob(f"{name}/*"))}
     strange = sorted(there - ours - {folder / name for name in names})
-    return (
-        [f"{strange[0]}: would be read as a part of the study; remove it or give another folder"]
-        if strange
-        else []
-    )
+    what = "would be read as a part of the study; remove it or give another folder"
+    return [f"{path}: {what}" for path in strange[:1]]
 
 
 def remove_earlier(folder: Path) -> None:

@@ -101,6 +101,5 @@ def _write_data_set(path: Path, name: str, scan: NDArray[np.int16], grid: ScanGr
     with h5py.File(path, "a") as file:
         data = file.create_dataset(name, data=scan)
         data.attrs["axes"] = "x,y,z"
-        data.attrs["spacing_mm"] = grid.spacing_mm
-        data.attrs["origin_mm"] = grid.origin_mm
-        data.attrs["direction"] = grid.direction
+        for geometry in ("spacing_mm", "origin_mm", "direction"):
+            data.attrs[geometry] = getattr(grid, geometry)

@@ -37,8 +37,7 @@ def machine() -> str:
 def write_page(out: Path) -> Path:
     """Join what lies in the folder into bench.csv and render it."""
     parts = [pd.read_csv(out / name) for name in (SOLVER_CSV, PEERS_CSV) if (out / name).exists()]
-    empty = pd.DataFrame(columns=list(BENCH.names))
-    table = pd.concat(parts, ignore_index=True) if parts else empty
+    table = pd.concat(parts or [pd.DataFrame(columns=list(BENCH.names))], ignore_index=True)
     table.to_csv(out / BENCH_CSV, index=False)
     others = [out / name if (out / name).exists() else None for name in (STRESS_CSV, CLAIMS_CSV, ORDERS_CSV)]
     return render_bench(out / BENCH_CSV, out, *others, note=f"Machine: {machine()}. {NOTE}")

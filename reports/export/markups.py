@@ -46,20 +46,6 @@ def write_markups_curve(
     write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
 
 
-def read_markups_curve(path: Path) -> Array:
-    """Points (n, 3) in LPS mm of the first curve of a file; RAS is turned. ValueError for another markup."""
-    markup = json.loads(path.read_text(encoding="utf-8"))["markups"][0]
-    units = markup.get("coordinateUnits", "mm")
-    if markup["type"] not in ("Curve", "ClosedCurve") or units not in ("mm", ["mm", "UCUM", "millimeter"]):
-        msg = f"{path}: got a {markup['type']!r} in {units!r}; only a curve in mm can be read"
-        raise ValueError(msg)
-    kept = [p["position"] for p in markup["controlPoints"] if p.get("positionStatus", "defined") == "defined"]
-    points = np.array(kept, dtype=np.float64).reshape(-1, 3)
-    # older writers say "0" for RAS, which is LPS with the first two axes reversed
-    reversed_axes = str(markup.get("coordinateSystem", "LPS")) in ("RAS", "0")
-    return np.asarray(points * (-1.0, -1.0, 1.0)) if reversed_axes else points
-
-
 def checked_points(points_mm: ArrayLike, path: Path) -> Array:
     """Points as a float64 array (n, 3); raises ValueError for another shape or a value that is not finite."""
     points = np.asarray(points_mm, dtype=np.float64)

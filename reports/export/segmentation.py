@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from reports.atomic import replacing
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Labels:
-    """A label map indexed x, y, z with its geometry in LPS mm; ``segments`` names the labels 1, 2, ..."""
-
-    values: NDArray[Any]
-    spacing_mm: Array
-    origin_mm: Array
-    direction: Array
-    segments: tuple[str, ...]
-
 
 def write_segmentation_nrrd(
     path: Path,
@@ -34,7 +20,6 @@ def write_segmentation_nrrd(
     origin_mm: ArrayLike,
     direction: ArrayLike,
     segments: Sequence[str] = ("lumen",),
-    colours: Sequence[tuple[float, float, float]] = ((0.835, 0.369, 0.0),),
 ) -> None:
     """Write a label map (nx, ny, nz), label k being ``segments[k - 1]``, compressed.
 
@@ -49,25 +34,13 @@ def write_segmentation_nrrd(
     image.SetSpacing(np.asarray(spacing_mm, dtype=np.float64).tolist())
     image.SetOrigin(np.asarray(origin_mm, dtype=np.float64).tolist())
     image.SetDirection(np.asarray(direction, dtype=np.float64).ravel().tolist())
-    for key, text in _metadata(values.shape, segments, colours).items():
+    for key, text in _metadata(values.shape, segments).items():
         image.SetMetaData(key, text)
     with replacing(path) as temporary:
         sitk.WriteImage(image, str(temporary), useCompression=True)
 
 
-def read_segmentation_nrrd(path: Path) -> Labels:
-    """Read back a segmentation, indexed x, y, z."""
-    image: Any = sitk.ReadImage(str(path))
-    keys = sorted(k for k in image.GetMetaDataKeys() if k.startswith("Segment") and k.endswith("_Name"))
-    values = sitk.GetArrayFromImage(image).T
-    spacing, origin = np.array(image.GetSpacing()), np.array(image.GetOrigin())
-    direction = np.array(image.GetDirection()).reshape(3, 3)
-    return Labels(values, spacing, origin, direction, tuple(image.GetMetaData(k) for k in keys))
-
-
-def _metadata(
-    shape: tuple[int, ...], segments: Sequence[str], colours: Sequence[tuple[float, float, float]]
-) -> dict[str, str]:
+def _metadata(shape: tuple[int, ...], segments: Sequence[str]) -> dict[str, str]:
     extent = " ".join(f"0 {n - 1}" for n in shape)
     common = {
         "Segmentation_MasterRepresentation": "Binary labelmap",  # read by Slicer 4.11 to 5.0
@@ -76,13 +49,12 @@ def _metadata(
         "Segmentation_ReferenceImageExtentOffset": "0 0 0",
     }
     for i, name in enumerate(segments):
-        colour = colours[i % len(colours)]
         common |= {
             f"Segment{i}_ID": name.replace(" ", "_"),
             f"Segment{i}_Name": name,
             f"Segment{i}_LabelValue": str(i + 1),
             f"Segment{i}_Layer": "0",
-            f"Segment{i}_Color": " ".join(f"{c:.4f}" for c in colour),
+            f"Segment{i}_Color": "0.8350 0.3690 0.0000",
             f"Segment{i}_Extent": extent,
         }
     return common

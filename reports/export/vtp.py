@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,20 +24,6 @@ _TYPES = {"Float64": "<f8", "Int64": "<i8"}
 _LENGTH_BYTES = 8  # header_type UInt64
 
 
-@dataclass(frozen=True, eq=False)
-class PolyData:
-    """What a .vtp holds.
-
-    points_mm : (n, 3) LPS mm.     lines : one index array each.     triangles : (t, 3) indices.
-    point_arrays : name -> (n,) or (n, 3).
-    """
-
-    points_mm: Array
-    lines: tuple[Index, ...] = ()
-    triangles: Index = field(default_factory=lambda: np.zeros((0, 3), np.int64))
-    point_arrays: Mapping[str, Array] = field(default_factory=dict)
-
-
 def write_polyline_vtp(
     path: Path, points_mm: ArrayLike, point_arrays: Mapping[str, ArrayLike] | None = None
 ) -> None:
@@ -48,12 +33,7 @@ def write_polyline_vtp(
     _write(path, points, "Lines", (np.arange(len(points)), offsets), point_arrays or {})
 
 
-def write_surface_vtp(
-    path: Path,
-    vertices_mm: ArrayLike,
-    triangles: ArrayLike,
-    point_arrays: Mapping[str, ArrayLike] | None = None,
-) -> None:
+def write_surface_vtp(path: Path, vertices_mm: ArrayLike, triangles: ArrayLike) -> None:
     """Write a triangle surface: vertices (n, 3) in LPS mm, triangles (t, 3) of vertex indices."""
     vertices = checked_points(vertices_mm, path)
     faces = np.asarray(triangles, dtype=np.int64)
@@ -61,21 +41,29 @@ def write_surface_vtp(
     if faces.ndim != 2 or faces.shape[1] != 3 or not inside:
         msg = f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices"
         raise ValueError(msg)
-    _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), point_arrays or {})
+    _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), {})
 
 
-def read_vtp(path: Path) -> PolyData:
-    """Read back a .vtp as written here; raises ValueError for the ASCII, compressed and appended forms."""
+def read_surface_vtp(path: Path) -> tuple[Array, Index]:
+    """Vertices (n, 3) and triangles (t, 3) as written here; ValueError for ASCII, compressed and appended forms."""
     root = ET.parse(path).getroot()
-    piece = root.find("./PolyData/Piece")
+    places = root.find("./PolyData/Piece/Points/DataArray")
+    corners = root.find("./PolyData/Piece/Polys/DataArray[@Name='connectivity']")
     inline = all(a.get("format") == "binary" for a in root.iter("DataArray"))
-    if piece is None or not inline or root.get("header_type") != "UInt64" or root.get("compressor"):
+    if (
+        places is None
+        or corners is None
+        or not inline
+        or root.get("header_type") != "UInt64"
+        or root.get("compressor")
+    ):
         msg = f"{path}: not an uncompressed inline .vtp; only the files that this package writes are read"
         raise ValueError(msg)
-    points = _arrays(piece, "Points")["Points"]
-    lines = _cells(piece, "Lines")
-    triangles = np.array(_cells(piece, "Polys"), dtype=np.int64).reshape(-1, 3)
-    return PolyData(points, lines, triangles, _arrays(piece, "PointData"))
+    vertices, triangles = (
+        np.frombuffer(base64.b64decode((a.text or "").strip())[_LENGTH_BYTES:], _TYPES[str(a.get("type"))])
+        for a in (places, corners)
+    )
+    return vertices.reshape(-1, 3), triangles.reshape(-1, 3)
 
 
 def _write(
@@ -89,20 +77,16 @@ def _write(
     piece = ET.SubElement(ET.SubElement(root, "PolyData"), "Piece", counts)
     data = ET.SubElement(piece, "PointData")
     for name, values in point_arrays.items():
-        _append(data, name, _checked_array(values, name, len(points), path), "Float64")
+        array, n = np.asarray(values, dtype=np.float64), len(points)
+        if array.shape not in ((n,), (n, 3)):
+            msg = f"{path}: point array {name} has shape {array.shape}; give ({n},) or ({n}, 3)"
+            raise ValueError(msg)
+        _append(data, name, array, "Float64")
     _append(ET.SubElement(piece, "Points"), "Points", points, "Float64")
     block = ET.SubElement(piece, kind)
     for name, indices in zip(("connectivity", "offsets"), cells, strict=True):
         _append(block, name, indices, "Int64")
     write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-
-
-def _checked_array(values: ArrayLike, name: str, n_points: int, path: Path) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((n_points,), (n_points, 3)):
-        msg = f"{path}: point array {name} has shape {array.shape}; give ({n_points},) or ({n_points}, 3)"
-        raise ValueError(msg)
-    return array
 
 
 def _append(parent: ET.Element, name: str, values: NDArray[Any], kind: str) -> None:
@@ -111,21 +95,3 @@ def _append(parent: ET.Element, name: str, values: NDArray[Any], kind: str) -> N
     components = str(values.shape[1]) if values.ndim == 2 else "1"
     attributes = {"type": kind, "Name": name, "NumberOfComponents": components, "format": "binary"}
     ET.SubElement(parent, "DataArray", attributes).text = base64.b64encode(length + content).decode("ascii")
-
-
-def _arrays(piece: ET.Element, block: str) -> dict[str, NDArray[Any]]:
-    return {str(a.get("Name")): _parse(a) for a in piece.findall(f"./{block}/DataArray")}
-
-
-def _parse(element: ET.Element) -> NDArray[Any]:
-    content = base64.b64decode((element.text or "").strip())[_LENGTH_BYTES:]
-    values = np.frombuffer(content, dtype=_TYPES[str(element.get("type"))])
-    components = int(element.get("NumberOfComponents", "1"))
-    return values.reshape(-1, components) if components > 1 else values
-
-
-def _cells(piece: ET.Element, kind: str) -> tuple[Index, ...]:
-    arrays = _arrays(piece, kind)
-    if not arrays or not len(arrays["offsets"]):
-        return ()
-    return tuple(np.split(arrays["connectivity"], arrays["offsets"][:-1]))

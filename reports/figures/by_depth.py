@@ -24,12 +24,10 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
     if not has(good, "rms_mm"):
         return None
     figure = new_figure(4.2)
-    axes = figure.subplots()
-    rivals = []
-    for column, label, colour, style, _ in predictors():
+    axes, rivals = figure.subplots(), list(predictors())
+    for column, label, colour, style, _ in rivals:
         _line(axes, good, column, f"predictor: {label}", color=colour, linestyle=style, linewidth=1.2)
-        rivals.append(column)
-    shown = [*_lines(axes, good, "error_by_depth"), *rivals]
+    shown = [*_lines(axes, good, "error_by_depth"), *(column for column, *_ in rivals)]
     positive_axis(axes, [good[column] for column in shown])
     if has(good, "trace_sigma_mm"):
         floor = good["insertion_mm"], axes.get_ylim()[0], good["trace_sigma_mm"]

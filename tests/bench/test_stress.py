@@ -39,8 +39,8 @@ def test_a_random_part_of_the_scenes_ends_as_it_may() -> None:
 
 
 @pytest.mark.slow
-def test_all_scenes_end_as_they_may() -> None:
-    rows = run_stress(SEED, range(5000), min(2, os.cpu_count() or 1))
+def test_all_scenes_end_as_they_may(tmp_path: Path) -> None:
+    rows = run_stress(tmp_path / "scenes.csv", SEED, range(5000), print, min(2, os.cpu_count() or 1))
     faults = rows[rows["fault"] != ""]
     assert faults.empty, faults[["index", "axes", "fault", "detail"]].to_string()
 
@@ -177,7 +177,9 @@ def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -
     assert "KeyError: 'no such scene'" in done[6].detail
 
 
-def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_table_counts_every_scene_at_each_of_its_axes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(
         "pipeline.benchmark.stress.run.run_isolated",
         lambda *_: [
@@ -185,7 +187,7 @@ def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.Mo
             Outcome(1, ("roll",), "crash", "crash"),
         ],
     )
-    table = stress_table(run_stress(0, range(2)))
+    table = stress_table(run_stress(tmp_path / "scenes.csv", 0, range(2), print))
     found = {(row.axis, row.outcome): row.count for row in table.itertuples(index=False)}
     assert dict(zip(table["axis"] + " " + table["outcome"], table["count"], strict=True)) == {
         "all converged": 1, "all CRASH": 1, "roll converged": 1, "hull converged": 1, "roll CRASH": 1,
@@ -217,20 +219,20 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
     monkeypatch.setattr("pipeline.benchmark.stress.run.run_isolated", runs)
     path = tmp_path / "scenes.csv"
     with pytest.raises(KeyboardInterrupt):
-        run_stress(5, range(4), path=path)
+        run_stress(path, 5, range(4), print)
     with path.open("a") as file:
         file.write('2,"roll hull",conv')
-    rows = run_stress(5, range(4), path=path)
+    rows = run_stress(path, 5, range(4), print)
     assert ran == [0, 1, 2, 3]
     assert list(rows["index"]) == [0, 1, 2, 3]
-    whole = run_stress(5, range(4))
+    whole = run_stress(tmp_path / "again.csv", 5, range(4), print)
     pd.testing.assert_frame_equal(rows, whole, check_dtype=False)
     # the table that the study leaves is one to go on from, too
     rows.to_csv(path, index=False)
-    pd.testing.assert_frame_equal(run_stress(5, range(4), path=path), whole, check_dtype=False)
+    pd.testing.assert_frame_equal(run_stress(path, 5, range(4), print), whole, check_dtype=False)
     # rows of another seed, or of another solver, are no rows of this study
     assert ran == [0, 1, 2, 3] * 2
-    run_stress(6, range(4), path=path)
+    run_stress(path, 6, range(4), print)
     monkeypatch.setattr("pipeline.benchmark.stress.run.version", lambda: "other")
-    run_stress(6, range(4), path=path)
+    run_stress(path, 6, range(4), print)
     assert ran == [0, 1, 2, 3] * 4

@@ -14,7 +14,7 @@ from data_synthetic.anatomy.centrelines import read_tree
 from data_synthetic.anatomy.from_tree import smooth_tube, way_through
 from data_synthetic.anatomy.iso_wall import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
-from data_synthetic.catalogue import build, from_anatomy, from_background
+from data_synthetic.catalogue import background_scene, build, from_anatomy
 from data_synthetic.geometry.scan_grid import centred_grid
 from data_synthetic.scanner.coverage import lumen_coverage
 from data_synthetic.write.volumes import to_image
@@ -119,7 +119,7 @@ def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
     grid = centred_grid([0, 0, 10], (72, 48, 96), 0.5)
     scan = 200 * lumen_coverage(shapes.bend(angle_deg=50.0, turn_mm=25.0, radius_mm=1.8), grid)
     sitk.WriteImage(to_image(scan.astype(np.uint8), grid), str(tmp_path / "scan.mha"))
-    study = from_background(tmp_path / "scan.mha", frames=2, truth_step_mm=0.8)
+    study = build(background_scene(tmp_path / "scan.mha"), frames=2, truth_step_mm=0.8)
     assert study.truth[-1].depth_mm > 20
     added = study.frame(1).astype(float) - study.reference
     index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
@@ -136,7 +136,7 @@ def test_wire_in_the_real_aneurysm_scan(real_data: Path, tmp_path: Path) -> None
     raw = gzip.decompress((real_data / "aneurism_3dra" / "aneurism.raw.gz").read_bytes())
     values = np.frombuffer(raw, np.uint8).reshape(256, 256, 256)
     sitk.WriteImage(sitk.GetImageFromArray(values), str(tmp_path / "aneurism.mha"))
-    study = from_background(tmp_path / "aneurism.mha", voxel_mm=0.5, truth_step_mm=0.4)
+    study = build(background_scene(tmp_path / "aneurism.mha", 0.5), truth_step_mm=0.4)
     assert len(study.truth) == 12
     assert study.truth[-1].depth_mm > 60
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from reports import export
+from tests.reports.reading import read_markups_curve, read_segmentation_nrrd, read_vtp
 
 COORDINATES = st.floats(-1e3, 1e3)
 CURVES = hnp.arrays(np.float64, st.tuples(st.integers(2, 12), st.just(3)), elements=COORDINATES)
@@ -26,9 +27,9 @@ TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray) -> None:
     folder = tmp_path_factory.mktemp("curve")
     export.write_markups_curve(folder / "w.mrk.json", points, "wire", {"error_mm": points[:, 0]})
-    np.testing.assert_allclose(export.read_markups_curve(folder / "w.mrk.json"), points, atol=1e-6)
+    np.testing.assert_allclose(read_markups_curve(folder / "w.mrk.json"), points, atol=1e-6)
     export.write_polyline_vtp(folder / "w.vtp", points, {"error_mm": points[:, 0], "force_N": points})
-    back = export.read_vtp(folder / "w.vtp")
+    back = read_vtp(folder / "w.vtp")
     np.testing.assert_array_equal(back.points_mm, points)
     np.testing.assert_array_equal(back.lines[0], np.arange(len(points)))
     np.testing.assert_array_equal(back.point_arrays["error_mm"], points[:, 0])
@@ -48,7 +49,7 @@ def test_ras_markups_are_turned(tmp_path: Path) -> None:
     path = tmp_path / "w.mrk.json"
     export.write_markups_curve(path, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "wire")
     path.write_text(path.read_text(encoding="utf-8").replace('"LPS"', '"RAS"'))
-    np.testing.assert_array_equal(export.read_markups_curve(path), [[-1, -2, 3], [-4, -5, 6]])
+    np.testing.assert_array_equal(read_markups_curve(path), [[-1, -2, 3], [-4, -5, 6]])
 
 
 def test_markups_of_another_kind_are_refused(tmp_path: Path) -> None:
@@ -56,7 +57,7 @@ def test_markups_of_another_kind_are_refused(tmp_path: Path) -> None:
     export.write_markups_curve(path, np.eye(3), "wire")
     path.write_text(path.read_text(encoding="utf-8").replace('"Curve"', '"Fiducial"'))
     with pytest.raises(ValueError, match="Fiducial"):
-        export.read_markups_curve(path)
+        read_markups_curve(path)
 
 
 def test_curves_written_by_slicer_are_read() -> None:
@@ -64,7 +65,7 @@ def test_curves_written_by_slicer_are_read() -> None:
     if not data:
         pytest.skip("WIREVAL_DATA is not set: no curve written by Slicer to read")
     path = sorted(Path(data).glob("aorta_to_cranial/**/*.mrk.json"))[0]
-    points = export.read_markups_curve(path)
+    points = read_markups_curve(path)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert len(points) > 10
     assert 0 < np.median(steps) < 20
@@ -73,7 +74,7 @@ def test_curves_written_by_slicer_are_read() -> None:
 def test_nan_survives_in_vtp_and_is_refused_elsewhere(tmp_path: Path) -> None:
     values = [0.5, np.nan, 1.0]
     export.write_polyline_vtp(tmp_path / "w.vtp", np.eye(3), {"error_mm": values})
-    np.testing.assert_array_equal(export.read_vtp(tmp_path / "w.vtp").point_arrays["error_mm"], values)
+    np.testing.assert_array_equal(read_vtp(tmp_path / "w.vtp").point_arrays["error_mm"], values)
     with pytest.raises(ValueError, match="finite"):
         export.write_polyline_vtp(tmp_path / "x.vtp", [[0, 0, np.nan]])
     with pytest.raises(ValueError, match="not finite"):
@@ -86,11 +87,15 @@ def test_nan_survives_in_vtp_and_is_refused_elsewhere(tmp_path: Path) -> None:
 def test_surfaces_read_back(tmp_path: Path) -> None:
     vertices = np.vstack([np.zeros(3), np.eye(3)])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    export.write_surface_vtp(tmp_path / "s.vtp", vertices, triangles, {"curvature_per_mm": np.arange(4)})
-    back = export.read_vtp(tmp_path / "s.vtp")
+    export.write_surface_vtp(tmp_path / "s.vtp", vertices, triangles)
+    back = read_vtp(tmp_path / "s.vtp")
     np.testing.assert_array_equal(back.points_mm, vertices)
     np.testing.assert_array_equal(back.triangles, triangles)
     assert back.lines == ()
+    for found, written in zip(
+        export.read_surface_vtp(tmp_path / "s.vtp"), (vertices, triangles), strict=True
+    ):
+        np.testing.assert_array_equal(found, written)
     with pytest.raises(ValueError, match="indices"):
         export.write_surface_vtp(tmp_path / "t.vtp", vertices, triangles + 1)
 
@@ -98,8 +103,8 @@ def test_surfaces_read_back(tmp_path: Path) -> None:
 def test_empty_curves_are_files_too(tmp_path: Path) -> None:
     export.write_polyline_vtp(tmp_path / "w.vtp", np.zeros((0, 3)))
     export.write_surface_vtp(tmp_path / "s.vtp", np.zeros((0, 3)), np.zeros((0, 3), int))
-    assert export.read_vtp(tmp_path / "w.vtp").lines == ()
-    assert export.read_vtp(tmp_path / "s.vtp").triangles.shape == (0, 3)
+    assert read_vtp(tmp_path / "w.vtp").lines == ()
+    assert read_vtp(tmp_path / "s.vtp").triangles.shape == (0, 3)
 
 
 def test_segmentations_keep_axes_and_geometry(tmp_path: Path) -> None:
@@ -109,7 +114,7 @@ def test_segmentations_keep_axes_and_geometry(tmp_path: Path) -> None:
     path = tmp_path / "lumen.seg.nrrd"
     spacing, origin = [0.3, 0.4, 0.5], [-10.0, 20.0, 7.5]
     export.write_segmentation_nrrd(path, values, spacing, origin, TURN, segments=("lumen", "aneurysm sac"))
-    back = export.read_segmentation_nrrd(path)
+    back = read_segmentation_nrrd(path)
     np.testing.assert_array_equal(back.values, values)
     np.testing.assert_allclose(back.direction, TURN, atol=1e-12)
     assert back.segments == ("lumen", "aneurysm sac")

@@ -10,11 +10,10 @@ import pytest
 
 from reports import scene3d
 from reports.case_files import read_case
-from reports.export import PolyData
 from tests.reports.fake_results import FakeCase, write_run
 
 
-def _sphere(n: int) -> PolyData:
+def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, n), np.linspace(0, np.pi, n), indexing="ij")
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3) * 10
     corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
@@ -24,18 +23,18 @@ def _sphere(n: int) -> PolyData:
             np.column_stack([corner + 1, corner + n + 1, corner + n]),
         ]
     )
-    return PolyData(points, triangles=triangles)
+    return points, triangles
 
 
 def test_decimation_keeps_the_shape_and_few_triangles() -> None:
-    small = scene3d.decimate(_sphere(120), 3000)
-    assert 500 < len(small.triangles) <= 3000
-    radius = np.linalg.norm(small.points_mm, axis=1)
+    vertices, triangles = scene3d.decimate(*_sphere(120), 3000)
+    assert 500 < len(triangles) <= 3000
+    radius = np.linalg.norm(vertices, axis=1)
     assert np.all(np.abs(radius - 10) < 0.5)
-    assert small.triangles.max() < len(small.points_mm)
-    same = _sphere(10)
-    assert len(scene3d.decimate(same).triangles) == len(same.triangles)
-    assert len(scene3d.decimate(PolyData(np.zeros((0, 3)))).triangles) == 0
+    assert triangles.max() < len(vertices)
+    points, same = _sphere(10)
+    assert len(scene3d.decimate(points, same)[1]) == len(same)
+    assert len(scene3d.decimate(np.zeros((0, 3)), np.zeros((0, 3), int))[1]) == 0
 
 
 def test_without_plotly_a_sentence_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -82,23 +82,18 @@ def _rivals(module: str) -> tuple[type[RivalWire], ...]:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.dup2(null, 2)
-    found: tuple[type[RivalWire], ...] = importlib.import_module(
-        f"pipeline.benchmark.peers.rivals.{module}"
-    ).RIVALS
-    return found
+    return tuple(importlib.import_module(f"pipeline.benchmark.peers.rivals.{module}").RIVALS)
 
 
 def _tasks(module: str, quick: bool) -> list[tuple[int, Task]]:
     """All that is asked of the rivals of a file, with their numbers; ``quick`` is one task a scene."""
     found = []
     for number, rival in enumerate(_rivals(module)):
-        tasks = [Task("cantilever", n) for n in rival.segments_a] + [
-            Task("bend", n) for n in rival.segments_b
-        ]
+        segments = {"cantilever": rival.segments_a, "bend": rival.segments_b}
+        tasks = [Task(scene, n) for scene, tried in segments.items() for n in tried]
+        tasks += [Task("bend", 60, per_mm) for per_mm in rival.per_mm if per_mm > 1]
         if quick:
-            tasks = [Task(scene, QUICK_SEGMENTS[scene]) for scene in dict.fromkeys(t.scene for t in tasks)]
-        else:
-            tasks += [Task("bend", 60, per_mm) for per_mm in rival.per_mm if per_mm > 1]
+            tasks = [Task(scene, QUICK_SEGMENTS[scene]) for scene, tried in segments.items() if tried]
         found += [(number, task) for task in tasks]
     return found
 

@@ -57,22 +57,18 @@ def version() -> str:
 
 
 def run_stress(
-    seed: int,
-    indices: Sequence[int],
-    jobs: int = 1,
-    say: Callable[[str], None] = lambda _: None,
-    path: Path | None = None,
+    path: Path, seed: int, indices: Sequence[int], say: Callable[[str], None], jobs: int = 1
 ) -> pd.DataFrame:
     """One row per scene: index, axes, outcome, fault, detail, iterations, residual, stretch, seconds, setting.
 
-    say : gets a line for every fault, and one for every 250 scenes with their rate.
     path : a CSV file that gets each row as its scene ends; the rows of this seed and of the same sources that are
     there already are kept and not run again.
+    say : gets a line for every fault, and one for every 250 scenes with their rate.
     """
     began, rows = perf_counter(), _rows_at(path, seed, indices)
     known = {row["index"] for row in rows}
     left = [index for index in indices if index not in known]
-    with path.open("w", encoding="utf-8") if path else io.StringIO() as file:
+    with path.open("w", encoding="utf-8") as file:
         pd.DataFrame(rows, columns=COLUMNS).to_csv(file, index=False)
         for number, done in enumerate(run_isolated(seed, left, jobs), 1):
             rows.append(_row(seed, done))
@@ -95,9 +91,9 @@ def _row(seed: int, done: Outcome) -> dict[str, Any]:
 COLUMNS = list(_row(0, Outcome(0, ("",), "")))
 
 
-def _rows_at(path: Path | None, seed: int, indices: Sequence[int]) -> list[dict[str, Any]]:
+def _rows_at(path: Path, seed: int, indices: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of this seed and version in a table; others are left out, and so is a last line that was cut off."""
-    text = path.read_text(encoding="utf-8") if path is not None and path.exists() else ""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
     # the version is the last column: behind the last one there is no whole line
     whole, last, _ = text.rpartition(end := f",{version()}\n")
     if not last:
@@ -114,7 +110,7 @@ def _rows_at(path: Path | None, seed: int, indices: Sequence[int]) -> list[dict[
 def measure_stress(out: Path, say: Callable[[str], None], seed: int, count: int) -> bool:
     """Random scenes and their tables; False where one ended otherwise than it may."""
     path = out / SCENES_CSV
-    rows = run_stress(seed, range(count), min(2, os.cpu_count() or 1), say, path)
+    rows = run_stress(path, seed, range(count), say, min(2, os.cpu_count() or 1))
     rows.to_csv(path, index=False)
     table = stress_table(rows)
     table.to_csv(out / STRESS_CSV, index=False)
