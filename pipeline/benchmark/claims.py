@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.benchmark import scenes
-from pipeline.benchmark.insert import Run, Setting, insert, timed
+from pipeline.benchmark.insert import Run, SolverSetting, insert, timed
 from pipeline.benchmark.reference import reference, shape_error
 from pipeline.benchmark.scenes import BenchScene
 from reports.schema import CLAIMS, ORDERS
@@ -92,7 +92,7 @@ def _last_steps(scene: BenchScene, wall: VesselWall | None, segment_mm: float, s
 def against_closed_form() -> Iterator[Claim]:
     """The seed's method against Newton's, both to the same energy."""
     scene = scenes.bend(60.0, SOFT)
-    wall, ours = scene.wall(), Setting(1.0, quadrature="joints")
+    wall, ours = scene.wall(), SolverSetting(1.0, quadrature="joints")
     seed = replace(ours, method="closed_form", max_iterations=20_000)
     fast, newton = timed(partial(insert, scene, ours, wall))
     slow, closed = timed(partial(insert, scene, seed, wall), 1)
@@ -104,7 +104,7 @@ def against_closed_form() -> Iterator[Claim]:
 
 def sub_steps() -> Iterator[Claim]:
     """Scene B at 60 joints with other numbers of steps per mm: the same minimum, or a status."""
-    runs = {n: insert(replace(scenes.bend(), step_mm=1.0 / n), Setting(1.0)) for n in SUB_STEPS}
+    runs = {n: insert(replace(scenes.bend(), step_mm=1.0 / n), SolverSetting(1.0)) for n in SUB_STEPS}
     for count, run in runs.items():
         energy, status = run.last.energy_N_mm, run.last.status.identifier
         apart = abs(energy / runs[1].last.energy_N_mm - 1.0)
@@ -115,7 +115,7 @@ def sub_steps() -> Iterator[Claim]:
 @cache
 def errors_at(scene: BenchScene, segment_mm: float) -> tuple[float, float, float]:
     """RMS and tip error, mm, and the size of the relative energy error; NaN where the depth is not reached."""
-    shape, tip, energy = reference(scene).errors_of(insert(scene, Setting(segment_mm)))
+    shape, tip, energy = reference(scene).errors_of(insert(scene, SolverSetting(segment_mm)))
     return shape, tip, abs(energy)
 
 
@@ -166,7 +166,7 @@ def voxel_order() -> Iterator[Claim]:
     for voxel in VOXELS_MM:
         shift = OFF_LATTICE * voxel
         wall = replace(scene, box=((x - shift, y - shift, z - shift), high)).wall(voxel_mm=voxel)
-        shapes.append(insert(scene, Setting(0.5, tolerance=1e-13), wall).last.joints_mm)
+        shapes.append(insert(scene, SolverSetting(0.5, tolerance=1e-13), wall).last.joints_mm)
     sizes = VOXELS_MM[:-1]
     found = tuple(shape_error(points, shapes[-1])[0] for points in shapes[:-1])
     name = "scene B, shape"
@@ -178,13 +178,13 @@ def in_a_sheath() -> Iterator[Claim]:
     """Scene B behind 400 mm of sheath, in which the pushed wire buckles: every depth at rest, and the time."""
     for bore, stiffness in SHEATHS:
         scene = scenes.sheath(bore, stiffness)
-        seconds, run = timed(partial(insert, scene, Setting(1.0), scene.wall()), 1)
+        seconds, run = timed(partial(insert, scene, SolverSetting(1.0), scene.wall()), 1)
         name = f"sheath of {bore:g} mm, wall {stiffness:g} N/mm², 460 joints: "
         yield Claim(name + "all depths at rest", float(run.reached), "1", "1", run.reached)
         yield Claim(name + "a 1 mm step, mean of all", 1e3 * seconds / run.steps, "ms")
 
 
-def _without(skip: str | None, scene: BenchScene, setting: Setting, wall: VesselWall | None) -> Run:
+def _without(skip: str | None, scene: BenchScene, setting: SolverSetting, wall: VesselWall | None) -> Run:
     """The insertion with all skips, or with all but one."""
     with off(skip) if skip else nullcontext():
         return insert(scene, setting, wall)
@@ -198,13 +198,13 @@ def skips() -> Iterator[Claim]:
         scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(), 0.5)
         wall = scene.wall(hull)
         # wires are compared at a tolerance so tight that where an iteration stops does not show
-        tight = Setting(segment, hull=hull, tolerance=1e-13)
+        tight = SolverSetting(segment, hull=hull, tolerance=1e-13)
         with_skip, without = (_without(s, scene, tight, wall).last.joints_mm for s in (None, name))
         apart = float(np.abs(with_skip - without).max())
         aim = "at most 1e-6 (algebraic skips 1e-12)"
         where = f"skip {name} off ({scene.name}, hull {hull})"
         yield Claim(f"{where}: wire apart", apart, "mm", aim, apart <= 1e-6)
-        asked = Setting(segment, hull=hull)
+        asked = SolverSetting(segment, hull=hull)
         seconds = [
             [timed(partial(_without, s, scene, asked, wall), 1)[0] for s in (None, name)]
             for _ in range(PAIRS)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.benchmark.insert import Run, Setting, insert, timed
+from pipeline.benchmark.insert import Run, SolverSetting, insert, timed
 from pipeline.benchmark.reference import FINE_MM, Reference, reference
 from pipeline.benchmark.scenes import BenchScene
 from reports.bench import TARGETS_MM, recommended
@@ -20,23 +20,23 @@ SOLVER_CSV = "solver.csv"
 SEGMENTS_MM = (5.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.1)
 QUICK_SEGMENTS_MM = (5.0, 2.0, 1.0, 0.5)
 VARIANTS = (
-    Setting(1.0),
-    Setting(1.0, tolerance=1e-4),
-    Setting(1.0, tolerance=1e-6),
-    Setting(1.0, quadrature="joints"),
-    Setting(1.0, quadrature="segments"),
-    Setting(1.0, hull="samples:4"),
-    Setting(1.0, hull="samples:16"),
+    SolverSetting(1.0),
+    SolverSetting(1.0, tolerance=1e-4),
+    SolverSetting(1.0, tolerance=1e-6),
+    SolverSetting(1.0, quadrature="joints"),
+    SolverSetting(1.0, quadrature="segments"),
+    SolverSetting(1.0, hull="samples:4"),
+    SolverSetting(1.0, hull="samples:16"),
 )
 """Each is tried with every segment length; the default comes first."""
-CLOSED_FORM = Setting(1.0, "closed_form", quadrature="joints", tolerance=1e-6, max_iterations=20_000)
+CLOSED_FORM = SolverSetting(1.0, "closed_form", quadrature="joints", tolerance=1e-6, max_iterations=20_000)
 ASKED = ("method", "segment_mm", "hull", "quadrature", "tolerance")
 """What a row says of its setting."""
 CLOSED_FORM_SHORTEST_MM = 1.0
 """Sweeps grow with the square of the number of joints: below 1 mm one insertion takes minutes."""
 
 
-def settings(*, quick: bool = False) -> list[Setting]:
+def settings(*, quick: bool = False) -> list[SolverSetting]:
     """All settings of the study; ``quick`` leaves the default and the seed's method, at fewer segment lengths."""
     segments = QUICK_SEGMENTS_MM if quick else SEGMENTS_MM
     variants = VARIANTS[:1] if quick else VARIANTS
@@ -46,7 +46,7 @@ def settings(*, quick: bool = False) -> list[Setting]:
 
 
 def costs(
-    scenes: Iterable[BenchScene], chosen: Sequence[Setting], repeats: int = 3, fine_mm: float = FINE_MM
+    scenes: Iterable[BenchScene], chosen: Sequence[SolverSetting], repeats: int = 3, fine_mm: float = FINE_MM
 ) -> Iterator[dict[str, Any]]:
     """One row per scene and setting; see ``_row``.
 
@@ -60,7 +60,9 @@ def costs(
             yield _row(scene, setting, run, seconds, limit)
 
 
-def _row(scene: BenchScene, setting: Setting, run: Run, seconds: float, limit: Reference) -> dict[str, Any]:
+def _row(
+    scene: BenchScene, setting: SolverSetting, run: Run, seconds: float, limit: Reference
+) -> dict[str, Any]:
     """Cost and error of one run; the errors of a run that did not reach the depth are NaN."""
     shape, tip, energy = limit.errors_of(run)
     looked = run.work.get("wall_look_ups", 0.0)

@@ -20,7 +20,7 @@ LONG_S = 2.0
 
 
 @dataclass(frozen=True)
-class Setting:
+class SolverSetting:
     """How the solver is asked; the names are those of ``solver.Insertion``."""
 
     segment_mm: float
@@ -48,7 +48,7 @@ class Run:
     work: dict[str, float]
 
 
-def insert(scene: BenchScene, setting: Setting, wall: VesselWall | None = None) -> Run:
+def insert(scene: BenchScene, setting: SolverSetting, wall: VesselWall | None = None) -> Run:
     """Push the scene's wire in; a free wire is bent by its dead load at once.
 
     wall : made already (it costs more than an insertion).

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from pipeline.benchmark.insert import Run, Setting, insert
+from pipeline.benchmark.insert import Run, SolverSetting, insert
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.model import Array
 
@@ -50,7 +50,7 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     """
     arcs = arc_samples(scene.depth_mm)
     for segment in fine_mm * 2.0 ** np.arange(COARSER):
-        runs = [insert(scene, Setting(s, quadrature="segments")) for s in (segment, 0.5 * segment)]
+        runs = [insert(scene, SolverSetting(s, quadrature="segments")) for s in (segment, 0.5 * segment)]
         if all(run.reached for run in runs):
             coarse, fine = (resampled(run.last.joints_mm, run.arcs_mm, arcs, smooth=True) for run in runs)
             first, second = (run.last.energy_N_mm for run in runs)

@@ -16,9 +16,9 @@ import pytest
 
 from pipeline.benchmark.stress import run as study
 from pipeline.benchmark.stress.axes import AXES, draw
-from pipeline.benchmark.stress.plan import Plan
+from pipeline.benchmark.stress.plan import ScenePlan
 from pipeline.benchmark.stress.run import run_isolated, run_stress, stress_table
-from pipeline.benchmark.stress.scene_run import Outcome, build, run_scene, solve
+from pipeline.benchmark.stress.scene_run import SceneOutcome, build, run_scene, solve
 from pipeline.benchmark.stress.statics import assemble
 from pipeline.benchmark.stress.verdict import judge
 from solver import relax
@@ -79,8 +79,8 @@ def test_scenes_are_the_same_in_any_order_and_cover_every_axis() -> None:
     assert max(max(abs(r) for r in p.rolls) for p in ranges) > 3000.0
 
 
-def _solved(**changes: Any) -> tuple[Plan, Any, Any, Any]:
-    plan = Plan(0, 0, way="relax", joints=20, depths=[20.0], rolls=[0.0], lumen_mm=1.0, tilt_deg=20.0)
+def _solved(**changes: Any) -> tuple[ScenePlan, Any, Any, Any]:
+    plan = ScenePlan(0, 0, way="relax", joints=20, depths=[20.0], rolls=[0.0], lumen_mm=1.0, tilt_deg=20.0)
     for name, value in changes.items():
         setattr(plan, name, value)
     wire, wall = build(plan)
@@ -135,7 +135,7 @@ def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
 
 def test_the_judge_sees_a_saddle() -> None:
     """A straight column under four times its buckling load is at rest, and no minimum."""
-    plan = Plan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
+    plan = ScenePlan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
     plan.stiffness = [[0.0, 10.0]]
     wire, _ = build(plan)
     force = 4 * np.pi**2 * 10.0 / (4 * 20.0**2)
@@ -148,7 +148,7 @@ def test_the_judge_sees_a_saddle() -> None:
     assert not judge(plan, wire, None, column, float("nan"), False).fault
 
 
-def _crashes(seed: int, index: int) -> Outcome:
+def _crashes(seed: int, index: int) -> SceneOutcome:
     if index == 1:
         os._exit(3)
     if index == 2:
@@ -162,7 +162,7 @@ def _crashes(seed: int, index: int) -> Outcome:
         stop = time.perf_counter() + 60.0
         while time.perf_counter() < stop:
             pass
-    return Outcome(index, ("roll",), "converged")
+    return SceneOutcome(index, ("roll",), "converged")
 
 
 def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,8 +183,8 @@ def test_the_table_counts_every_scene_at_each_of_its_axes(
     monkeypatch.setattr(
         "pipeline.benchmark.stress.run.run_isolated",
         lambda *_: [
-            Outcome(0, ("roll", "hull"), "converged", iterations=4),
-            Outcome(1, ("roll",), "crash", "crash"),
+            SceneOutcome(0, ("roll", "hull"), "converged", iterations=4),
+            SceneOutcome(1, ("roll",), "crash", "crash"),
         ],
     )
     table = stress_table(run_stress(tmp_path / "scenes.csv", 0, range(2), print))
@@ -207,7 +207,7 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
                 stop.clear()
                 raise KeyboardInterrupt
             ran.append(index)
-            yield Outcome(
+            yield SceneOutcome(
                 index,
                 ("roll", "hull"),
                 "converged",

@@ -14,7 +14,7 @@ from scipy.optimize import check_grad
 from pipeline.benchmark import page, scenes, vessels
 from pipeline.benchmark.claims import Claim, fitted, measure_claims
 from pipeline.benchmark.cost import advice, costs, settings
-from pipeline.benchmark.insert import Setting, insert, timed
+from pipeline.benchmark.insert import SolverSetting, insert, timed
 from pipeline.benchmark.isolate import Lost
 from pipeline.benchmark.peers.frame import Task, pushed
 from pipeline.benchmark.peers.run import ask, bending_energy
@@ -73,7 +73,9 @@ def test_cantilever_reference_is_the_elastica() -> None:
 
 
 def test_second_order_is_seen_by_the_study() -> None:
-    rows = pd.DataFrame(costs([scenes.cantilever()], [Setting(10.0), Setting(5.0)], repeats=1, fine_mm=1.0))
+    rows = pd.DataFrame(
+        costs([scenes.cantilever()], [SolverSetting(10.0), SolverSetting(5.0)], repeats=1, fine_mm=1.0)
+    )
     assert (rows["status"] == "converged").all()
     assert np.log2(rows["tip_error_mm"][0] / rows["tip_error_mm"][1]) == pytest.approx(2.0, abs=0.05)
     assert (rows["ms_per_mm"] > 0).all()
@@ -132,7 +134,7 @@ def test_joint_constants_of_a_profile() -> None:
 
 
 def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    chosen = [Setting(10.0), Setting(5.0), Setting(2.0)]
+    chosen = [SolverSetting(10.0), SolverSetting(5.0), SolverSetting(2.0)]
     rows = pd.DataFrame(costs([scenes.cantilever()], chosen, repeats=1, fine_mm=1.0))
     # what is measured once in a third of a millisecond is in no order: let the longer segments be the faster ones
     rows["ms_per_mm"] = 1.0 / rows["segment_mm"]
@@ -171,7 +173,7 @@ def test_orders_are_fitted_drawn_and_a_broken_promise_is_marked(tmp_path: Path) 
 
 def test_insert_reports_what_it_did() -> None:
     scene = replace(scenes.bend(), depth_mm=12.0)
-    run = insert(scene, Setting(2.0))
+    run = insert(scene, SolverSetting(2.0))
     assert run.reached
     assert run.steps == 12
     np.testing.assert_allclose(run.last.joints_mm[-1], [0.0, 0.0, 12.0], atol=1e-9)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.benchmark.stress.plan import Plan
+from pipeline.benchmark.stress.plan import ScenePlan
 
 Rng = np.random.Generator
 Changes = dict[str, Any]
@@ -17,7 +17,7 @@ Changes = dict[str, Any]
 LUMENS = ("straight", "bend", "siphon", "sphere", "channel")
 
 
-def draw(seed: int, index: int) -> Plan:
+def draw(seed: int, index: int) -> ScenePlan:
     """Scene ``index`` of the study ``seed``: the same one every time, in any order."""
     rng = np.random.default_rng([seed, index])
     plan = _moderate(rng, seed, index)
@@ -39,11 +39,11 @@ def draw(seed: int, index: int) -> Plan:
     return plan
 
 
-def _moderate(rng: Rng, seed: int, index: int) -> Plan:
+def _moderate(rng: Rng, seed: int, index: int) -> ScenePlan:
     segment = _log_uniform(rng, 0.5, 2.0)
     voxel = _log_uniform(rng, 0.5, 1.0)
     curved = rng.random() < 0.5
-    return Plan(
+    return ScenePlan(
         seed,
         index,
         way=str(rng.choice(["relax", "insertion"])),
@@ -67,7 +67,7 @@ def _log_uniform(rng: Rng, low: float, high: float) -> float:
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _bending_range(plan: Plan, rng: Rng) -> Changes:
+def _bending_range(plan: ScenePlan, rng: Rng) -> Changes:
     """Six decades of EI within one wire, in any order, with or without a jump."""
     count = int(rng.integers(2, 7))
     at = np.sort(rng.uniform(0.0, plan.length_mm, count))
@@ -79,20 +79,20 @@ def _bending_range(plan: Plan, rng: Rng) -> Changes:
     return {"stiffness": rows}
 
 
-def _segment_length(plan: Plan, rng: Rng) -> Changes:
+def _segment_length(plan: ScenePlan, rng: Rng) -> Changes:
     """Segments from 0.1 to 5 mm, longer than the lumen is wide."""
     segment = _log_uniform(rng, 0.1, 5.0)
     return {"segment_mm": segment, "joints": int(np.clip(round(plan.length_mm / segment), 1, 600))}
 
 
-def _joints(plan: Plan, rng: Rng) -> Changes:
+def _joints(plan: ScenePlan, rng: Rng) -> Changes:
     """From one joint to two thousand."""
     joints = max(1, round(_log_uniform(rng, 1.0, 2000.0)))
     segment = _log_uniform(rng, 0.1, 0.5) if joints > 200 else plan.segment_mm
     return {"joints": joints, "segment_mm": segment}
 
 
-def _rest_curvature(plan: Plan, rng: Rng) -> Changes:
+def _rest_curvature(plan: ScenePlan, rng: Rng) -> Changes:
     """Up to 1/(2 segment), whole wire or tip."""
     curvature = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0)) * 0.5 / plan.segment_mm
     where = rng.uniform(2.0, 15.0)
@@ -100,7 +100,7 @@ def _rest_curvature(plan: Plan, rng: Rng) -> Changes:
     return {"rest": [[0.0, curvature], *tip]}
 
 
-def _kinks(plan: Plan, rng: Rng) -> Changes:
+def _kinks(plan: ScenePlan, rng: Rng) -> Changes:
     """A wire that was bent sharply at some places, or one that starts from a zigzag."""
     length, segment = plan.length_mm, plan.segment_mm
     if rng.random() < 0.5:
@@ -116,20 +116,20 @@ def _kinks(plan: Plan, rng: Rng) -> Changes:
     return {"way": "relax", "start": np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])}
 
 
-def _narrow_lumen(_: Plan, rng: Rng) -> Changes:
+def _narrow_lumen(_: ScenePlan, rng: Rng) -> Changes:
     """Narrower than the wire."""
     radius = rng.uniform(0.3, 1.5)
     return {"radius_mm": radius, "lumen_mm": radius * rng.uniform(0.2, 1.0)}
 
 
-def _zero_step(plan: Plan, rng: Rng) -> Changes:
+def _zero_step(plan: ScenePlan, rng: Rng) -> Changes:
     """No step, a step of rounding, no wire at all."""
     end = plan.length_mm * rng.uniform(0.3, 1.0)
     choices = [0.0, end, end, end + 1e-13, end * (1 + 1e-9), 1e-12, end]
     return {"way": "insertion", "depths": [choices[i] for i in rng.permutation(len(choices))]}
 
 
-def _loads(plan: Plan, rng: Rng) -> Changes:
+def _loads(plan: ScenePlan, rng: Rng) -> Changes:
     """A dead load on the tip, with or without a wall, from a feather to far beyond buckling."""
     wall = bool(rng.random() < 0.4)
     force = _log_uniform(rng, 1e-3, 300.0) * plan.stiffness[-1][1] / plan.length_mm**2
@@ -139,14 +139,14 @@ def _loads(plan: Plan, rng: Rng) -> Changes:
     return {"wall": wall, "load_N": tuple((force * direction / np.linalg.norm(direction)).tolist())}
 
 
-def _closed_form(plan: Plan, rng: Rng) -> Changes:
+def _closed_form(plan: ScenePlan, rng: Rng) -> Changes:
     """The seed's relaxation on a scene of its own scale."""
     rolls = [math.copysign(min(abs(r), 90.0), r) for r in plan.rolls]
     limit = int(rng.choice([200, 2000]))
     return {"method": "closed_form", "joints": min(plan.joints, 40), "rolls": rolls, "max_iterations": limit}
 
 
-AXES: dict[str, Callable[[Plan, Rng], Changes]] = {
+AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     # from next to nothing to hard
     "wall_stiffness": lambda _, rng: {"wall_stiffness": _log_uniform(rng, 1e-3, 1e6)},
     "bending_range": _bending_range,

@@ -29,7 +29,7 @@ SHOWN = (
 
 
 @dataclass
-class Plan:
+class ScenePlan:
     """Everything that defines a scene, before anything is built.
 
     way : "relax" (one relaxation from a start shape) or "insertion" (depth after depth).
@@ -79,7 +79,7 @@ class Plan:
         return self.segment_mm * self.joints
 
 
-def lumen_grid(plan: Plan) -> Grid:
+def lumen_grid(plan: ScenePlan) -> Grid:
     """The plan's wall on its grid, with its defects."""
     rng = np.random.default_rng([plan.seed, plan.index, 1])
     low, high = np.array(BOXES[plan.lumen])
@@ -106,14 +106,14 @@ def lumen_grid(plan: Plan) -> Grid:
     return Grid(values, np.array(plan.voxel_mm), turn @ low + shift, turn)
 
 
-def placement(plan: Plan) -> tuple[Array, Array]:
+def placement(plan: ScenePlan) -> tuple[Array, Array]:
     """Rotation (3, 3) and shift (3,) that take the scene to where it lies."""
     rng = np.random.default_rng([plan.seed, plan.index, 2])
     turn = Rotation.random(rng=rng).as_matrix() if plan.turned else np.eye(3)
     return turn, plan.far_mm * rng.uniform(-1.0, 1.0, 3)
 
 
-def entry(plan: Plan) -> tuple[Array, Array, Array]:
+def entry(plan: ScenePlan) -> tuple[Array, Array, Array]:
     """Entry point, direction and material axis of the plan, in the scene's place."""
     rng = np.random.default_rng([plan.seed, plan.index, 3])
     turn, shift = placement(plan)

@@ -15,7 +15,7 @@ import pandas as pd
 from pipeline.benchmark.isolate import Lost, alone
 from pipeline.benchmark.stress.axes import AXES, draw
 from pipeline.benchmark.stress.plan import SHOWN
-from pipeline.benchmark.stress.scene_run import Outcome, run_scene
+from pipeline.benchmark.stress.scene_run import SceneOutcome, run_scene
 from pipeline.run.batch import run_all
 from solver import warm_up
 from solver._compile import hash_of
@@ -30,14 +30,16 @@ BUSY = 10.0
 
 def run_isolated(
     seed: int, indices: Sequence[int], jobs: int = 1, limit_s: float = LIMIT_S
-) -> Iterator[Outcome]:
+) -> Iterator[SceneOutcome]:
     """Outcomes of the scenes as they end, ``jobs`` of them at a time."""
     warm_up(beside=True)  # compiled once, here; a worker only loads the machine code
     for done in run_all(indices, partial(_run_alone, run_scene, limit_s, seed), jobs):
         yield done.result or _failed(seed, done.job, Lost("crash", done.error))
 
 
-def _run_alone(run: Callable[[int, int], Outcome], limit_s: float, seed: int, index: int) -> Outcome:
+def _run_alone(
+    run: Callable[[int, int], SceneOutcome], limit_s: float, seed: int, index: int
+) -> SceneOutcome:
     """Run one scene in a fork of this process, whose kernels are loaded; a crash or a hang is its outcome."""
     _loaded()
     answer = alone("fork", partial(run, seed, index), BUSY * limit_s, limit_s)
@@ -47,8 +49,8 @@ def _run_alone(run: Callable[[int, int], Outcome], limit_s: float, seed: int, in
 _loaded = cache(warm_up)
 
 
-def _failed(seed: int, index: int, lost: Lost) -> Outcome:
-    return Outcome(index, draw(seed, index).axes, lost.fault, lost.fault, lost.reason)
+def _failed(seed: int, index: int, lost: Lost) -> SceneOutcome:
+    return SceneOutcome(index, draw(seed, index).axes, lost.fault, lost.fault, lost.reason)
 
 
 def version() -> str:
@@ -82,13 +84,13 @@ def run_stress(
     return pd.DataFrame(rows).sort_values("index", ignore_index=True)
 
 
-def _row(seed: int, done: Outcome) -> dict[str, Any]:
+def _row(seed: int, done: SceneOutcome) -> dict[str, Any]:
     plan = draw(seed, done.index)
     row = {**vars(done), "axes": " ".join(done.axes), **{name: getattr(plan, name) for name in SHOWN}}
     return {**row, "axis": done.axes[0], "seed": seed, "version": version()}
 
 
-COLUMNS = list(_row(0, Outcome(0, ("",), "")))
+COLUMNS = list(_row(0, SceneOutcome(0, ("",), "")))
 
 
 def _rows_at(path: Path, seed: int, indices: Sequence[int]) -> list[dict[str, Any]]:

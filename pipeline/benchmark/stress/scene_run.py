@@ -8,9 +8,9 @@ from time import process_time
 import numpy as np
 
 from pipeline.benchmark.stress.axes import draw
-from pipeline.benchmark.stress.plan import Plan, entry, lumen_grid
+from pipeline.benchmark.stress.plan import ScenePlan, entry, lumen_grid
 from pipeline.benchmark.stress.statics import assemble
-from pipeline.benchmark.stress.verdict import Verdict, judge
+from pipeline.benchmark.stress.verdict import SceneVerdict, judge
 from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
 
 DEEP_EVERY = 3
@@ -18,7 +18,7 @@ DEEP_EVERY = 3
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SceneOutcome:
     """How one scene ended.
 
     outcome : converged, refused, a status identifier.     fault : empty if that is sound.     seconds : of processor
@@ -38,7 +38,7 @@ class Outcome:
     seconds: float = 0.0
 
 
-def run_scene(seed: int, index: int) -> Outcome:
+def run_scene(seed: int, index: int) -> SceneOutcome:
     """Build, run and judge scene ``index``; an exception other than a well-formed refusal is a fault."""
     plan = draw(seed, index)
     clock = process_time()
@@ -55,10 +55,10 @@ def run_scene(seed: int, index: int) -> Outcome:
         seconds = process_time() - clock
         verdicts = [judge(plan, wire, wall, s, e, index % DEEP_EVERY == 0) for s, e in results]
         return _outcome(plan, [s for s, _ in results], verdicts, seconds)
-    return Outcome(index, plan.axes, outcome, fault, detail, seconds=process_time() - clock)
+    return SceneOutcome(index, plan.axes, outcome, fault, detail, seconds=process_time() - clock)
 
 
-def build(plan: Plan) -> tuple[GuideWire, VesselWall | None]:
+def build(plan: ScenePlan) -> tuple[GuideWire, VesselWall | None]:
     """The plan's wire and wall; ValueError where they refuse it."""
     wire = GuideWire(plan.segment_mm, plan.radius_mm, plan.stiffness, plan.rest, plan.torsion)
     if not plan.wall:
@@ -66,7 +66,7 @@ def build(plan: Plan) -> tuple[GuideWire, VesselWall | None]:
     return wire, VesselWall(lumen_grid(plan), plan.wall_stiffness, plan.friction, plan.hull)
 
 
-def solve(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[Solution, float]]:
+def solve(plan: ScenePlan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[Solution, float]]:
     """Solutions, each with the energy that its last relaxation started from."""
     at, direction, axis = entry(plan)
     if plan.way == "insertion":
@@ -89,7 +89,7 @@ def solve(plan: Plan, wire: GuideWire, wall: VesselWall | None) -> list[tuple[So
     return [(s, s.work["start_energy_N_mm"]) for s in found]
 
 
-def _straight_energy(plan: Plan, wire: GuideWire, wall: VesselWall | None, solution: Solution) -> float:
+def _straight_energy(plan: ScenePlan, wire: GuideWire, wall: VesselWall | None, solution: Solution) -> float:
     """Energy of the wire laid straight along the entry direction, by the second assembly."""
     chain = assemble(wire, wall, plan.depths[0], plan.load_N)
     angles = np.zeros((len(chain.length), 3))
@@ -97,11 +97,13 @@ def _straight_energy(plan: Plan, wire: GuideWire, wall: VesselWall | None, solut
     return chain.energy(*chain.roll_out(angles, solution.joints_mm[0], solution.frames[0]))
 
 
-def _outcome(plan: Plan, solutions: list[Solution], verdicts: list[Verdict], seconds: float) -> Outcome:
+def _outcome(
+    plan: ScenePlan, solutions: list[Solution], verdicts: list[SceneVerdict], seconds: float
+) -> SceneOutcome:
     """The first fault, the last status that is not "converged", and the worst of what was measured."""
     bad = next((v for v in verdicts if v.fault), None)
     failed = [s.status for s in solutions if s.status is not Status.CONVERGED]
-    return Outcome(
+    return SceneOutcome(
         plan.index,
         plan.axes,
         failed[-1].identifier if failed else "converged",

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class StaticChain:
     """A wire of k joints at one depth, with its wall and a dead load (k + 1, 3) on its nodes, N.
 
     length (k,) of the segments; bend and twist (k,): stiffness of the joints; rest (k,): their rest bend, rad, and
@@ -112,7 +112,7 @@ class Chain:
 
 def assemble(
     wire: GuideWire, wall: VesselWall | None, depth_mm: float, tip_load_N: ArrayLike = (0.0, 0.0, 0.0)
-) -> Chain:
+) -> StaticChain:
     """The chain of a wire at a depth: a joint owns half of either segment, the clamp half of the first only."""
     k, first = wire.segments_at(depth_mm)
     length = np.full(k, wire.segment_mm)
@@ -128,7 +128,7 @@ def assemble(
     load[k] = tip_load_N
     at_rest = Rotation.from_rotvec(np.column_stack([np.zeros(k), rest, np.zeros(k)]))
     kinds = 3 if wire.twists else 2
-    return Chain(wire, wall, length, 1.0 / compliance, twist, rest, at_rest, load, kinds)
+    return StaticChain(wire, wall, length, 1.0 / compliance, twist, rest, at_rest, load, kinds)
 
 
 def _integral(

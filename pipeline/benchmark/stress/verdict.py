@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.benchmark.stress.plan import Plan
-from pipeline.benchmark.stress.statics import Array, Chain, assemble
+from pipeline.benchmark.stress.plan import ScenePlan
+from pipeline.benchmark.stress.statics import Array, StaticChain, assemble
 from solver import GuideWire, Solution, VesselWall
 
 STRETCH = 1e-12
@@ -38,7 +38,7 @@ PUBLISHED = (
 
 
 @dataclass(frozen=True)
-class Verdict:
+class SceneVerdict:
     """fault : empty, or what is wrong.     residual : relative moment left.     stretch : relative."""
 
     fault: str = ""
@@ -48,8 +48,13 @@ class Verdict:
 
 
 def judge(
-    plan: Plan, wire: GuideWire, wall: VesselWall | None, solution: Solution, start_energy: float, deep: bool
-) -> Verdict:
+    plan: ScenePlan,
+    wire: GuideWire,
+    wall: VesselWall | None,
+    solution: Solution,
+    start_energy: float,
+    deep: bool,
+) -> SceneVerdict:
     """Judge one solution.
 
     start_energy : of the state that the last relaxation began with, NaN where it is not known.
@@ -57,25 +62,25 @@ def judge(
     """
     broken = [name for name in PUBLISHED if not np.all(np.isfinite(getattr(solution, name)))]
     if broken:
-        return Verdict("nan", ", ".join(broken))
+        return SceneVerdict("nan", ", ".join(broken))
     if len(solution.joints_mm) < 2:
-        return Verdict()
+        return SceneVerdict()
     chain = assemble(wire, wall, solution.depth_mm, plan.load_N)
     # relative to the larger of length and coordinates, whose last place bounds what can be kept
     steps = np.linalg.norm(np.diff(solution.joints_mm, axis=0), axis=1)
     reach = np.maximum(chain.length, np.abs(solution.joints_mm).max())
     stretch = float(np.max(np.abs(steps - chain.length) / reach))
     if not stretch <= STRETCH:
-        return Verdict("stretched", f"{stretch:.3g}", stretch=stretch)
+        return SceneVerdict("stretched", f"{stretch:.3g}", stretch=stretch)
     if solution.energy_N_mm > start_energy + ROSE * abs(start_energy) + 1e-15:
-        return Verdict("energy_rose", f"{start_energy!r} to {solution.energy_N_mm!r}", stretch=stretch)
+        return SceneVerdict("energy_rose", f"{start_energy!r} to {solution.energy_N_mm!r}", stretch=stretch)
     known = plan.friction == 0.0 and (plan.hull == "offset" or plan.quadrature == "joints")
     if not (solution.converged and known):
-        return Verdict(stretch=stretch)
+        return SceneVerdict(stretch=stretch)
     return replace(_at_rest(chain, solution, plan.quadrature == "joints", deep), stretch=stretch)
 
 
-def _at_rest(chain: Chain, solution: Solution, at_joints: bool, deep: bool) -> Verdict:
+def _at_rest(chain: StaticChain, solution: Solution, at_joints: bool, deep: bool) -> SceneVerdict:
     """Do the moments of a wire called converged balance, and is there no way down from it?
 
     at_joints : the solver looks the wall up where the second assembly does; else its own contact forces are taken.
@@ -84,18 +89,18 @@ def _at_rest(chain: Chain, solution: Solution, at_joints: bool, deep: bool) -> V
     parts = abs(solution.bending_energy_N_mm) + abs(solution.wall_energy_N_mm)
     energy = chain.energy(*state)
     if at_joints and abs(energy - solution.energy_N_mm) > 1e-6 * (parts + 1e-9 + abs(energy)):
-        return Verdict("wrong_energy", f"{solution.energy_N_mm!r}, is {energy!r}")
+        return SceneVerdict("wrong_energy", f"{solution.energy_N_mm!r}, is {energy!r}")
     gradient, elastic = chain.moments(*state, None if at_joints else np.asarray(solution.contact_force_N))
     scale = max(float(np.abs(elastic).max()), MOMENT_FLOOR_RAD * float(chain.bend.max()))
     residual = float(np.abs(gradient).max()) / scale
     left = float(np.sum(gradient**2 / (2.0 * chain.bend[:, None])))
     if not (residual <= RESIDUAL + _noise(chain, solution) / scale or left <= ENERGY_PLACE * parts):
-        return Verdict("not_at_rest", f"moment {residual:.3g} of the largest", residual)
+        return SceneVerdict("not_at_rest", f"moment {residual:.3g} of the largest", residual)
     down = _way_down(chain, solution, parts) if deep and at_joints else ""
-    return Verdict("no_minimum" if down else "", down, residual)
+    return SceneVerdict("no_minimum" if down else "", down, residual)
 
 
-def _noise(chain: Chain, solution: Solution) -> float:
+def _noise(chain: StaticChain, solution: Solution) -> float:
     """Moment that the last place of the coordinates makes through the wall's stiffness, N mm."""
     if chain.wall is None:
         return 0.0
@@ -105,7 +110,7 @@ def _noise(chain: Chain, solution: Solution) -> float:
     return place * chain.wall.stiffness_N_mm2 * float(length.max()) * touching * float(length.sum())
 
 
-def _way_down(chain: Chain, solution: Solution, parts: float) -> str:
+def _way_down(chain: StaticChain, solution: Solution, parts: float) -> str:
     """A sentence where the Hessian, by central differences of the second assembly, has a negative direction."""
     if chain.kinds * len(chain.length) > HESSIAN_DOFS:
         return ""
