@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from data_synthetic._compile import on_disk
-from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.geometry import Array, Index
 
 Vector = tuple[float, float, float]
 

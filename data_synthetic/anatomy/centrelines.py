@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.geometry import Array, Index
 
 LONGEST_EDGE_MM = 5.0
 """Longer SWC edges join trees that are not joined in the body (BraVa opens the circle of Willis); they are cut."""

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from data_synthetic.anatomy.centrelines import Tree
 from data_synthetic.anatomy.tubes import Anatomy, Tube, sweep
-from data_synthetic.geometry.vectors import Array, Index, arc_lengths, at_arc
+from data_synthetic.geometry import Array, Index, arc_lengths, at_arc
 
 STEP_MM = 0.5
 SMOOTHING_MM = 2.0

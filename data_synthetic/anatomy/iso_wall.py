@@ -14,8 +14,7 @@ from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from data_synthetic._compile import on_disk
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume, voxels_near
-from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.geometry import Array, Index, ScanGrid, Volume, voxels_near
 
 BAND_MM = 1.5
 """Distances are exact up to here and cut beyond: a wire touches at less than its radius."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
-from data_synthetic.geometry.vectors import Array, ends_of
+from data_synthetic.geometry import Array, ends_of
 
 INLET_MM = 12.0
 """Straight vessel below the origin, so that the entry lies well inside it."""

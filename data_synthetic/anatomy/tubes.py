@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from data_synthetic.anatomy import _kernels as kernels
-from data_synthetic.geometry.vectors import Array, arc_lengths
+from data_synthetic.geometry import Array, arc_lengths
 
 STEP_MM = 0.25
 """Arc length between samples of a tube, about: they divide it evenly."""

@@ -10,8 +10,7 @@ from skimage.morphology import skeletonize
 
 from data_synthetic.anatomy.from_tree import smooth_tube
 from data_synthetic.anatomy.tubes import Tube
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume
-from data_synthetic.geometry.vectors import Array, Index, arc_lengths
+from data_synthetic.geometry import Array, Index, ScanGrid, Volume, arc_lengths
 
 Mask = NDArray[np.bool_]
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Anatomy, Tube, ball, sweep
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array
 
 DIAMETERS_MM = {
     "cavernous": (5.0, 0.6),

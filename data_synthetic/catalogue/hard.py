@@ -10,7 +10,7 @@ from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.tubes import Anatomy, sweep
 from data_synthetic.catalogue.plain import bend, plain_setup
 from data_synthetic.catalogue.scene import Setup, scene
-from data_synthetic.geometry.vectors import rotate
+from data_synthetic.geometry import rotate
 from data_synthetic.scanner import Greys
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from data_synthetic.catalogue.scene import NamedScene, Setup
-from data_synthetic.geometry.vectors import arc_lengths
+from data_synthetic.geometry import arc_lengths
 from data_synthetic.scanner.c_arm import ABSENT
 
 BONE_WIRES = 1.8

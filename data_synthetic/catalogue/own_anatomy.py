@@ -10,7 +10,7 @@ import numpy as np
 from data_synthetic.anatomy.centrelines import read_tree
 from data_synthetic.anatomy.from_tree import way_through
 from data_synthetic.catalogue.scene import NamedScene, Setup, spread
-from data_synthetic.geometry.vectors import world_axis_across
+from data_synthetic.geometry import world_axis_across
 from data_synthetic.rod.steer import steer
 
 ENTRY_ARC_MM, END_MM = 3.0, 4.0

@@ -14,8 +14,7 @@ from data_synthetic.anatomy.tubes import Anatomy, Tube
 from data_synthetic.anatomy.vessel_way import find_way, vessel_threshold
 from data_synthetic.catalogue.own_anatomy import steered
 from data_synthetic.catalogue.scene import NamedScene, Setup, spread
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume
-from data_synthetic.geometry.vectors import world_axis_across
+from data_synthetic.geometry import ScanGrid, Volume, world_axis_across
 from data_synthetic.scanner import Greys, PsfScanner
 
 VESSEL_GREY = 1000.0

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Tube
-from data_synthetic.geometry.scan_grid import ScanGrid
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array, ScanGrid
 from data_synthetic.rod.replay import TrueInsertion
 from data_synthetic.rod.rod import Wall
 from data_synthetic.rod.wire import TrueWire

@@ -11,8 +11,7 @@ import numpy as np
 
 from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory, Setup
-from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
-from data_synthetic.geometry.vectors import normal_to, rotate, unit
+from data_synthetic.geometry import ScanGrid, centred_grid, normal_to, rotate, unit
 from data_synthetic.rod.replay import TrueFrame
 from data_synthetic.rod.truth import converged_truth
 from data_synthetic.scanner.phantom import Scan, Wires

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.geometry import Array, Index
 from data_synthetic.rod.rod import Rod, Wall
 
 PLACES, WEIGHTS = (

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array
 from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.rod import Rod

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, solveh_banded
 
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array
 from data_synthetic.rod import _kernels as kernels
 from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.contact import add_wall, wall_energy

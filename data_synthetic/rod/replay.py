@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from data_synthetic.geometry.vectors import Array, at_arc, ends_of, normal_to, rotate, unit
+from data_synthetic.geometry import Array, at_arc, ends_of, normal_to, rotate, unit
 from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.friction import by_tip, held_back, relax_with_friction
 from data_synthetic.rod.relax import Equilibrium, relax

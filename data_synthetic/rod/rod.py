@@ -8,7 +8,7 @@ import numpy as np
 
 from data_synthetic.anatomy.iso_wall import IsoWall
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.geometry.vectors import Array, ends_of
+from data_synthetic.geometry import Array, ends_of
 from data_synthetic.rod._kernels import Elastic, Shape, carry
 from data_synthetic.rod.sliders import Sliders
 from data_synthetic.rod.wire import RIGID_TORSION_N_MM2, TrueWire, cell_means

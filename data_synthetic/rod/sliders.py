@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array
 
 ELASTIC_SLIP_MM = 2e-3
 """A slider gives by this much before it slips: a fifth of the truth's own accuracy of 0.01 mm."""

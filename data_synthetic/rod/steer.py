@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array, arc_lengths
+from data_synthetic.geometry import Array, arc_lengths
 from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
 
 ROLLS_DEG = (0.0, 90.0, 180.0, 270.0, 30.0, 120.0, 210.0, 300.0, 60.0, 150.0, 240.0, 330.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from data_synthetic.geometry.vectors import Array, ends_of
+from data_synthetic.geometry import Array, ends_of
 
 Profile = tuple[tuple[float, float], ...]
 

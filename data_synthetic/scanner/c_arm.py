@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects
 
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array, ScanGrid, Volume
 
 ABSENT = (
     "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"

@@ -14,12 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array, ScanGrid, Volume
 from data_synthetic.scanner.c_arm import Arc, CArm
 from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
-from data_synthetic.scanner.particles import splat, wire_particles
-from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires, splat, wire_particles
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""

@@ -7,8 +7,7 @@ import numpy as np
 from data_synthetic._compile import on_disk
 from data_synthetic.anatomy._kernels import TubeTables, union_distance
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.geometry.scan_grid import ScanGrid, Volume, voxels_near
-from data_synthetic.geometry.vectors import Array, Index
+from data_synthetic.geometry import Array, Index, ScanGrid, Volume, voxels_near
 
 SUBSAMPLES = 4
 """Sub-voxels per axis where the wall crosses a voxel, the wall being a plane in each."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from data_synthetic._compile import on_disk
 from data_synthetic.anatomy.tubes import Anatomy
-from data_synthetic.geometry.vectors import Array
+from data_synthetic.geometry import Array, Volume, arc_lengths, at_arc
 
 Scan = NDArray[np.int16]
 Wires = Sequence[tuple[Array, float]]
@@ -47,3 +49,54 @@ class Phantom:
     bone: Anatomy | None = None
     bone_gap_mm: float = 1.2
     greys: Greys = field(default_factory=Greys)
+
+
+CUT = 4.0
+"""Gaussians are cut at this many sd: the rest of the weight is 6e-5."""
+
+RING_POINTS, RINGS = 16, 4
+"""Points over the wire's cross-section, rings of equal area."""
+
+
+def wire_particles(points_mm: Array, radius_mm: float, step_mm: float) -> tuple[Array, float]:
+    """Points (n, 3) that fill the wire evenly, and the volume in mm3 that each stands for."""
+    arc = arc_lengths(points_mm)
+    count = max(int(np.ceil(arc[-1] / step_mm)), 1)
+    places = (np.arange(count) + 0.5) * arc[-1] / count
+    centre = at_arc(places, arc, points_mm)
+    tangent = np.diff(points_mm, axis=0)[np.clip(np.searchsorted(arc, places) - 1, 0, len(arc) - 2)]
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    seed = np.where(np.abs(tangent[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = np.cross(tangent, seed)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangent, first)
+    # the cross-section: rings of equal area, every other one turned by half a point
+    ring = radius_mm * np.sqrt((np.arange(RINGS)[:, None] + 0.5) / RINGS)
+    angle = 2.0 * np.pi * (np.arange(RING_POINTS)[None] + 0.5 * (np.arange(RINGS)[:, None] % 2)) / RING_POINTS
+    x, y = (ring * np.cos(angle)).reshape(-1, 1), (ring * np.sin(angle)).reshape(-1, 1)
+    filled = centre[:, None] + x * first[:, None] + y * second[:, None]
+    volume = np.pi * radius_mm**2 * arc[-1] / (count * len(x))
+    return filled.reshape(-1, 3), float(volume)
+
+
+@on_disk()
+def splat(index: Array, weights: Array, sigma: Array, out: Volume) -> None:
+    """Add weighted points (n, 3), in voxels, blurred by a Gaussian (sd per axis) and integrated over every voxel."""
+    reach = np.ceil(CUT * sigma + 0.5).astype(np.int64)
+    profile = np.zeros((3, 2 * reach.max() + 1))
+    low, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
+    for n in range(len(index)):
+        for a in range(3):
+            low[a] = int(np.rint(index[n, a])) - reach[a]
+            first[a], last[a] = max(0, -low[a]), min(2 * reach[a] + 1, out.shape[a] - low[a])
+            scale = 1.0 / (np.sqrt(2.0) * sigma[a])
+            below = math.erf((low[a] - 0.5 - index[n, a]) * scale)
+            for i in range(2 * reach[a] + 1):
+                above = math.erf((low[a] + i + 0.5 - index[n, a]) * scale)
+                profile[a, i] = 0.5 * (above - below)
+                below = above
+        for i in range(first[0], last[0]):
+            for j in range(first[1], last[1]):
+                part = weights[n] * profile[0, i] * profile[1, j]
+                for k in range(first[2], last[2]):
+                    out[low[0] + i, low[1] + j, low[2] + k] += part * profile[2, k]

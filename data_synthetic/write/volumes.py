@@ -10,7 +10,7 @@ import numpy as np
 import SimpleITK as sitk
 from numpy.typing import NDArray
 
-from data_synthetic.geometry.scan_grid import ScanGrid
+from data_synthetic.geometry import ScanGrid
 
 FORMATS = ("mha", "nrrd", "nii.gz", "dicom", "h5")
 HDF5_FILE = "study.h5"

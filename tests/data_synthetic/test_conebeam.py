@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("itk", reason="needs the extra [conebeam]")
 
 from data_synthetic.anatomy.tubes import Anatomy, sweep
-from data_synthetic.geometry.scan_grid import ScanGrid, centred_grid
+from data_synthetic.geometry import ScanGrid, centred_grid
 from data_synthetic.scanner import Greys, Phantom
 from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
 

@@ -13,7 +13,7 @@ from data_synthetic import catalogue
 from data_synthetic.catalogue import Wanted
 from data_synthetic.catalogue.limits import largest_voxel, width_of_way
 from data_synthetic.catalogue.study import scan_grid
-from data_synthetic.geometry.vectors import arc_lengths
+from data_synthetic.geometry import arc_lengths
 from tests.studies.catalogue import size_of
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from data_synthetic import catalogue
-from data_synthetic.geometry.scan_grid import ScanGrid
+from data_synthetic.geometry import ScanGrid
 from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
 
 Array = NDArray[np.float64]

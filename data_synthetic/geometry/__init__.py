@@ -1,1 +1,0 @@
-"""Directions, curves and voxel grids: what every room of the package measures with."""
