@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.commands.common import add_settings, complain, resolved_settings, say, settings_of
+from pipeline.commands import add_settings, complain, resolved_settings, say, settings_of
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -84,7 +84,7 @@ def _plan(args: argparse.Namespace) -> Plan:
     from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
     from pipeline.run.store import default_root
-    from pipeline.study.suggest import did_you_mean
+    from pipeline.status import did_you_mean
 
     manifest, assumptions = _manifest(args)
     settings = resolved_settings(args)

@@ -14,8 +14,7 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from pipeline.arrays.polyline import smooth, to_length
-from pipeline.compare.distance import point_to_curve
-from pipeline.compare.metrics import rms
+from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, VesselWall, relax

@@ -11,12 +11,10 @@ from time import perf_counter
 
 import solver
 from pipeline.run import results, rows, views
-from pipeline.run.keys import digest
-from pipeline.run.log import Log, Stage
-from pipeline.run.progress import CaseProgress
+from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import Store
+from pipeline.run.store import Store, digest
 from pipeline.study.schema import Case
 from pipeline.study.settings import Resolved
 from reports import tables

@@ -11,17 +11,16 @@ from typing import Any
 import numpy as np
 
 from pipeline.run import sweep
-from pipeline.run.aggregate import Totals, aggregate
+from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
 from pipeline.run.case import Job, finished, run_case
-from pipeline.run.junit import write_junit
-from pipeline.run.keys import file_hash
 from pipeline.run.provenance import collect
 from pipeline.run.results import crashed, found_results, write_json
+from pipeline.run.store import file_hash
+from pipeline.status import did_you_mean
 from pipeline.study.manifest import Manifest
 from pipeline.study.schema import Case
 from pipeline.study.settings import to_toml
-from pipeline.study.suggest import did_you_mean
 from reports.atomic import write_text
 from reports.html import render_index
 from reports.schema import ERRORS, POINTS

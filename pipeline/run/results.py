@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.load.scans import Scans
+from pipeline.load import Scans
 from pipeline.register.frames import record
-from pipeline.run.keys import file_hash
 from pipeline.run.log import Log
 from pipeline.run.rows import CaseRows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
+from pipeline.run.store import file_hash
 from pipeline.study.schema import Case
 from reports.atomic import write_text
 

@@ -9,10 +9,10 @@ import numpy as np
 from skimage.measure import marching_cubes
 
 from pipeline.model import Lumen, Volume
-from pipeline.run.projections import projections
 from pipeline.run.rows import contact_at
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.trace import projections
 from reports import export, frames_file
 
 SIMULATED_COLOUR = (0.835, 0.369, 0.0)

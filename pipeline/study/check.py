@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import LoadError, Source
+from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
-from pipeline.load.scans import Scans, read_headers
-from pipeline.study.config import Config
 from pipeline.study.schema import Case, not_one_per_frame
+from pipeline.study.settings import Config
 
 
 def check(cases: Sequence[Case], config: Config) -> list[str]:

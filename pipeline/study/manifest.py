@@ -11,8 +11,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.model import Wall, Wire
+from pipeline.status import did_you_mean
 from pipeline.study.schema import WHOLE_CASE, Case, ManifestTables
-from pipeline.study.suggest import did_you_mean
 
 
 class ManifestError(Exception):

@@ -22,7 +22,7 @@ from pydantic_core import PydanticCustomError
 from pipeline.load import Source
 from pipeline.model import Wall, Wire
 from pipeline.ranges import Axis, Direction, Finite, Positive, Vector
-from pipeline.study.suggest import did_you_mean
+from pipeline.status import did_you_mean
 
 WHOLE_CASE = "whole_case"
 """Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""

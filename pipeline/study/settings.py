@@ -1,18 +1,37 @@
-"""Where each setting comes from: command line > config file > default; unknown or ill-typed ones are all listed."""
+"""Every setting of a run, one TOML table for each stage's frozen dataclass, and where each setting comes from.
+
+Command line > config file > default; unknown or ill-typed ones are all listed.
+"""
 
 from __future__ import annotations
 
 import json
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.study.config import Config
-from pipeline.study.suggest import did_you_mean
+from pipeline.compare.config import CompareConfig
+from pipeline.load.config import LoadConfig
+from pipeline.segment.config import SegmentConfig
+from pipeline.simulate.config import SimulateConfig, SolverConfig
+from pipeline.status import did_you_mean
+from pipeline.trace.config import TraceConfig
+
+
+@dataclass(frozen=True)
+class Config:
+    """All settings of a run."""
+
+    load: LoadConfig = field(default_factory=LoadConfig)
+    segment: SegmentConfig = field(default_factory=SegmentConfig)
+    trace: TraceConfig = field(default_factory=TraceConfig)
+    solver: SolverConfig = field(default_factory=SolverConfig)
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
+    compare: CompareConfig = field(default_factory=CompareConfig)
 
 
 class SettingsError(Exception):

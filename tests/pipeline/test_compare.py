@@ -42,7 +42,7 @@ def test_repeated_points_and_single_points_are_no_trouble() -> None:
 def test_blocks_of_points_give_the_same_as_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     points, curve = random_curve(3, 50), random_curve(4, 40)
     whole = point_to_curve(points, curve)
-    monkeypatch.setattr("pipeline.compare.distance.PAIRS_AT_ONCE", 100)
+    monkeypatch.setattr("pipeline.compare.metrics.PAIRS_AT_ONCE", 100)
     np.testing.assert_array_equal(whole, point_to_curve(points, curve))
 
 

@@ -10,9 +10,8 @@ import pytest
 
 from pipeline.model import Clamp, Lumen, Simulated
 from pipeline.run.stages.load import rolls
-from pipeline.simulate import insertion_of, simulate
+from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
-from pipeline.simulate.replay import guide_wire
 from pipeline.study.manifest import read_manifest
 from pipeline.study.schema import Case
 from solver.grid import Grid

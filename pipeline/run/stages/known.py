@@ -10,16 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.compare import Comparison
-from pipeline.load import Crop
-from pipeline.load.scans import Scans
+from pipeline.load import Crop, Scans
 from pipeline.model import Array, Clamp, Curve, Lumen, Simulated, Volume
 from pipeline.register import Registration
-from pipeline.run.keys import key_of
 from pipeline.run.log import Log, Stage
-from pipeline.run.store import Store
+from pipeline.run.store import Store, key_of
 from pipeline.status import FrameStatus, StageError
-from pipeline.study.config import Config
 from pipeline.study.schema import Case
+from pipeline.study.settings import Config
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
-from pipeline.load.scans import read_headers
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.study.schema import not_one_per_frame
 
