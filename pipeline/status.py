@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from enum import Enum
 
@@ -41,6 +41,14 @@ class StageError(Exception):
     def __init__(self, status: FrameStatus, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+class InputError(Exception):
+    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
 
 
 def did_you_mean(key: str, allowed: Iterable[str]) -> str:

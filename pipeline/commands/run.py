@@ -89,11 +89,9 @@ def _plan(args: argparse.Namespace) -> Plan:
     manifest, assumptions = _manifest(args)
     settings = resolved_settings(args)
     if args.until not in STAGES:
-        msg = f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"
-        raise UsageError(msg)
+        raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.jobs < 1:
-        msg = f"-j {args.jobs}: expected 1 or more"
-        raise UsageError(msg)
+        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     cache = None if args.no_cache else default_root()
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
     points = tuple(sweep.points_of(args.sweep, settings_of(args)))
@@ -115,13 +113,14 @@ def _manifest(args: argparse.Namespace) -> tuple[Manifest, tuple[str, ...]]:
     if not path.is_dir():
         return read_manifest(path), ()
     entry, direction = _vector(args.entry, "--entry"), _vector(args.direction, "--direction")
-    inferred = infer_manifest(path, entry, direction, args.wire_radius, resolved_settings(args).config.load)
-    say(inferred.text)
-    for note in inferred.assumptions:
+    load = resolved_settings(args).config.load
+    text, assumptions = infer_manifest(path, entry, direction, args.wire_radius, load)
+    say(text)
+    for note in assumptions:
         say(f"assumed: {note}")
     written = args.out / "manifest.inferred.toml"
-    write_text(written, inferred.text)
-    return read_manifest(written), inferred.assumptions
+    write_text(written, text)
+    return read_manifest(written), assumptions
 
 
 def _vector(text: str | None, name: str) -> Any:
@@ -136,6 +135,5 @@ def _vector(text: str | None, name: str) -> Any:
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,):
-        msg = f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"
-        raise UsageError(msg)
+        raise UsageError([f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"])
     return values

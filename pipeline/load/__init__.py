@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry
+from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry, unusable
 from pipeline.model import Counters, Volume
 
 __all__ = [
@@ -66,8 +66,8 @@ def read_header(
     """
     source = source if isinstance(source, Source) else Source(Path(source))
     if not source.path.exists():
-        msg = f"{source.path}: no such file or folder; check the path in the manifest (relative to the manifest itself)"
-        raise LoadError(msg)
+        why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
+        raise unusable(source.path, why)
     header = _format_of(source.path).read_header(source, config)
     if spacing_mm is None:
         return header
@@ -82,8 +82,8 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     values = _format_of(header.source.path).read(header, (start, stop), config)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
-        msg = f"{header.source}: {bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
-        raise LoadError(msg)
+        why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
+        raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)
     return Volume(values, header.spacing_mm, origin, header.direction, header.assumed, made_of)

@@ -16,7 +16,7 @@ import SimpleITK as sitk
 from numpy.typing import NDArray
 
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source
+from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 
 LONGEST_HEADER = 65536
 TYPES = {
@@ -110,11 +110,11 @@ def _geometry(reader: sitk.ImageFileReader, source: Source) -> tuple[Any, Any, A
     origin = np.array(reader.GetOrigin()[:3])
     direction = np.array(reader.GetDirection()).reshape(dimension, dimension)[:3, :3]
     if np.abs(direction.T @ direction - np.eye(3)).max() > ORTHONORMAL:
-        msg = (
-            f"{source.path}: the axes are sheared or scaled, direction {direction.round(5).tolist()}; "
-            "allowed: an orthonormal matrix (a tilted gantry gives this). Resample the scan onto a regular grid first."
+        why = (
+            f"the axes are sheared or scaled, direction {direction.round(5).tolist()}; allowed: an orthonormal matrix "
+            "(a tilted gantry gives this). Resample the scan onto a regular grid first."
         )
-        raise LoadError(msg)
+        raise unusable(source.path, why)
     return spacing, origin, direction
 
 
@@ -144,11 +144,11 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
     reader = _reader(source)
     size = reader.GetSize()
     if len(size) not in (3, 4) or reader.GetNumberOfComponents() != 1 or min(size) < 1:
-        msg = (
-            f"{source.path}: got {len(size)} axes {tuple(size)} with {reader.GetNumberOfComponents()} component(s) per "
-            "voxel; allowed: a 3-D grey-value volume, or a 4-D file that is a sequence of them."
+        why = (
+            f"got {len(size)} axes {tuple(size)} with {reader.GetNumberOfComponents()} component(s) per voxel; "
+            "allowed: a 3-D grey-value volume, or a 4-D file that is a sequence of them."
         )
-        raise LoadError(msg)
+        raise unusable(source.path, why)
     spacing, origin, direction = _geometry(reader, source)
     return Header(
         source,
@@ -180,5 +180,5 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
         return to_xyz(reader.Execute())
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1]
-        msg = f"{header.source}: the voxels cannot be read: {reason}\n  The file may be cut short; copy it again."
-        raise LoadError(msg) from None
+        why = f"the voxels cannot be read: {reason}\n  The file may be cut short; copy it again."
+        raise unusable(header.source, why) from None

@@ -22,9 +22,14 @@ class LoadError(StageError):
         super().__init__(FrameStatus.LOAD_FAILED, message)
 
 
+def unusable(what: object, why: str) -> LoadError:
+    """The error for a file or a scan that cannot be used, and why."""
+    return LoadError(f"{what}: {why}")
+
+
 def refused(path: Path, got: str, allowed: str, do: str) -> LoadError:
     """The error for a file that holds something else than it should."""
-    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
+    return unusable(path, f"got {got}; expected {allowed}; {do}")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pipeline.run.case import Job, finished, run_case
 from pipeline.run.provenance import collect
 from pipeline.run.results import crashed, found_results, write_json
 from pipeline.run.store import file_hash
-from pipeline.status import did_you_mean
+from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Manifest
 from pipeline.study.schema import Case
 from pipeline.study.settings import to_toml
@@ -28,7 +28,7 @@ from reports.schema import ERRORS, POINTS
 CASE_FILES = (ERRORS.file, POINTS.file, "frames.h5", "report.html")
 
 
-class UsageError(Exception):
+class UsageError(InputError):
     """A command line that cannot be carried out."""
 
 
@@ -64,8 +64,7 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
     by_id = {case.id: case for case in cases}
     unknown = [name for name in only if name not in by_id]
     if unknown:
-        msg = f"--only {unknown[0]!r}: no such case; {did_you_mean(unknown[0], by_id)}"
-        raise UsageError(msg)
+        raise UsageError([f"--only {unknown[0]!r}: no such case; {did_you_mean(unknown[0], by_id)}"])
     ids = [name for name in by_id if not only or name in only]
     if shard:
         index, count = _shard(shard)
@@ -77,8 +76,7 @@ def _shard(text: str) -> tuple[int, int]:
     parts = text.split("/")
     if len(parts) == 2 and all(p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
         return int(parts[0]), int(parts[1])
-    msg = f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"
-    raise UsageError(msg)
+    raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
 def guard_out(out: Path, manifest: Path) -> None:
@@ -91,10 +89,8 @@ def guard_out(out: Path, manifest: Path) -> None:
         return
     if known != file_hash(manifest):
         what = "was made from another manifest" if known else "is not empty and holds no run"
-        msg = (
-            f"{out} {what}; name another folder, or say --resume (keep what fits) or --fresh (compute again)"
-        )
-        raise UsageError(msg)
+        allowed = "name another folder, or say --resume (keep what fits) or --fresh (compute again)"
+        raise UsageError([f"{out} {what}; {allowed}"])
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:

@@ -11,16 +11,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from pipeline.model import Wall, Wire
-from pipeline.status import did_you_mean
+from pipeline.status import InputError, did_you_mean
 from pipeline.study.schema import WHOLE_CASE, Case, ManifestTables
 
 
-class ManifestError(Exception):
-    """The manifest cannot be used; ``problems`` lists everything that is wrong with it."""
-
-    def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
+class ManifestError(InputError):
+    """The manifest cannot be used."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -18,7 +18,7 @@ from pipeline.compare.config import CompareConfig
 from pipeline.load.config import LoadConfig
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
-from pipeline.status import did_you_mean
+from pipeline.status import InputError, did_you_mean
 from pipeline.trace.config import TraceConfig
 
 
@@ -34,12 +34,8 @@ class Config:
     compare: CompareConfig = field(default_factory=CompareConfig)
 
 
-class SettingsError(Exception):
-    """Settings that cannot be used; ``problems`` lists all of them."""
-
-    def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
+class SettingsError(InputError):
+    """Settings that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +48,11 @@ class Resolved:
     def as_dict(self) -> dict[str, dict[str, dict[str, Any]]]:
         """{table: {key: {"value", "source"}}}, as result.json holds it."""
         return {
-            table.name: {
-                item.name: {
-                    "value": getattr(getattr(self.config, table.name), item.name),
-                    "source": self.origin.get(f"{table.name}.{item.name}", "default"),
-                }
-                for item in fields(getattr(self.config, table.name))
+            table: {
+                key: {"value": value, "source": self.origin.get(f"{table}.{key}", "default")}
+                for key, value in values.items()
             }
-            for table in fields(self.config)
+            for table, values in asdict(self.config).items()
         }
 
 
@@ -104,7 +97,8 @@ def read_settings(path: Path) -> list[Setting]:
 
 def resolve(settings: Sequence[Setting]) -> Resolved:
     """Apply settings in order (later ones win); raises SettingsError listing every problem."""
-    config, origin, problems = Config(), {}, []
+    config, origin = Config(), {}
+    problems: list[str] = []
     for setting in settings:
         try:
             config = _applied(config, setting)
