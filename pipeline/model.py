@@ -165,7 +165,6 @@ class Simulated:
     """The simulated wire of one frame, at the depth of that frame.
 
     joints_mm : (k + 1, 3).     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
-    reaction_force_N : (3,), reaction_torque_N_mm : float or (3,), at the introducer.
     """
 
     joints_mm: Array
@@ -174,8 +173,6 @@ class Simulated:
     sentence: str
     converged: bool
     depth_mm: float
-    roll_deg: float
-    energy_N_mm: float
     iterations: int
     push_force_N: float
     max_penetration_mm: float

@@ -86,19 +86,19 @@ def run_case(job: Job) -> None:
 
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     """Every file of the case; result.json last, since it says that the case is complete."""
-    case = rows.rows_of(job.case, known, log, job.settings.config.compare.bootstrap)
-    tables.write(job.folder / ERRORS.file, ERRORS, case.errors)
+    errors = [rows.error_row(frame, log) for frame in known.frames]
+    tables.write(job.folder / ERRORS.file, ERRORS, errors)
     points = rows.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
     views.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
         views.write_view(job.folder / "view", known)
+    summary = rows.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
-    result = results.result_of(job.case, known, case, key, details)
-    result.summary["total_s"], result.summary["peak_memory_MiB"] = perf_counter() - clock, peak_memory_mib()
-    result.write(job.folder)
+    summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
+    results.result_of(job.case, known, summary, key, details).write(job.folder)
 
 
 @functools.cache

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,18 +20,8 @@ TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
 
 
-@dataclass(frozen=True, eq=False)
-class CaseRows:
-    """What the tables hold of a case: rows of errors.csv and of failures.csv, and its row of summary.csv."""
-
-    errors: tuple[Row, ...]
-    failures: tuple[Row, ...]
-    summary: Row
-
-
-def rows_of(case: Case, known: Known, log: Log, draws: int) -> CaseRows:
-    """All rows of a case. draws : resamples behind the intervals."""
-    errors = tuple(error_row(frame, log) for frame in known.frames)
+def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
+    """The row of a case in summary.csv. errors : its rows of errors.csv; draws : resamples behind the intervals."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
     good = sum(frame.ok for frame in known.frames)
@@ -41,8 +30,7 @@ def rows_of(case: Case, known: Known, log: Log, draws: int) -> CaseRows:
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and counts(row, mm)]
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
-    summary = head | pooled(scored, draws) | _forces(known.frames) | times
-    return CaseRows(errors, tuple(_failures(case.id, known)), summary)
+    return head | pooled(scored, draws) | _forces(known.frames) | times
 
 
 def error_row(frame: Frame, log: Log) -> dict[str, Any]:
@@ -53,9 +41,7 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
         "insertion_mm": frame.depth_mm,
         "roll_deg": frame.roll_deg,
     }
-    row |= {
-        f"{s}_s": log.frame_seconds[frame.index, s] for s in TIMED if (frame.index, s) in log.frame_seconds
-    }
+    row |= {f"{stage}_s": s for (index, stage), s in log.frame_seconds.items() if index == frame.index}
     row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
     row |= frame.truth
     if frame.comparison is not None:
@@ -109,7 +95,7 @@ def _forces(frames: Sequence[Frame]) -> dict[str, float]:
     }
 
 
-def _failures(case: str, known: Known) -> list[Row]:
+def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
     """Rows of failures.csv: the case itself, or each frame that is not ok."""
     log = f"cases/{case}/log.txt"
     if known.failure is not None:

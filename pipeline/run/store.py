@@ -130,7 +130,8 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data.files if name != "json"}
-                return UNPACK[stage](arrays, json.loads(str(data["json"])))
+                unpack = unpack_lumen if stage == "segment" else unpack_curve
+                return unpack(arrays, json.loads(str(data["json"])))
         except (OSError, ValueError, KeyError, EOFError):
             path.unlink(missing_ok=True)
             return None
@@ -183,10 +184,8 @@ def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
 
 def pack_curve(curve: Curve) -> Packed:
     """Arrays and JSON part of a traced curve."""
-    arrays = {
-        name: np.asarray(getattr(curve, name)) for name in ("points_mm", "sigma_mm", "flagged", "in_plane")
-    }
-    meta = {name: getattr(curve, name) for name in ("tip_sigma_mm", "note", "counters", "levels")}
+    arrays = {name: value for name, value in vars(curve).items() if isinstance(value, np.ndarray)}
+    meta = {name: value for name, value in vars(curve).items() if name not in arrays}
     return arrays, meta | {"status": curve.status.name}
 
 
@@ -194,9 +193,3 @@ def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
     """The inverse of :func:`pack_curve`."""
     fields: dict[str, Any] = {**arrays, **meta, "status": FrameStatus[meta["status"]]}
     return Curve(**fields)
-
-
-UNPACK: dict[str, Callable[[Arrays, dict[str, Any]], Lumen | Curve]] = {
-    "segment": unpack_lumen,
-    "trace": unpack_curve,
-}

@@ -89,8 +89,6 @@ def _simulated(solution: Solution, seconds: float) -> Simulated:
         sentence=solution.sentence,
         converged=solution.converged,
         depth_mm=solution.depth_mm,
-        roll_deg=solution.roll_deg,
-        energy_N_mm=solution.energy_N_mm,
         iterations=solution.iterations,
         push_force_N=solution.push_force_N,
         max_penetration_mm=solution.max_penetration_mm,

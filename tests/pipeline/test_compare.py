@@ -80,7 +80,7 @@ def open_space() -> Lumen:
 
 
 def simulated(joints: np.ndarray) -> Simulated:
-    return Simulated(joints, np.zeros_like(joints), "converged", "", True, 0.0, 0.0, 0.0, 1, 0.0, 0.0)
+    return Simulated(joints, np.zeros_like(joints), "converged", "", True, 0.0, 1, 0.0, 0.0)
 
 
 def traced(points: np.ndarray) -> Curve:
