@@ -79,9 +79,8 @@ def main(args: argparse.Namespace) -> int:
 
 def _plan(args: argparse.Namespace) -> Plan:
     """What the command line asks for; raises where it cannot be carried out."""
-    from pipeline.run import sweep
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, points_of
     from pipeline.run.log import STAGES
     from pipeline.run.store import default_root
     from pipeline.status import did_you_mean
@@ -94,7 +93,7 @@ def _plan(args: argparse.Namespace) -> Plan:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     cache = None if args.no_cache else default_root()
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
-    points = tuple(sweep.points_of(args.sweep, settings_of(args)))
+    points = tuple(points_of(args.sweep, settings_of(args)))
     cases = chosen(manifest.cases, args.only, args.shard)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path)
