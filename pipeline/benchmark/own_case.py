@@ -8,7 +8,7 @@ from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import rolls
 from pipeline.run.store import Store, default_root
 from pipeline.simulate import guide_wire
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
 

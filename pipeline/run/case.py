@@ -15,7 +15,7 @@ from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import Store, digest
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.html import render_case

@@ -22,8 +22,7 @@ from pipeline.run.provenance import collect
 from pipeline.run.results import Result, crashed, found_results, write_json
 from pipeline.run.store import file_hash
 from pipeline.status import InputError, did_you_mean
-from pipeline.study.manifest import Manifest
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve, to_toml
 from reports import tables
 from reports.atomic import write_text

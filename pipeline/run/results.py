@@ -18,7 +18,7 @@ from pipeline.run.rows import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.store import file_hash
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
 from reports.atomic import write_text
 
 CRASHED = "the case ended in an unexpected error; its log has the traceback"

@@ -14,7 +14,7 @@ from pipeline.model import Array, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
-from pipeline.study.schema import Case, not_one_per_frame
+from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.settings import Config
 
 

@@ -11,7 +11,7 @@ from pipeline.load import SUFFIXES, LoadError, load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import unusable
 from pipeline.model import Array, Volume
-from pipeline.study.schema import natural_key
+from pipeline.study.manifest import natural_key
 
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18

@@ -12,8 +12,7 @@ from pipeline.model import Clamp, Lumen, Simulated
 from pipeline.run.stages.load import rolls
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
-from pipeline.study.manifest import read_manifest
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case, read_manifest
 from solver.grid import Grid
 
 MANIFEST = """

@@ -16,7 +16,7 @@ from pipeline.register import Registration
 from pipeline.run.log import Log, Stage
 from pipeline.run.store import Store, key_of
 from pipeline.status import FrameStatus, StageError
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
 

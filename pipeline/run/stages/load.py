@@ -8,7 +8,7 @@ from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.study.schema import not_one_per_frame
+from pipeline.study.manifest import not_one_per_frame
 
 
 def open_case(run: Context, known: Known) -> Known:
