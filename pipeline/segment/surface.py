@@ -27,8 +27,7 @@ from pipeline.segment._kernels.wall import (
     smooth_lattice,
     surface_voxels,
 )
-from pipeline.segment.levels import GreyLevels, plateau, scanner_blur
-from pipeline.segment.region import Index, failed
+from pipeline.segment.region import GreyLevels, Index, failed, plateau, scanner_blur
 from solver.grid import Array, Grid
 
 LAYERS = 4
