@@ -10,7 +10,8 @@ import numpy as np
 from pipeline.arrays.polyline import resample
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import METRICS, pair_of, point_to_curve, rms
-from pipeline.model import Array, Curve, Lumen, Simulated
+from pipeline.model import Array, Curve, Lumen
+from solver import Solution
 
 __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
 
@@ -35,7 +36,7 @@ class Comparison:
 
 
 def compare(
-    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()
+    simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()
 ) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
     pair = pair_of(simulated, traced, lumen, config)
@@ -46,7 +47,7 @@ def compare(
 def compare_truth(
     truth_mm: Array,
     traced: Curve | None,
-    simulated: Simulated | None,
+    simulated: Solution | None,
     config: CompareConfig = CompareConfig(),
 ) -> dict[str, float]:
     """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.

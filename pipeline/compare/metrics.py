@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 
 from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent
 from pipeline.compare.config import CompareConfig
-from pipeline.model import Array, Curve, Lumen, Simulated, arc_length
+from pipeline.model import Array, Curve, Lumen, arc_length
 from reports.schema import ERRORS, Column
+from solver import Solution
 
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB
 
@@ -85,7 +86,7 @@ class Pair:
 Metric = Callable[[Pair], float | bool]
 
 
-def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig) -> Pair:
+def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig) -> Pair:
     """Sample both curves and measure their distances; ValueError where one of them is empty."""
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:

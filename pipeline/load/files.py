@@ -104,20 +104,6 @@ def _reader(source: Source) -> sitk.ImageFileReader:
     return reader
 
 
-def _geometry(reader: sitk.ImageFileReader, source: Source) -> tuple[Any, Any, Any]:
-    dimension = reader.GetDimension()
-    spacing = np.array(reader.GetSpacing()[:3])
-    origin = np.array(reader.GetOrigin()[:3])
-    direction = np.array(reader.GetDirection()).reshape(dimension, dimension)[:3, :3]
-    if np.abs(direction.T @ direction - np.eye(3)).max() > ORTHONORMAL:
-        why = (
-            f"the axes are sheared or scaled, direction {direction.round(5).tolist()}; allowed: an orthonormal matrix "
-            "(a tilted gantry gives this). Resample the scan onto a regular grid first."
-        )
-        raise unusable(source.path, why)
-    return spacing, origin, direction
-
-
 def recognises(_path: Path) -> bool:
     """Any file: SimpleITK finds out."""
     return True
@@ -149,12 +135,18 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
             "allowed: a 3-D grey-value volume, or a 4-D file that is a sequence of them."
         )
         raise unusable(source.path, why)
-    spacing, origin, direction = _geometry(reader, source)
+    direction = np.array(reader.GetDirection()).reshape(len(size), len(size))[:3, :3]
+    if np.abs(direction.T @ direction - np.eye(3)).max() > ORTHONORMAL:
+        why = (
+            f"the axes are sheared or scaled, direction {direction.round(5).tolist()}; allowed: an orthonormal matrix "
+            "(a tilted gantry gives this). Resample the scan onto a regular grid first."
+        )
+        raise unusable(source.path, why)
     return Header(
         source,
         (size[0], size[1], size[2]),
-        spacing,
-        origin,
+        np.array(reader.GetSpacing()[:3]),
+        np.array(reader.GetOrigin()[:3]),
         direction,
         sitk.GetPixelIDValueAsString(reader.GetPixelID()),
         (source.path, *detached(source.path)),

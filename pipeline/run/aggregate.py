@@ -18,7 +18,7 @@ from pipeline.model import Array
 from pipeline.run.results import Result, found_results, write_json
 from reports import tables
 from reports.atomic import write_bytes
-from reports.schema import FAILURES, POINTS, SUMMARY, Table
+from reports.schema import FAILURES, POINTS, SUMMARY
 
 DRAWS = 2000
 """Resamples behind the interval over groups."""
@@ -46,9 +46,11 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
     found = found_results(out)
     rows = [result.summary for result in found]
-    tables.write(out / "summary.csv", SUMMARY, [_only(row, SUMMARY) for row in rows])
     failures = [row for result in found for row in result.failures]
-    tables.write(out / "failures.csv", FAILURES, [_only(row, FAILURES) for row in failures])
+    for table, given in ((SUMMARY, rows), (FAILURES, failures)):
+        # result files may come from another version, with other columns
+        known = [{name: row[name] for name in row.keys() & table.names} for row in given]
+        tables.write(out / table.file, table, known)
     errors = [_point_errors(out, result) for result in found]
     if run_info is not None:
         info = {"cases": [result.case for result in found], "overall": overall(found, errors)}
@@ -95,11 +97,6 @@ def _point_errors(out: Path, result: Result) -> Array:
     frame, error = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
     good = [entry["frame"] for entry in result.frames if counts(entry, error[frame == entry["frame"]])]
     return np.asarray(error[np.isin(frame, good)])
-
-
-def _only(row: dict[str, Any], table: Table) -> dict[str, Any]:
-    """The values of a row that a table has a column for: result files may come from another version."""
-    return {name: value for name, value in row.items() if name in table.names}
 
 
 def write_junit(path: Path, found: Sequence[Result]) -> None:

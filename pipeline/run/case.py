@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 
 import solver
-from pipeline.run import results, rows, views
+from pipeline.run import outputs, results
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
@@ -86,15 +86,15 @@ def run_case(job: Job) -> None:
 
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     """Every file of the case; result.json last, since it says that the case is complete."""
-    errors = [rows.error_row(frame, log) for frame in known.frames]
+    errors = [outputs.error_row(frame, log) for frame in known.frames]
     tables.write(job.folder / ERRORS.file, ERRORS, errors)
-    points = rows.point_columns(known.frames)
+    points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
-    views.write_frames(job.folder / "frames.h5", known)
+    outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
-        views.write_view(job.folder / "view", known)
-    summary = rows.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
+        outputs.write_view(job.folder / "view", known)
+    summary = outputs.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
     summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,10 +30,8 @@ class Log:
     frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    _counts: dict[str, dict[str, float]] = field(default_factory=lambda: {stage: {} for stage in STAGES})
-    _levels: dict[str, dict[str, list[float]]] = field(
-        default_factory=lambda: {stage: {} for stage in STAGES}
-    )
+    _counts: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
+    _levels: dict[str, dict[str, list[float]]] = field(default_factory=lambda: defaultdict(dict))
 
     @contextmanager
     def timed(self, stage: Stage, frame: int | None = None) -> Iterator[None]:

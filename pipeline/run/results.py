@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run.log import Log
-from pipeline.run.rows import failure_rows
+from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.store import file_hash

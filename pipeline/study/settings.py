@@ -131,9 +131,7 @@ def to_toml(resolved: Resolved) -> str:
     """config.resolved.toml: every setting with a comment saying where it came from; reads back through -c."""
     lines: list[str] = []
     for table, items in resolved.as_dict().items():
-        lines.append(f"[{table}]")
-        lines += [_line(key, item) for key, item in items.items()]
-        lines.append("")
+        lines += [f"[{table}]", *(_line(key, item) for key, item in items.items()), ""]
     return "\n".join(lines)
 
 
