@@ -1,6 +1,7 @@
-"""The data that flows: load -> Volume, segment -> Lumen, trace -> Curve, simulate -> Simulated, compare -> Comparison.
+"""The data that flows: load -> Volume, segment -> Lumen, trace -> Curve, simulate -> Solution, compare -> Comparison.
 
-Frozen dataclasses of read-only arrays. Points are LPS mm, shape (n, 3), float64, ordered from entry to tip.
+Frozen dataclasses of read-only arrays; a Solution is the solver's own, a Comparison stands in ``pipeline.compare``.
+Points are LPS mm, shape (n, 3), float64, ordered from entry to tip.
 """
 
 from __future__ import annotations
@@ -158,27 +159,3 @@ class Curve:
     def length_mm(self) -> float:
         """Length of the curve, mm; 0 for an empty one."""
         return float(self.arc_mm[-1]) if len(self.points_mm) else 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Simulated:
-    """The simulated wire of one frame, at the depth of that frame.
-
-    joints_mm : (k + 1, 3).     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
-    reaction_force_N : (3,), reaction_torque_N_mm : float or (3,), at the introducer.
-    """
-
-    joints_mm: Array
-    contact_force_N: Array
-    status: str
-    sentence: str
-    converged: bool
-    depth_mm: float
-    roll_deg: float
-    energy_N_mm: float
-    iterations: int
-    push_force_N: float
-    max_penetration_mm: float
-    seconds: float = float("nan")
-    work: Counters = field(default_factory=dict)
-    levels: Levels = field(default_factory=dict)

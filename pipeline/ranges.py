@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, ValidationInfo
@@ -30,7 +31,8 @@ def _unit(value: Vector) -> Vector:
     return value[0] / size, value[1] / size, value[2] / size
 
 
-def _checked(value: Profile, name: str | None, lowest: float) -> Profile:
+def _checked(value: Profile, info: ValidationInfo, *, lowest: float) -> Profile:
+    name = info.field_name
     pairs = [(0.0, value)] if isinstance(value, (int, float)) else value
     if not pairs:
         msg = f"{name}: an empty profile; give a number or [[distance from tip mm, value], ...]"
@@ -46,16 +48,8 @@ def _checked(value: Profile, name: str | None, lowest: float) -> Profile:
     return value
 
 
-def _positive_profile(value: Profile, info: ValidationInfo) -> Profile:
-    return _checked(value, info.field_name, 1e-12)
-
-
-def _finite_profile(value: Profile, info: ValidationInfo) -> Profile:
-    return _checked(value, info.field_name, -math.inf)
-
-
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector that is made to have length 1."""
-PositiveProfile = Annotated[Profile, AfterValidator(_positive_profile)]
-FiniteProfile = Annotated[Profile, AfterValidator(_finite_profile)]
+PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12))]
+FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-math.inf))]

@@ -1,7 +1,9 @@
-"""What can happen to a frame: every member is the sentence that the user reads."""
+"""What can go wrong, in the words that the user reads: with a frame, and with what the user wrote."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from enum import Enum
 
 
@@ -39,3 +41,18 @@ class StageError(Exception):
     def __init__(self, status: FrameStatus, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+class InputError(Exception):
+    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
+def did_you_mean(key: str, allowed: Iterable[str]) -> str:
+    """Sentence naming the nearest allowed key, or all of them."""
+    names = sorted(allowed)
+    close = get_close_matches(key, names, n=1)
+    return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(names)}"

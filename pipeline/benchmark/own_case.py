@@ -7,9 +7,9 @@ from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import rolls
 from pipeline.run.store import Store, default_root
-from pipeline.simulate.replay import guide_wire
-from pipeline.study.config import Config
-from pipeline.study.schema import Case
+from pipeline.simulate import guide_wire
+from pipeline.study.manifest import Case
+from pipeline.study.settings import Config
 
 
 class NoScene(ValueError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.commands.common import complain, say
+from pipeline.commands import complain, say
 
 HELP = "run time against error; rivals; a stress study"
 
@@ -32,8 +32,8 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.benchmark.peers.run import measure_peers
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
     from pipeline.load import LoadError
-    from pipeline.study.config import Config
     from pipeline.study.manifest import ManifestError, read_manifest
+    from pipeline.study.settings import Config
 
     plain = not (args.stress or args.peers)
     try:

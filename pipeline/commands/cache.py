@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from pipeline.commands.common import say
+from pipeline.commands import say
 
 HELP = "the stage store"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.commands.common import add_settings, complain, resolved_settings, say
+from pipeline.commands import add_settings, complain, resolved_settings, say
 
 HELP = "list every problem of a manifest at once; reads headers only"
 

@@ -6,7 +6,7 @@ import argparse
 import tomllib
 from pathlib import Path
 
-from pipeline.commands.common import complain, say
+from pipeline.commands import complain, say
 
 HELP = "paired differences of two outputs; exit 1 on a regression"
 

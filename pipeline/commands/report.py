@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.commands.common import complain, say
+from pipeline.commands import complain, say
 
 HELP = "rebuild tables, figures and pages from result files"
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.commands.common import add_settings, complain, resolved_settings, say, settings_of
+from pipeline.commands import add_settings, complain, resolved_settings, say, settings_of
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -79,24 +79,21 @@ def main(args: argparse.Namespace) -> int:
 
 def _plan(args: argparse.Namespace) -> Plan:
     """What the command line asks for; raises where it cannot be carried out."""
-    from pipeline.run import sweep
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, points_of
     from pipeline.run.log import STAGES
     from pipeline.run.store import default_root
-    from pipeline.study.suggest import did_you_mean
+    from pipeline.status import did_you_mean
 
     manifest, assumptions = _manifest(args)
     settings = resolved_settings(args)
     if args.until not in STAGES:
-        msg = f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"
-        raise UsageError(msg)
+        raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.jobs < 1:
-        msg = f"-j {args.jobs}: expected 1 or more"
-        raise UsageError(msg)
+        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     cache = None if args.no_cache else default_root()
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
-    points = tuple(sweep.points_of(args.sweep, settings_of(args)))
+    points = tuple(points_of(args.sweep, settings_of(args)))
     cases = chosen(manifest.cases, args.only, args.shard)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path)
@@ -115,13 +112,14 @@ def _manifest(args: argparse.Namespace) -> tuple[Manifest, tuple[str, ...]]:
     if not path.is_dir():
         return read_manifest(path), ()
     entry, direction = _vector(args.entry, "--entry"), _vector(args.direction, "--direction")
-    inferred = infer_manifest(path, entry, direction, args.wire_radius, resolved_settings(args).config.load)
-    say(inferred.text)
-    for note in inferred.assumptions:
+    load = resolved_settings(args).config.load
+    text, assumptions = infer_manifest(path, entry, direction, args.wire_radius, load)
+    say(text)
+    for note in assumptions:
         say(f"assumed: {note}")
     written = args.out / "manifest.inferred.toml"
-    write_text(written, inferred.text)
-    return read_manifest(written), inferred.assumptions
+    write_text(written, text)
+    return read_manifest(written), assumptions
 
 
 def _vector(text: str | None, name: str) -> Any:
@@ -136,6 +134,5 @@ def _vector(text: str | None, name: str) -> Any:
     except ValueError:
         values = np.zeros(0)
     if values.shape != (3,):
-        msg = f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"
-        raise UsageError(msg)
+        raise UsageError([f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"])
     return values

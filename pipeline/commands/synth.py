@@ -8,8 +8,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from pipeline.commands.common import complain, say
-from pipeline.study.suggest import did_you_mean
+from pipeline.commands import complain, say
+from pipeline.status import did_you_mean
 
 HELP = "write a synthetic study with truth, as real files"
 

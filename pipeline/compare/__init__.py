@@ -2,8 +2,70 @@
 
 from __future__ import annotations
 
-from pipeline.compare.curves import Comparison, compare, compare_truth
-from pipeline.compare.distance import point_to_curve
-from pipeline.compare.metrics import rms
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays.polyline import resample
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import METRICS, pair_of, point_to_curve, rms
+from pipeline.model import Array, Curve, Lumen
+from solver import Solution
 
 __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Errors of one frame: sample_mm (n, 3) of the simulated wire; arc_mm, error_mm, foot_arc_mm (n,), mm.
+
+    values : every metric by its column's name; ``comparison["rms_mm"]`` is one of them. Point errors are kept, since
+    pooled statistics come from points, never from averaged RMSEs.
+    """
+
+    sample_mm: Array
+    arc_mm: Array
+    error_mm: Array
+    foot_arc_mm: Array
+    values: Mapping[str, float | bool]
+
+    def __getitem__(self, name: str) -> float | bool:
+        """A metric by its column's name."""
+        return self.values[name]
+
+
+def compare(
+    simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()
+) -> Comparison:
+    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
+    pair = pair_of(simulated, traced, lumen, config)
+    values = {name: metric(pair) for name, metric in METRICS.items()}
+    return Comparison(pair.sample_mm, pair.arc_mm, pair.error_mm, pair.foot_arc_mm, values)
+
+
+def compare_truth(
+    truth_mm: Array,
+    traced: Curve | None,
+    simulated: Solution | None,
+    config: CompareConfig = CompareConfig(),
+) -> dict[str, float]:
+    """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.
+
+    One-sided, from equal steps along each curve to the truth; what has no curve has no entry.
+    """
+    values: dict[str, float] = {}
+    if traced is not None and len(traced.points_mm) > 1:
+        distance, tip = _against(traced.points_mm, truth_mm, config.sample_mm)
+        values |= {"trace_mean_mm": float(distance.mean()), "trace_max_mm": float(distance.max())}
+        values["trace_tip_mm"] = tip
+    if simulated is not None and len(simulated.joints_mm) > 1:
+        distance, tip = _against(simulated.joints_mm, truth_mm, config.sample_mm)
+        values |= {"truth_rms_mm": rms(distance), "truth_tip_mm": tip}
+    return values
+
+
+def _against(curve: Array, truth: Array, step_mm: float) -> tuple[Array, float]:
+    """Distances of equal steps along a curve to the true wire, and between the tips."""
+    distance, _ = point_to_curve(resample(curve, step_mm), truth)
+    return distance, float(np.linalg.norm(curve[-1] - truth[-1]))

@@ -14,8 +14,7 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from pipeline.arrays.polyline import smooth, to_length
-from pipeline.compare.distance import point_to_curve
-from pipeline.compare.metrics import rms
+from pipeline.compare.metrics import point_to_curve, rms
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, VesselWall, relax
@@ -39,28 +38,31 @@ class Clues:
 
     @cached_property
     def room(self) -> Grid:
-        """The signed distance around the traced wires."""
-        return _room(self.lumen, np.vstack([self.clamp.entry_mm, self.deepest_mm]))
+        """The signed distance around the traced wires alone: a tenth of a circle of Willis, and of the memory."""
+        grid, points = self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm])
+        corners = zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)
+        index = grid.to_index(np.array(np.meshgrid(*corners)).reshape(3, -1).T)
+        low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
+        high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
+        return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
     @cached_property
     def centreline(self) -> Array | None:
         """The lumen's centreline (n, 3) from the entry towards the deepest tip; None where they are not joined."""
-        clearance = -np.asarray(self.room.values, dtype=np.float64)
         voxel = float(self.room.spacing_mm.mean())
-        return self._path(
-            np.where(clearance > 0, (np.maximum(clearance, 0) + voxel) ** -CENTRE_POWER, np.inf)
-        )
+        return self._path(0.0, lambda clearance: (np.maximum(clearance, 0) + voxel) ** -CENTRE_POWER)
 
     @cached_property
     def shortest(self) -> Array | None:
         """The shortest path (n, 3) that leaves the wire's radius to the wall."""
-        clearance = -np.asarray(self.room.values, dtype=np.float64)
-        return self._path(
-            np.where(clearance > min(self.radius_mm, 0.5 * float(clearance.max())), 1.0, np.inf)
-        )
+        return self._path(self.radius_mm, np.ones_like)
 
-    def _path(self, cost: Array) -> Array | None:
-        path = voxel_path(self.room, cost, self.clamp.entry_mm, self.deepest_mm[-1])
+    def _path(self, room_mm: float, cost: Callable[[Array], Array]) -> Array | None:
+        """The cheapest path through voxels that are further from the wall than ``room_mm`` or half the greatest."""
+        clearance = -np.asarray(self.room.values, dtype=np.float64)
+        open_to = clearance > min(room_mm, 0.5 * float(clearance.max()))
+        costs = np.where(open_to, cost(clearance), np.inf)
+        path = voxel_path(self.room, costs, self.clamp.entry_mm, self.deepest_mm[-1])
         return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
 
     @cached_property
@@ -139,15 +141,3 @@ def voxel_path(clearance: Grid, cost: Array, entry_mm: Array, target_mm: Array) 
         return None
     inner = clearance.to_mm(np.array(search.traceback(ends[1])))
     return np.vstack([entry_mm, inner[1:]])
-
-
-def _room(lumen: Lumen, points_mm: Array) -> Grid:
-    """The distance around the traced wires alone: a tenth of a circle of Willis, and of the memory."""
-    grid = lumen.distance
-    corners = np.array(
-        np.meshgrid(*zip(points_mm.min(axis=0) - ROOM_MM, points_mm.max(axis=0) + ROOM_MM, strict=True))
-    )
-    index = grid.to_index(corners.reshape(3, -1).T)
-    low = np.clip(np.floor(index.min(axis=0)), 0, np.array(grid.shape) - 1).astype(int)
-    high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, grid.shape).astype(int)
-    return grid.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))

@@ -1,10 +1,12 @@
-"""load: scans in. ``read_header`` reads geometry alone, ``Crop.load`` the voxels of a box alone.
+"""load: scans in. ``read_header`` reads geometry alone, ``read_headers`` that of all scans of a case, which is held
+against each other before any voxel is read, ``Crop.load`` the voxels of a box alone.
 
 A format is a module with three functions: ``recognises`` a path, ``read_header`` of a source, ``read`` voxels of a box.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry
+from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry, unusable
 from pipeline.model import Counters, Volume
 
 __all__ = [
@@ -23,9 +25,12 @@ __all__ = [
     "Crop",
     "Header",
     "LoadError",
+    "Scans",
     "Source",
+    "each_volume",
     "load",
     "read_header",
+    "read_headers",
     "require_same_geometry",
 ]
 
@@ -61,8 +66,8 @@ def read_header(
     """
     source = source if isinstance(source, Source) else Source(Path(source))
     if not source.path.exists():
-        msg = f"{source.path}: no such file or folder; check the path in the manifest (relative to the manifest itself)"
-        raise LoadError(msg)
+        why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
+        raise unusable(source.path, why)
     header = _format_of(source.path).read_header(source, config)
     if spacing_mm is None:
         return header
@@ -77,8 +82,8 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
     values = _format_of(header.source.path).read(header, (start, stop), config)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
-        msg = f"{header.source}: {bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
-        raise LoadError(msg)
+        why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
+        raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)
     return Volume(values, header.spacing_mm, origin, header.direction, header.assumed, made_of)
@@ -107,3 +112,50 @@ class Crop:
 def _format_of(path: Path) -> Format:
     """The module that reads a path."""
     return next(kind for kind in FORMATS if kind.recognises(path))
+
+
+@dataclass(frozen=True, eq=False)
+class Scans:
+    """Headers of a case's scans; all share one geometry."""
+
+    reference: Header | None
+    frames: tuple[Header, ...]
+
+    @property
+    def all(self) -> tuple[Header, ...]:
+        """The reference, if there is one, and the frames."""
+        return (*((self.reference,) if self.reference else ()), *self.frames)
+
+    @property
+    def first(self) -> Header | None:
+        """The scan that the lumen comes from: the wire-free one, else the frame with the least wire in it."""
+        return next(iter(self.all), None)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the files lacked, each said once."""
+        return tuple(dict.fromkeys(text for header in self.all for text in header.assumed))
+
+
+def each_volume(header: Header) -> Iterator[Header]:
+    """A sequence in one file as one header per volume."""
+    if header.item_count == 1:
+        yield header
+        return
+    for item in range(header.item_count):
+        yield replace(header, source=replace(header.source, item=item), item_count=1)
+
+
+def read_headers(
+    reference: Source | None,
+    frames: Sequence[Source],
+    config: LoadConfig,
+    spacing_mm: ArrayLike | None = None,
+) -> Scans:
+    """Headers of a case's scans; raises LoadError where one is unusable or its geometry differs from the first's."""
+    empty = read_header(reference, config, spacing_mm) if reference else None
+    headers = [read_header(source, config, spacing_mm) for source in frames]
+    scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
+    for header in scans.frames:
+        require_same_geometry(scans.all[0], header)
+    return scans

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load.geometry import LoadError, refused
+from pipeline.load.geometry import refused, unusable
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.model import Array, Curve
 
@@ -74,18 +74,15 @@ def read_curve(path: Path) -> Curve:
     """
     kind = next((k for k in READERS if path.name.lower().endswith(k)), None)
     if kind is None:
-        msg = f"{path}: got {path.suffix!r}; expected {', '.join(READERS)}; export the curve in one of these"
-        raise LoadError(msg)
+        raise refused(path, repr(path.suffix), ", ".join(READERS), "export the curve in one of these")
     if not path.exists():
-        msg = f"{path}: no such file; check traces in the manifest (relative to the manifest itself)"
-        raise LoadError(msg)
+        raise unusable(path, "no such file; check traces in the manifest (relative to the manifest itself)")
     points = READERS[kind](path)
     if len(points):
         keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
         points = points[keep]
     if len(points) < 2 or not np.all(np.isfinite(points)):
-        msg = f"{path}: got {len(points)} points; expected two or more, all finite; correct the file"
-        raise LoadError(msg)
+        raise refused(path, f"{len(points)} points", "two or more, all finite", "correct the file")
     return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")
 
 
@@ -95,9 +92,12 @@ def read_truth(path: Path, frame_count: int) -> list[Array]:
         frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
         curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in frames]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        msg = f'{path}: cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
-        raise LoadError(msg) from None
+        why = (
+            f'cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
+        )
+        raise unusable(path, why) from None
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
-        msg = f"{path}: holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame"
-        raise LoadError(msg)
+        raise unusable(
+            path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame"
+        )
     return curves

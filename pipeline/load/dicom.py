@@ -1,13 +1,19 @@
-"""DICOM series in a folder: sorted by position, refused by name where a stack is not a regular grid.
+"""DICOM series in a folder or a multi-frame file: sorted by position, refused by name where a stack is no regular grid.
 
 ITK's reader sorts and spaces slices by itself, but shears a tilted stack and silently respaces one that lacks a
 slice (ITK issues 441 and 1607), so the positions are checked here, with tolerances relative to the spacing.
+
+Of an enhanced multi-frame file (CT, MR, XA and others since DICOM supplement 49) GDCM takes spacing and direction from
+the first frames alone: with a frame missing it says 1 mm, it hides a tilt, and turns a stack written downwards into one
+with the wrong direction. So the functional groups are read here.
 """
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +24,49 @@ from scipy.ndimage import shift as shift_slice
 
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import to_xyz
-from pipeline.load.geometry import Box, Header, LoadError, Source
-from pipeline.load.multiframe import Frames, frames_of
+from pipeline.load.geometry import Box, Header, Source, unusable
 
 GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
 TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
 POSITION, ORIENTATION, PIXEL_SPACING = "0020|0032", "0020|0037", "0028|0030"
+KEYWORDS = ("ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing")
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """positions (n, 3) mm and orientation (n, 6) of the frames in the file's order, pixel_mm (n, 2): row, column."""
+
+    positions: NDArray[np.float64]
+    orientations: NDArray[np.float64]
+    pixels_mm: NDArray[np.float64]
+
+
+def frames_of(path: Path) -> Frames | None:
+    """Where the frames lie, or None for a file that is no enhanced multi-frame DICOM."""
+    with path.open("rb") as file:
+        if file.read(132)[128:] != b"DICM":
+            return None
+    from pydicom import dcmread  # a third of a second, for those who have DICOM
+
+    try:
+        data = dcmread(path, stop_before_pixels=True)
+        groups = data.PerFrameFunctionalGroupsSequence
+        common = data.get("SharedFunctionalGroupsSequence", ())
+        found = [[_first(name, group, *common) for group in groups] for name in KEYWORDS]
+        places, axes, pixels = (np.array(values, float) for values in found)
+    except (AttributeError, KeyError, ValueError, TypeError, EOFError, struct.error):
+        return None
+    good = places.shape[1:] == (3,) and axes.shape[1:] == (6,) and pixels.shape[1:] == (2,)
+    return Frames(places, axes, pixels) if good else None
+
+
+def _first(keyword: str, *groups: Any) -> Any:
+    """The value of an element in the first group that has it, however deep; raises KeyError where none has."""
+    for group in groups:
+        for element in group.iterall():
+            if element.keyword == keyword:
+                return element.value
+    raise KeyError(keyword)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,33 +113,26 @@ def _numbers(reader: sitk.ImageFileReader, key: str, count: int, path: Path) -> 
     text = reader.GetMetaData(key) if reader.HasMetaDataKey(key) else ""
     values = [float(v) for v in text.split("\\") if v.strip()]
     if len(values) != count:
-        tag = key.replace("|", ",")
-        msg = (
-            f"{path}: DICOM tag ({tag}) holds {text!r}, expected {count} numbers; this slice has no position"
-        )
-        raise LoadError(msg)
+        found = f"DICOM tag ({key.replace('|', ',')}) holds {text!r}"
+        raise unusable(path, f"{found}, expected {count} numbers; this slice has no position")
     return np.array(values)
 
 
-def _series_files(folder: Path, wanted: str) -> tuple[str, ...]:
-    sitk.ProcessObject.SetGlobalWarningDisplay(
-        False
-    )  # GDCM prints its own lines about folders without a series
+def _series_files(folder: Path, wanted: str) -> list[Path]:
+    # GDCM prints its own lines about folders without a series
+    sitk.ProcessObject.SetGlobalWarningDisplay(False)
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
-    images = {uid: files for uid, files in sizes.items() if files and _is_image(files[0])}
+    images = {uid: files for uid, files in sizes.items() if files and _is_image(Path(files[0]))}
     if wanted:
         images = {uid: files for uid, files in images.items() if uid == wanted}
     if len(images) != 1:
         groups = "\n".join(f"    {uid}: {len(files)} files" for uid, files in images.items()) or "    none"
         below = [d.name for d in sorted(folder.iterdir()) if d.is_dir()]
         hint = f"  It has sub-folders: {', '.join(below[:5])}; name one of them.\n" if below else ""
-        msg = (
-            f"{folder}: found {len(images)} DICOM image series, expected one:\n{groups}\n{hint}"
-            "  Keep one series a folder, or name one as FOLDER#SERIES_UID."
-        )
-        raise LoadError(msg)
-    return next(iter(images.values()))
+        found = f"found {len(images)} DICOM image series, expected one:\n{groups}\n{hint}"
+        raise unusable(folder, f"{found}  Keep one series a folder, or name one as FOLDER#SERIES_UID.")
+    return [Path(name) for name in next(iter(images.values()))]
 
 
 def _header_of(path: Path) -> sitk.ImageFileReader:
@@ -106,18 +142,16 @@ def _header_of(path: Path) -> sitk.ImageFileReader:
     return reader
 
 
-def _is_image(path: str) -> bool:
+def _is_image(path: Path) -> bool:
     try:
-        reader = _header_of(Path(path))
+        return bool(_header_of(path).HasMetaDataKey(POSITION)) or frames_of(path) is not None
     except RuntimeError:
         return False
-    return bool(reader.HasMetaDataKey(POSITION)) or frames_of(Path(path)) is not None
 
 
 def read_stack(source: Source) -> Stack:
     """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
-    names = _series_files(source.path, source.dataset) if source.path.is_dir() else (str(source.path),)
-    files = [Path(name) for name in names]
+    files = _series_files(source.path, source.dataset) if source.path.is_dir() else [source.path]
     headers = [_header_of(path) for path in files]
     several = frames_of(files[0]) if len(files) == 1 else None
     where = several or _slices(files, headers)
@@ -146,8 +180,8 @@ def _frame_count(path: Path, header: sitk.ImageFileReader, frames: Frames) -> in
     size = header.GetSize()
     count = size[2] if len(size) > 2 else 1
     if count != len(frames.positions):
-        msg = f"{path}: the file holds {count} frames and positions of {len(frames.positions)}; allowed: one for each."
-        raise LoadError(msg + " Export the series again.")
+        found = f"the file holds {count} frames and positions of {len(frames.positions)}"
+        raise unusable(path, f"{found}; allowed: one for each. Export the series again.")
     return int(count)
 
 
@@ -159,10 +193,8 @@ def _require_uniform(source: Source, where: Frames, sizes: list[Any]) -> None:
             found = "; ".join(
                 f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items()
             )
-            msg = (
-                f"{source.path}: slices of different {name}: {found}. Mixed series: keep one stack a folder."
-            )
-            raise LoadError(msg)
+            why = f"slices of different {name}: {found}. Mixed series: keep one stack a folder."
+            raise unusable(source.path, why)
 
 
 def irregularities(stack: Stack) -> list[str]:
@@ -200,24 +232,19 @@ def recognises(path: Path) -> bool:
 
 def read_header(source: Source, config: LoadConfig) -> Header:
     """Geometry of a series; tilt, gaps and repeats are refused, or resampled where the setting asks for it."""
-    return _header(source, read_stack(source), config.resample)
-
-
-def _header(source: Source, stack: Stack, resample: bool) -> Header:
+    stack = read_stack(source)
     problems = irregularities(stack)
     fatal = [p for p in problems if p.startswith(("repeated", "single"))]
-    if fatal or (problems and not resample):
+    if fatal or (problems and not config.resample):
         listing = "".join(f"\n    {p}" for p in problems)
-        msg = (
-            f"{source.path}: this series is not a regular grid:{listing}\n  A plain stack would shear or stretch the "
+        why = (
+            f"this series is not a regular grid:{listing}\n  A plain stack would shear or stretch the "
             "anatomy. Export it again without tilt, or ask for resampling with --set load.resample=true."
         )
-        raise LoadError(msg)
-    count = (
-        len(stack.files)
-        if not problems
-        else int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
-    )
+        raise unusable(source.path, why)
+    count = len(stack.files)
+    if problems:
+        count = int(np.floor(np.ptp(stack.heights) / stack.spacing_mm + 1e-6)) + 1
     return Header(
         source,
         (stack.size[0], stack.size[1], count),
@@ -247,19 +274,13 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
 def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
     """Linear between the two nearest slices, each first shifted in plane by its drift (undoes the tilt)."""
     heights = stack.heights - stack.heights[0]
-    slices: dict[int, NDArray[np.float32]] = {}
     whole = to_xyz(sitk.ReadImage(str(stack.files[0]))) if stack.frames else None
 
+    @lru_cache(maxsize=2)  # the two neighbours move on together, so that each slice is read once
     def straightened(i: int) -> NDArray[np.float32]:
-        if i not in slices:
-            if whole is None:
-                plane = to_xyz(sitk.ReadImage(str(stack.files[i])))[:, :, 0].astype(np.float32)
-            else:
-                plane = whole[:, :, stack.frames[i]].astype(np.float32)
-            slices[i] = shift_slice(
-                plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min())
-            )
-        return slices[i]
+        voxels = to_xyz(sitk.ReadImage(str(stack.files[i]))) if whole is None else whole
+        plane = voxels[:, :, stack.frames[i] if stack.frames else 0].astype(np.float32)
+        return shift_slice(plane, stack.drift_px[i], order=1, mode="constant", cval=float(plane.min()))
 
     out = np.empty(header.shape, np.float32)
     for k in range(header.shape[2]):
@@ -267,5 +288,4 @@ def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
         upper = int(np.clip(np.searchsorted(heights, z), 1, len(heights) - 1))
         weight = (z - heights[upper - 1]) / (heights[upper] - heights[upper - 1])
         out[:, :, k] = (1 - weight) * straightened(upper - 1) + weight * straightened(upper)
-        slices = {i: s for i, s in slices.items() if i >= upper - 1}
     return out

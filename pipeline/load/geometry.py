@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
+SAME_VOXELS = 0.5
+"""Anything less between two scans is rounding in a header (1e-8 in a direction is common), harmonised silently."""
 Box = tuple[tuple[int, int, int], tuple[int, int, int]]
 """First voxel (inclusive) and last voxel (exclusive) along x, y, z."""
 
@@ -22,9 +24,14 @@ class LoadError(StageError):
         super().__init__(FrameStatus.LOAD_FAILED, message)
 
 
+def unusable(what: object, why: str) -> LoadError:
+    """The error for a file or a scan that cannot be used, and why."""
+    return LoadError(f"{what}: {why}")
+
+
 def refused(path: Path, got: str, allowed: str, do: str) -> LoadError:
     """The error for a file that holds something else than it should."""
-    return LoadError(f"{path}: got {got}; expected {allowed}; {do}")
+    return unusable(path, f"got {got}; expected {allowed}; {do}")
 
 
 @dataclass(frozen=True)
@@ -80,14 +87,10 @@ class Header:
 
 def describe(header: Header) -> str:
     """One line with the whole geometry, for messages."""
+    said = {"shape": header.shape, "spacing": header.spacing_mm, "origin": header.origin_mm}
     numbers = ", ".join(
         f"{name} {np.array2string(np.asarray(value), precision=6, separator=', ').replace(chr(10), '')}"
-        for name, value in (
-            ("shape", header.shape),
-            ("spacing", header.spacing_mm),
-            ("origin", header.origin_mm),
-            ("direction", header.direction),
-        )
+        for name, value in {**said, "direction": header.direction}.items()
     )
     return f"{header.source}: {numbers}"
 
@@ -101,16 +104,13 @@ def corner_shift_voxels(a: Header, b: Header) -> float:
     return float(shift.max() / a.spacing_mm.min())
 
 
-def require_same_geometry(reference: Header, other: Header, tolerance_voxels: float = 0.5) -> None:
-    """Refuse a scan whose corners lie more than half a voxel from the reference's.
-
-    Anything less is rounding in a header (1e-8 in a direction is common) and is harmonised silently.
-    """
+def require_same_geometry(reference: Header, other: Header) -> None:
+    """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's."""
     shift = corner_shift_voxels(reference, other)
-    if shift > tolerance_voxels:
+    if shift > SAME_VOXELS:
         found = "the shapes differ" if np.isinf(shift) else f"their corners lie {shift:.2f} voxels apart"
         msg = (
-            f"geometry differs between scans of one case: {found}, allowed {tolerance_voxels} voxel.\n"
+            f"geometry differs between scans of one case: {found}, allowed {SAME_VOXELS} voxel.\n"
             f"  {describe(reference)}\n  {describe(other)}\n"
             "  Resample the scans onto one grid, or split them into two cases."
         )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source
+from pipeline.load.geometry import Box, Header, Source, unusable
 
 AXES = ("z,y,x", "x,y,z")
 
@@ -33,18 +33,14 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     file.visititems(
         lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None
     )
-    msg = (
-        f"{source.path}: no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held) or 'none'}. "
-        "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name."
-    )
-    raise LoadError(msg)
+    none = f"no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held) or 'none'}. "
+    raise unusable(source.path, none + "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name.")
 
 
 def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
     axes = str(data.attrs.get("axes", AXES[0]))
     if axes not in AXES:
-        msg = f"{source}: attribute axes is {axes!r}; allowed: {' or '.join(map(repr, AXES))}"
-        raise LoadError(msg)
+        raise unusable(source, f"attribute axes is {axes!r}; allowed: {' or '.join(map(repr, AXES))}")
     return axes == AXES[1]
 
 
@@ -59,11 +55,8 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
         volumes = _volumes(file, source)
         data = volumes[0]
         if "spacing_mm" not in data.attrs:
-            msg = (
-                f"{source}: {data.name} lacks the attribute spacing_mm (three lengths in mm, x, y, z); found "
-                f"{sorted(data.attrs)}. Add it to every dataset."
-            )
-            raise LoadError(msg)
+            lacks = f"{data.name} lacks the attribute spacing_mm (three lengths in mm, x, y, z); "
+            raise unusable(source, f"{lacks}found {sorted(data.attrs)}. Add it to every dataset.")
         a, b, c = data.shape[-3:]
         return Header(
             source,

@@ -6,6 +6,7 @@ Out: LPS mm.
 from __future__ import annotations
 
 import base64
+import itertools
 import re
 import struct
 import xml.etree.ElementTree as ET
@@ -29,31 +30,6 @@ _TYPES = {
 def _to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (n, 3) of a file in LPS mm: 3D Slicer says SPACE=RAS in a comment or header, all else is taken as LPS."""
     return points * RAS_TO_LPS if b"SPACE=RAS" in text[:4096] else points
-
-
-def _blocks(data: bytes, header: str, compressed: bool) -> bytes:
-    """The payload of one binary array (after base64): a length, or a table of zlib blocks, comes first."""
-    size = struct.calcsize(header)
-    first = struct.unpack(header, data[:size])[0]
-    if not compressed:
-        return data[size : size + first]
-    sizes = struct.unpack(f"{header[0]}{first}{header[1]}", data[3 * size : (3 + first) * size])
-    out, at = [], (3 + first) * size
-    for n in sizes:
-        out.append(zlib.decompress(data[at : at + n]))
-        at += n
-    return b"".join(out)
-
-
-def _base64(text: str, header: str, compressed: bool) -> bytes:
-    """Decode base64 in which VTK codes the header apart from the data when it compresses."""
-    clean = "".join(text.split())
-    if not compressed:
-        return base64.b64decode(clean)
-    size = struct.calcsize(header)
-    blocks = struct.unpack(header, base64.b64decode(clean[:24])[:size])[0]
-    coded = 4 * ((((3 + blocks) * size) + 2) // 3)
-    return base64.b64decode(clean[:coded]) + base64.b64decode(clean[coded:])
 
 
 class _Vtp:
@@ -87,14 +63,29 @@ class _Vtp:
         form = node.get("format")
         if form == "ascii":
             return np.array((node.text or "").split(), dtype=float).astype(kind)
-        if form == "binary":
-            data = _blocks(
-                _base64(node.text or "", self.header, self.compressed), self.header, self.compressed
-            )
-            return np.frombuffer(data, kind)
-        tail = self.tail[int(node.get("offset", "0")) :]
-        data = tail if self.encoding == "raw" else _base64(tail.decode(), self.header, self.compressed)
-        return np.frombuffer(_blocks(data, self.header, self.compressed), kind)
+        tail = (node.text or "").encode() if form == "binary" else self.tail[int(node.get("offset", "0")) :]
+        raw = form != "binary" and self.encoding == "raw"
+        return np.frombuffer(self._payload(tail if raw else self._decoded(tail)), kind)
+
+    def _decoded(self, text: bytes) -> bytes:
+        """Decode base64 in which VTK codes the header apart from the data when it compresses."""
+        clean = b"".join(text.split())
+        if not self.compressed:
+            return base64.b64decode(clean)
+        size = struct.calcsize(self.header)
+        blocks = struct.unpack(self.header, base64.b64decode(clean[:24])[:size])[0]
+        coded = 4 * ((((3 + blocks) * size) + 2) // 3)
+        return base64.b64decode(clean[:coded]) + base64.b64decode(clean[coded:])
+
+    def _payload(self, data: bytes) -> bytes:
+        """The content of one binary array: a length, or a table of zlib blocks, comes first."""
+        size = struct.calcsize(self.header)
+        first = struct.unpack(self.header, data[:size])[0]
+        if not self.compressed:
+            return data[size : size + first]
+        sizes = struct.unpack_from(f"{self.header[0]}{first}{self.header[1]}", data, 3 * size)
+        ends = (3 + first) * size + np.cumsum([0, *sizes])
+        return b"".join(zlib.decompress(data[a:b]) for a, b in itertools.pairwise(ends))
 
 
 def _cells(file: _Vtp, piece: ET.Element, kind: str) -> list[NDArray[np.int64]]:

@@ -1,7 +1,11 @@
-"""From the case folders found in OUT to summary.csv, failures.csv and run.json: merging is copying folders together."""
+"""From the case folders found in OUT to summary.csv, failures.csv and run.json: merging is copying folders together.
+
+And to a JUnit summary for CI: one test a frame, so that a build server shows which frame failed and why.
+"""
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +17,8 @@ from pipeline.compare.pooled import counts, intervals, pooled_rms
 from pipeline.model import Array
 from pipeline.run.results import Result, found_results, write_json
 from reports import tables
-from reports.schema import FAILURES, POINTS, SUMMARY, Table
+from reports.atomic import write_bytes
+from reports.schema import FAILURES, POINTS, SUMMARY
 
 DRAWS = 2000
 """Resamples behind the interval over groups."""
@@ -41,9 +46,11 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
     found = found_results(out)
     rows = [result.summary for result in found]
-    tables.write(out / "summary.csv", SUMMARY, [_only(row, SUMMARY) for row in rows])
     failures = [row for result in found for row in result.failures]
-    tables.write(out / "failures.csv", FAILURES, [_only(row, FAILURES) for row in failures])
+    for table, given in ((SUMMARY, rows), (FAILURES, failures)):
+        # result files may come from another version, with other columns
+        known = [{name: row[name] for name in row.keys() & table.names} for row in given]
+        tables.write(out / table.file, table, known)
     errors = [_point_errors(out, result) for result in found]
     if run_info is not None:
         info = {"cases": [result.case for result in found], "overall": overall(found, errors)}
@@ -92,6 +99,24 @@ def _point_errors(out: Path, result: Result) -> Array:
     return np.asarray(error[np.isin(frame, good)])
 
 
-def _only(row: dict[str, Any], table: Table) -> dict[str, Any]:
-    """The values of a row that a table has a column for: result files may come from another version."""
-    return {name: value for name, value in row.items() if name in table.names}
+def write_junit(path: Path, found: Sequence[Result]) -> None:
+    """Write one test suite a case, one test a frame (or one for a case that has no frames to show)."""
+    root = ET.Element("testsuites", name="wireval")
+    for result in found:
+        whole = {
+            "frame": "case",
+            "status": result.status,
+            "sentence": result.sentence,
+            "message": result.sentence,
+        }
+        frames = result.frames or [whole]
+        bad = [f for f in frames if f["status"] not in ("ok", "simulated")]
+        suite = ET.SubElement(root, "testsuite", name=result.case, errors="0")
+        suite.set("tests", str(len(frames)))
+        suite.set("failures", str(len(bad)))
+        for frame in frames:
+            test = ET.SubElement(suite, "testcase", classname=result.case, name=f"frame {frame['frame']}")
+            if frame in bad:
+                failure = ET.SubElement(test, "failure", type=frame["status"], message=frame["sentence"])
+                failure.text = frame["message"]
+    write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True))

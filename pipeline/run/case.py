@@ -10,14 +10,12 @@ from pathlib import Path
 from time import perf_counter
 
 import solver
-from pipeline.run import results, rows, views
-from pipeline.run.keys import digest
-from pipeline.run.log import Log, Stage
-from pipeline.run.progress import CaseProgress
+from pipeline.run import outputs, results
+from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import Store
-from pipeline.study.schema import Case
+from pipeline.run.store import Store, digest
+from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.html import render_case
@@ -88,19 +86,19 @@ def run_case(job: Job) -> None:
 
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     """Every file of the case; result.json last, since it says that the case is complete."""
-    case = rows.rows_of(job.case, known, log, job.settings.config.compare.bootstrap)
-    tables.write(job.folder / ERRORS.file, ERRORS, case.errors)
-    points = rows.point_columns(known.frames)
+    errors = [outputs.error_row(frame, log) for frame in known.frames]
+    tables.write(job.folder / ERRORS.file, ERRORS, errors)
+    points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
-    views.write_frames(job.folder / "frames.h5", known)
+    outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
-        views.write_view(job.folder / "view", known)
+        outputs.write_view(job.folder / "view", known)
+    summary = outputs.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
-    result = results.result_of(job.case, known, case, key, details)
-    result.summary["total_s"], result.summary["peak_memory_MiB"] = perf_counter() - clock, peak_memory_mib()
-    result.write(job.folder)
+    summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
+    results.result_of(job.case, known, summary, key, details).write(job.folder)
 
 
 @functools.cache

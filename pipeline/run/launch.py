@@ -1,4 +1,9 @@
-"""The whole run: every case of a manifest, and of every point of a sweep, into one output folder."""
+"""The whole run: every case of a manifest, and of every point of a sweep, into one output folder.
+
+A sweep is the same cases with one setting changed at a time, beside the plain result. Segmentation and tracing do not
+depend on the solver's settings, so the stage store answers them: a sweep costs simulation and comparison only. An
+agreement that no parameter moves is suspicious.
+"""
 
 from __future__ import annotations
 
@@ -10,27 +15,71 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.run import sweep
-from pipeline.run.aggregate import Totals, aggregate
+from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
 from pipeline.run.case import Job, finished, run_case
-from pipeline.run.junit import write_junit
-from pipeline.run.keys import file_hash
 from pipeline.run.provenance import collect
-from pipeline.run.results import crashed, found_results, write_json
-from pipeline.study.manifest import Manifest
-from pipeline.study.schema import Case
-from pipeline.study.settings import to_toml
-from pipeline.study.suggest import did_you_mean
+from pipeline.run.results import Result, crashed, found_results, write_json
+from pipeline.run.store import file_hash
+from pipeline.status import InputError, did_you_mean
+from pipeline.study.manifest import Case, Manifest
+from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve, to_toml
+from reports import tables
 from reports.atomic import write_text
 from reports.html import render_index
-from reports.schema import ERRORS, POINTS
+from reports.schema import ERRORS, POINTS, SWEEP
 
 CASE_FILES = (ERRORS.file, POINTS.file, "frames.h5", "report.html")
 
 
-class UsageError(Exception):
+class UsageError(InputError):
     """A command line that cannot be carried out."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One changed setting and the settings that result."""
+
+    parameter: str
+    value: str
+    settings: Resolved
+
+    @property
+    def folder(self) -> str:
+        """Name of its sub-folder."""
+        return f"{self.parameter}={self.value}".replace("/", "_")
+
+
+def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[Point]:
+    """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
+    points = []
+    for text in texts:
+        name, equals, values = text.partition("=")
+        if not equals or not values.strip():
+            raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
+        for value in values.split(","):
+            setting = parse_assignment(f"{name}={value}", "sweep")
+            points.append(Point(name.strip(), value.strip(), resolve([*base, setting])))
+    return points
+
+
+def jobs_of(point: Point, jobs: Sequence[Job]) -> list[Job]:
+    """The same cases at one point, in a folder of its own, without pictures."""
+    out = jobs[0].out / "sweep" / point.folder
+    return [replace(job, settings=point.settings, out=out, pictures=False, quiet=True) for job in jobs]
+
+
+def write_sweep(out: Path, points: Sequence[Point]) -> None:
+    """sweep.csv: the plain result first, then every point."""
+    rows = [_row("(plain)", "", result) for result in found_results(out)]
+    for point in points:
+        rows += [_row(point.parameter, point.value, r) for r in found_results(out / "sweep" / point.folder)]
+    tables.write(out / "sweep.csv", SWEEP, rows)
+
+
+def _row(parameter: str, value: str, result: Result) -> dict[str, Any]:
+    own = {"parameter": parameter, "value": value, "case": result.case}
+    return {name: result.summary.get(name) for name in SWEEP.names} | own
 
 
 @dataclass(frozen=True)
@@ -43,7 +92,7 @@ class Plan:
     manifest: Manifest
     cases: tuple[Case, ...]
     template: Job
-    points: tuple[sweep.Point, ...] = ()
+    points: tuple[Point, ...] = ()
     workers: int = 1
     address: str = ""
     shard: str = ""
@@ -65,8 +114,7 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
     by_id = {case.id: case for case in cases}
     unknown = [name for name in only if name not in by_id]
     if unknown:
-        msg = f"--only {unknown[0]!r}: no such case; {did_you_mean(unknown[0], by_id)}"
-        raise UsageError(msg)
+        raise UsageError([f"--only {unknown[0]!r}: no such case; {did_you_mean(unknown[0], by_id)}"])
     ids = [name for name in by_id if not only or name in only]
     if shard:
         index, count = _shard(shard)
@@ -78,8 +126,7 @@ def _shard(text: str) -> tuple[int, int]:
     parts = text.split("/")
     if len(parts) == 2 and all(p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
         return int(parts[0]), int(parts[1])
-    msg = f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"
-    raise UsageError(msg)
+    raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
 def guard_out(out: Path, manifest: Path) -> None:
@@ -92,10 +139,8 @@ def guard_out(out: Path, manifest: Path) -> None:
         return
     if known != file_hash(manifest):
         what = "was made from another manifest" if known else "is not empty and holds no run"
-        msg = (
-            f"{out} {what}; name another folder, or say --resume (keep what fits) or --fresh (compute again)"
-        )
-        raise UsageError(msg)
+        allowed = "name another folder, or say --resume (keep what fits) or --fresh (compute again)"
+        raise UsageError([f"{out} {what}; {allowed}"])
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
@@ -109,9 +154,9 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
     run_cases(plan, jobs)
     for point in plan.points:
-        run_cases(plan, sweep.jobs_of(point, jobs))
+        run_cases(plan, jobs_of(point, jobs))
     if plan.points:
-        sweep.write_sweep(out, plan.points)
+        write_sweep(out, plan.points)
     totals = aggregate(out, info, name)
     if junit:
         write_junit(junit, found_results(out))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import resource
 import subprocess
 import sys
@@ -34,27 +35,21 @@ def package_version() -> str:
 
 
 def _git(*args: str) -> str:
+    command = ["git", "-C", str(Path(__file__).parent), *args]
     try:
-        done = subprocess.run(
-            ["git", *args],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            encoding="utf-8",
-            timeout=10,
-            check=True,
-        )
+        return subprocess.check_output(
+            command, stderr=subprocess.DEVNULL, encoding="utf-8", timeout=10
+        ).strip()
     except (OSError, subprocess.SubprocessError):
         return ""
-    return done.stdout.strip()
 
 
 def _processor() -> str:
     info = Path("/proc/cpuinfo")
-    if info.exists():
-        for line in info.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    found = (
+        re.search(r"^model name.*?:(.*)$", info.read_text(encoding="utf-8"), re.M) if info.exists() else None
+    )
+    return found[1].strip() if found else platform.processor() or platform.machine()
 
 
 def peak_memory_mib() -> float:

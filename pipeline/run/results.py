@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.load.scans import Scans
+from pipeline.load import Scans
 from pipeline.register.frames import record
-from pipeline.run.keys import file_hash
 from pipeline.run.log import Log
-from pipeline.run.rows import CaseRows
+from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.study.schema import Case
+from pipeline.run.store import file_hash
+from pipeline.study.manifest import Case
 from reports.atomic import write_text
 
 CRASHED = "the case ended in an unexpected error; its log has the traceback"
@@ -68,15 +68,13 @@ def found_results(out: Path) -> list[Result]:
     return [read_result(path) for path in sorted((out / "cases").glob("*/result.json"))]
 
 
-def result_of(case: Case, known: Known, rows: CaseRows, key: str, details: Mapping[str, Any]) -> Result:
+def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
-    summary = dict(rows.summary)
     frames = [_frame_entry(frame) for frame in known.frames]
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
     sentence = str(known.failure) if known.failure else worst
-    failures = [dict(row) for row in rows.failures]
     head = (case.id, case.role, case.group, summary["status"], sentence)
-    return Result(*head, frames, failures, summary, key, dict(details))
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, details)
 
 
 def crashed(case: Case, reason: str) -> Result:

@@ -1,20 +1,106 @@
-"""The store of stage results: a stage whose inputs and code have not changed is not computed again."""
+"""The store of stage results: a stage whose inputs and code have not changed is not computed again.
+
+The key of a result is a hash of everything that it depends on, and of the code that made it: it is made from the values
+that a stage is called with, so nothing can be forgotten. A file counts by its content, never by its name or time, so
+that moving a study recomputes nothing.
+"""
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import inspect
 import json
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
-from pipeline.model import Curve, Lumen
+from pipeline.load.files import detached
+from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
+from solver._compile import hash_of
 from solver.grid import Grid
+
+_known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
+
+
+def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
+    """Key of what ``stage(*inputs)`` returns: its sources, and its inputs' contents."""
+    code = hash_of(Path(inspect.getfile(inspect.unwrap(stage))))
+    return hashlib.sha256(f"{stage.__qualname__} {code} {digest(inputs)}".encode()).hexdigest()
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of a value's content; TypeError for a kind of value whose content is not known."""
+    if isinstance(value, Path):
+        return file_hash(value) if value.exists() else "missing"
+    if isinstance(value, np.ndarray):
+        head = f"{value.dtype.str} {value.shape}".encode()
+        return hashlib.sha256(head + value.tobytes()).hexdigest()
+    if isinstance(value, np.generic):
+        value = value.item()  # a number that was stored comes back as Python's own
+    if isinstance(value, (str, bytes, int, float, bool, type(None))):
+        return f"{type(value).__name__} {value!r}"
+    if is_dataclass(value) and value.__hash__ is object.__hash__:
+        # compared by identity, its arrays read-only: one lumen stands in the keys of all frames
+        if value not in _known:
+            _known[value] = _digest_of_parts(value)
+        return _known[value]
+    return _digest_of_parts(value)
+
+
+def _digest_of_parts(value: Any) -> str:
+    text = "\0".join(f"{name}\0{digest(part)}" for name, part in _parts(value))
+    return hashlib.sha256(f"{type(value).__qualname__}\0{text}".encode()).hexdigest()
+
+
+def _parts(value: Any) -> Iterator[tuple[str, Any]]:
+    """The named parts of a value that has parts."""
+    if isinstance(value, Enum):
+        yield "name", value.name
+    elif isinstance(value, BaseModel):
+        yield from value
+    elif is_dataclass(value):
+        # what a volume was read from says more cheaply what its values are
+        left_out = {"values"} if isinstance(value, Volume) and value.made_of is not None else set()
+        yield from ((f.name, getattr(value, f.name)) for f in fields(value) if f.name not in left_out)
+    elif isinstance(value, Mapping):
+        yield from ((str(name), value[name]) for name in sorted(value, key=str))
+    elif isinstance(value, (list, tuple)):
+        yield from ((str(i), part) for i, part in enumerate(value))
+    else:
+        msg = f"a {type(value).__name__} cannot be part of a key: its content is not known; got {value!r}"
+        raise TypeError(msg)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's content, with that of files which hold its voxels; of a folder, of its files in order."""
+    if path.is_dir():
+        hasher = hashlib.sha256()
+        for item in sorted(p for p in path.rglob("*") if p.is_file()):
+            hasher.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
+        return hasher.hexdigest()
+    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *detached(path))]
+    return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
+
+
+@functools.cache
+def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
+    """Read a file once a process: the resume check, the stages and every point of a sweep ask for the same gigabyte.
+
+    Size and time only say whether it is still the same file here; the key is its content alone.
+    """
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
 
 Arrays = dict[str, NDArray[Any]]
 Packed = tuple[Arrays, dict[str, Any]]
@@ -44,7 +130,8 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data.files if name != "json"}
-                return UNPACK[stage](arrays, json.loads(str(data["json"])))
+                unpack = unpack_lumen if stage == "segment" else unpack_curve
+                return unpack(arrays, json.loads(str(data["json"])))
         except (OSError, ValueError, KeyError, EOFError):
             path.unlink(missing_ok=True)
             return None
@@ -97,10 +184,8 @@ def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
 
 def pack_curve(curve: Curve) -> Packed:
     """Arrays and JSON part of a traced curve."""
-    arrays = {
-        name: np.asarray(getattr(curve, name)) for name in ("points_mm", "sigma_mm", "flagged", "in_plane")
-    }
-    meta = {name: getattr(curve, name) for name in ("tip_sigma_mm", "note", "counters", "levels")}
+    arrays = {name: value for name, value in vars(curve).items() if isinstance(value, np.ndarray)}
+    meta = {name: value for name, value in vars(curve).items() if name not in arrays}
     return arrays, meta | {"status": curve.status.name}
 
 
@@ -108,9 +193,3 @@ def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
     """The inverse of :func:`pack_curve`."""
     fields: dict[str, Any] = {**arrays, **meta, "status": FrameStatus[meta["status"]]}
     return Curve(**fields)
-
-
-UNPACK: dict[str, Callable[[Arrays, dict[str, Any]], Lumen | Curve]] = {
-    "segment": unpack_lumen,
-    "trace": unpack_curve,
-}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.sparse import sparse_zeros
 from pipeline.segment._kernels.connect import FULL, READ, Affinity, Search, flood, strengths
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, SIDE
-from pipeline.segment.levels import GreyLevels
+from pipeline.segment.region import GreyLevels, Index
 from solver.grid import Grid
 
 HALF_HEIGHT_SPREAD = 0.42
@@ -56,9 +56,6 @@ def estimate_affinity(
     h = np.exp(-0.25 * (difference / s_h) ** 2)
     o = np.exp(-0.25 * (below / s_o) ** 2)
     return Affinity((FULL * h).astype(np.float32), o.astype(np.float32), low, 1.0 / step, taps)
-
-
-Index = NDArray[np.int64]
 
 
 def neighbours(adjacency: int) -> Index:

@@ -1,16 +1,149 @@
-"""What a method of segmentation is given and what it finds; a method is a function like :func:`fuzzy.fuzzy_region`."""
+"""What a method of segmentation goes by near the seeds (two grey levels and the noise), and the region that it finds.
+
+A method is a function like :func:`fuzzy.fuzzy_region`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+from scipy.stats import ncx2
 
+from pipeline.arrays.robust import spread
 from pipeline.model import Counters
-from pipeline.segment.levels import GreyLevels
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
+
+BOX_MM = 6.0
+"""Half width of the box around a seed in which the levels are estimated: a carotid artery and what is around it."""
+LEAST_BOX = 8
+"""Its least half width in voxels."""
+THICK = 5.0
+"""Depth over blur from which grey in the middle is the plateau."""
+
+
+@dataclass(frozen=True)
+class GreyLevels:
+    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing."""
+
+    inside: float
+    outside: float
+    noise: float
+
+    @property
+    def contrast(self) -> float:
+        """Inside minus outside."""
+        return self.inside - self.outside
+
+    @property
+    def half(self) -> float:
+        """The level of the wall."""
+        return 0.5 * (self.inside + self.outside)
+
+
+def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
+    """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
+    half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
+    a, b, c = (
+        slice(max(0, int(i - h)), min(n, int(i + h) + 1))
+        for i, h, n in zip(index, half, grid.shape, strict=True)
+    )
+    return a, b, c
+
+
+def _median(values: NDArray[Any], otherwise: float) -> float:
+    return float(np.median(values)) if values.size >= 8 else otherwise
+
+
+def _two_levels(
+    grey: NDArray[Any], seed: float, at: tuple[int, ...]
+) -> tuple[float, float, NDArray[np.bool_]]:
+    """Median grey of the bright region that holds the seed and of what is darker, by fixed-point iteration.
+
+    The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
+    """
+    outside = float(np.percentile(grey, 10))
+    inside = seed
+    region = np.zeros(grey.shape, bool)
+    for _ in range(6):
+        bright = grey > 0.5 * (inside + outside)
+        if not bright[at]:
+            break
+        labels, _ = ndimage.label(bright)
+        region = labels == labels[at]
+        whole = _median(grey[region], inside)
+        inside = _median(grey[ndimage.binary_erosion(region)], whole)
+        inside = min(inside, seed + 0.5 * (seed - outside))
+        outside = _median(grey[~ndimage.binary_dilation(bright, iterations=2)], outside)
+    return inside, outside, region
+
+
+def _noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
+    """Spread of grey minus smoothed grey well inside the region, or well outside if that is too thin."""
+    core = ndimage.binary_erosion(region, iterations=2)
+    if core.sum() < 100:
+        core = ~ndimage.binary_dilation(region, iterations=4)
+    values = rough[core] if core.any() else rough.ravel()
+    return spread(values) / 0.935
+
+
+def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
+    """GreyLevels around one seed voxel, and the brightest smoothed voxel beside it, where to start.
+
+    Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
+    """
+    box = box_around(grid, index, BOX_MM, LEAST_BOX)
+    raw = np.asarray(grid.values[box], np.float32)
+    grey = raw
+    for axis in range(3):
+        grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
+    start = np.array([s.start for s in box])
+    # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
+    near = box_around(grid, index, 0.0, 1)
+    inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
+    around = grey[inner]
+    seed = float(np.median(around))
+    best = np.unravel_index(int(np.argmin(np.abs(around - seed))), around.shape)
+    at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
+    inside, outside, region = _two_levels(grey, seed, at)
+    noise = _noise(raw - grey, region)
+    return GreyLevels(inside, outside, noise), start + np.array(at)
+
+
+def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
+    """The whole blur less the smoothing by ``taps`` and by the spline, mm; 0.3 voxel at least."""
+    reach = np.arange(len(taps)) - len(taps) // 2
+    smoothing = float(np.sum(reach**2 * taps)) + 1.0 / 3.0
+    return float(np.sqrt(max(blur_mm**2 - smoothing * voxel**2, (0.3 * voxel) ** 2)))
+
+
+def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> GreyLevels:
+    """The levels again, from the deepest part of the whole segmented vessel.
+
+    distance : signed, on a box of the scan.  blur_mm : the scanner's.  A tube no thicker than its blur never reaches
+    its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2).
+    """
+    inside = distance.values < 0
+    if not np.isfinite(blur_mm) or not inside.any():
+        return levels
+    corner = np.rint(scan.to_index(distance.origin_mm)).astype(int)
+    window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    off_wall, grey = -distance.values[inside], scan.values[window][inside]
+    depth = float(np.percentile(off_wall, 99))
+    core = np.flatnonzero(off_wall > 0.7 * depth)
+    if depth > THICK * blur_mm:
+        return GreyLevels(_median(grey[core], levels.inside), levels.outside, levels.noise)
+    core = core[:: max(1, len(core) // 500)]
+    radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
+    off_axis = np.maximum(radius - off_wall[core], 0.0)
+    share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
+    peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
+    return GreyLevels(levels.outside + peak, levels.outside, levels.noise)
+
 
 Index = NDArray[np.int64]
 

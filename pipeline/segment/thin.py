@@ -7,8 +7,6 @@ skirt of the vessel, what hangs together at a lower grey, is long, thin and nowh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -23,8 +21,7 @@ from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.wall import PAD, dilate
 from pipeline.segment.connect import connect, neighbours, noise_after
 from pipeline.segment.contact import numbered, parts
-from pipeline.segment.levels import GreyLevels
-from pipeline.segment.region import Index
+from pipeline.segment.region import GreyLevels, Index
 from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 
@@ -56,12 +53,8 @@ SHARP = 0.4
 """Curvature of a crest over that of a Gaussian line of its height: half a blur off its middle it is down to 0.7."""
 
 
-@dataclass(frozen=True, eq=False)
-class Balls:
-    """A thin branch as balls: centres (n, 3) mm along the box's axes from its first voxel, radii (n,) mm."""
-
-    centre: Array
-    radius: Array
+Balls = tuple[Array, Array]
+"""Thin branches as balls: centres (n, 3) mm along the box's axes from its first voxel, radii (n,) mm."""
 
 
 def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
@@ -133,7 +126,7 @@ def balls(volume: Grid, thin: Index, corner: Index, levels: GreyLevels, blur_mm:
     # several voxels lead to one point of the crest: one ball per third of a voxel
     _, first = np.unique(np.rint(3.0 * at[good] / spacing), axis=0, return_index=True)
     thickest = np.maximum(radius[good][first], LEAST_RADIUS * float(spacing.min()))
-    return Balls(at[good][first] - corner * spacing, thickest)
+    return at[good][first] - corner * spacing, thickest
 
 
 def _nearest(places: Array, points: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -168,10 +161,11 @@ def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_
 def add_balls(distance: NDArray[np.float32], spacing: Array, found: Balls, outer_mm: float) -> None:
     """Lower the signed distance to that of the union with the balls that hang together with the vessel."""
     vessel = np.argwhere(distance < 0).astype(float)
-    if len(found.radius) == 0 or len(vessel) == 0:
+    centre, radius = found
+    if len(radius) == 0 or len(vessel) == 0:
         return
-    kept, bridges = joined(found.centre / spacing, vessel, BRIDGE_VOXELS)
-    centre, radius = found.centre[kept], found.radius[kept]
+    kept, bridges = joined(centre / spacing, vessel, BRIDGE_VOXELS)
+    centre, radius = centre[kept], radius[kept]
     cones(centre, centre, radius, radius, spacing, outer_mm, distance)
     if len(bridges):
         start, end = bridges[:, 0] * spacing, bridges[:, 1] * spacing

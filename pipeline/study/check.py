@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import LoadError, Source
+from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
-from pipeline.load.scans import Scans, read_headers
-from pipeline.study.config import Config
-from pipeline.study.schema import Case, not_one_per_frame
+from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.settings import Config
 
 
 def check(cases: Sequence[Case], config: Config) -> list[str]:
@@ -41,17 +40,9 @@ def check_case(case: Case, config: Config) -> list[str]:
 
 def inputs_of(case: Case) -> list[Path]:
     """Every file or folder that a case names, once."""
-    return list(dict.fromkeys(path for _, value in case for path in _paths_in(value)))
-
-
-def _paths_in(value: object) -> Iterator[Path]:
-    if isinstance(value, Source):
-        yield value.path
-    elif isinstance(value, Path):
-        yield value
-    elif isinstance(value, tuple):
-        for item in value:
-            yield from _paths_in(item)
+    values = [item for _, value in case for item in (value if isinstance(value, tuple) else (value,))]
+    paths = (item.path if isinstance(item, Source) else item for item in values)
+    return list(dict.fromkeys(path for path in paths if isinstance(path, Path)))
 
 
 def _entry_problems(case: Case, scans: Scans) -> list[str]:
@@ -64,9 +55,7 @@ def _entry_problems(case: Case, scans: Scans) -> list[str]:
         index = header.grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):
-                corners = (
-                    header.grid.to_mm(np.array([(0, 0, 0), header.shape]) - [[0], [1]]).round(1).tolist()
-                )
+                corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]]).round(1).tolist()
                 problems.append(
                     f"{name} {list(point)} lies outside the scan (voxel {voxel.round(1).tolist()} of "
                     f"{list(header.shape)}); the scan spans {corners[0]} to {corners[1]} mm in LPS; "

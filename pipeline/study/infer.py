@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,21 +9,26 @@ from scipy import ndimage
 
 from pipeline.load import SUFFIXES, LoadError, load, read_header
 from pipeline.load.config import LoadConfig
+from pipeline.load.geometry import unusable
 from pipeline.model import Array, Volume
-from pipeline.study.schema import natural_key
+from pipeline.study.manifest import natural_key
 
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
-DEFAULT_WIRE = """radius_mm = {radius}
+DEFAULT_RADIUS_MM = 0.18
+MANIFEST = """schema = 1
+
+[wires.assumed]
+radius_mm = {radius}
 bending_stiffness_N_mm2 = [[0.0, 0.5], [30.0, 5.0], [100.0, 40.0]]
-rest_curvature_per_mm = [[0.0, 0.15], [10.0, 0.15], [10.0, 0.0]]"""
+rest_curvature_per_mm = [[0.0, 0.15], [10.0, 0.15], [10.0, 0.0]]
 
-
-@dataclass(frozen=True)
-class Inferred:
-    """Text of the manifest and the sentences that say where each guess comes from."""
-
-    text: str
-    assumptions: tuple[str, ...]
+[[case]]
+id = "{id}"
+{reference}frames = [{frames}]
+entry_mm = {entry}
+entry_direction = {direction}
+wire = "assumed"
+"""
 
 
 def _is_scan(path: Path) -> bool:
@@ -32,9 +36,7 @@ def _is_scan(path: Path) -> bool:
 
 
 def _scans_in(folder: Path) -> tuple[Path | None, list[Path]]:
-    below = [p for p in folder.iterdir() if _is_scan(p)]
-    if (folder / "frames").is_dir():
-        below += [p for p in (folder / "frames").iterdir() if _is_scan(p)]
+    below = [p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p)]
     below.sort(key=lambda p: natural_key(str(p.relative_to(folder))))
     reference = next((p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES), None)
     return reference, [p for p in below if p != reference]
@@ -74,39 +76,36 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
 
 def infer_manifest(
     folder: Path, entry: Array | None, direction: Array | None, radius_mm: float | None, config: LoadConfig
-) -> Inferred:
-    """A manifest for one case from a folder of scans; raises LoadError where there is nothing to go by."""
+) -> tuple[str, tuple[str, ...]]:
+    """The text of a manifest for one case from a folder of scans, and sentences that say where each guess comes from.
+
+    Raises LoadError where there is nothing to go by.
+    """
     reference, frames = _scans_in(folder)
     if not frames:
-        msg = f"{folder}: found no scans; allowed: files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
-        raise LoadError(msg)
+        allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
+        raise unusable(folder, f"found no scans; allowed: {allowed}")
     notes = [
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
     ]
     if entry is None or direction is None:
-        first = load(read_header(frames[0], config), None, config)
-        empty = load(read_header(reference, config), None, config) if reference else None
-        found_entry, found_direction = infer_entry(first, empty)
-        entry, direction = (found_entry, found_direction) if entry is None else (entry, found_direction)
+        first = load(read_header(frames[0], config), config=config)
+        empty = load(read_header(reference, config), config=config) if reference else None
+        seen, direction = infer_entry(first, empty)
+        entry = seen if entry is None else entry
         notes.append(
             "entry_mm and entry_direction: the end of the wire nearest to the edge of the first frame"
         )
-    notes.append(f"wire: radius {radius_mm or 0.18} mm, stiffness and tip curve of a common 0.014 inch wire")
+    radius = radius_mm or DEFAULT_RADIUS_MM
+    notes.append(f"wire: radius {radius} mm, stiffness and tip curve of a common 0.014 inch wire")
     notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")
-    return Inferred(_text(folder, reference, frames, entry, direction, radius_mm or 0.18), tuple(notes))
-
-
-def _text(
-    folder: Path, reference: Path | None, frames: list[Path], entry: Array, direction: Array, radius: float
-) -> str:
-    names = ", ".join(f'"{p.resolve()}"' for p in frames)
-    lines = ["schema = 1", "", "[wires.assumed]", DEFAULT_WIRE.format(radius=radius), "", "[[case]]"]
-    lines.append(f'id = "{"".join(c if c.isalnum() or c in "._-" else "_" for c in folder.resolve().name)}"')
-    if reference:
-        lines.append(f'reference = "{reference.resolve()}"')
-    lines.append(f"frames = [{names}]")
-    lines.append(f"entry_mm = {[round(float(x), 3) for x in entry]}")
-    lines.append(f"entry_direction = {[round(float(x), 5) for x in direction]}")
-    lines.append('wire = "assumed"')
-    return "\n".join(lines) + "\n"
+    text = MANIFEST.format(
+        radius=radius,
+        id="".join(c if c.isalnum() or c in "._-" else "_" for c in folder.resolve().name),
+        reference=f'reference = "{reference.resolve()}"\n' if reference else "",
+        frames=", ".join(f'"{p.resolve()}"' for p in frames),
+        entry=[round(float(x), 3) for x in entry],
+        direction=[round(float(x), 5) for x in direction],
+    )
+    return text, tuple(notes)

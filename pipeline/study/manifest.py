@@ -1,26 +1,206 @@
-"""The study's description, read from TOML; everything that is wrong with it is listed at once."""
+"""The manifest as it is written (TOML) and as it is used: one class for each table, checked by pydantic.
+
+Everything that is wrong with it is listed at once.
+"""
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
+from pipeline.load import Source
 from pipeline.model import Wall, Wire
-from pipeline.study.schema import WHOLE_CASE, Case, ManifestTables
-from pipeline.study.suggest import did_you_mean
+from pipeline.ranges import Axis, Direction, Finite, Positive, Vector
+from pipeline.status import InputError, did_you_mean
+
+WHOLE_CASE = "whole_case"
+"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
 
 
-class ManifestError(Exception):
-    """The manifest cannot be used; ``problems`` lists everything that is wrong with it."""
+def natural_key(text: str) -> list[Any]:
+    """Sort key under which frame_2 comes before frame_10."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
 
-    def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
+
+def _problem(*problems: str) -> PydanticCustomError:
+    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
+
+
+def _source(value: Any, info: ValidationInfo) -> Source:
+    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
+    if not isinstance(value, str):
+        msg = "Input should be a valid string"
+        raise ValueError(msg)
+    name, _, dataset = value.partition("#")
+    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
+
+
+def _path(value: Any, info: ValidationInfo) -> Path:
+    """A file, relative to the manifest."""
+    return _source(value, info).path
+
+
+def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
+    """A list of sources, or a pattern whose matches come in natural order."""
+    if isinstance(value, list):
+        return tuple(_source(item, info) for item in value)
+    source, base = _source(value, info), Path((info.context or {}).get("folder", ""))
+    pattern = value.partition("#")[0]
+    if not any(mark in pattern for mark in "*?["):
+        return (source,)
+    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
+    if not found:
+        problem = f"{info.field_name} = {value!r} matches no file below {base}"
+        raise _problem(problem)
+    return tuple(Source(path, source.dataset) for path in found)
+
+
+def _wire(value: Any, info: ValidationInfo) -> Wire:
+    """The wire of that name among ``[wires.*]``, which are read first."""
+    wires: dict[str, Wire] = (info.context or {}).get("wires", {})
+    if value not in wires:
+        problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
+        # where the wires themselves are wrong, that is all there is to say
+        raise _problem(*[problem] * bool(wires))
+    return wires[value]
+
+
+def _not_yet(value: Any, info: ValidationInfo) -> Any:
+    """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
+    problem = {
+        "parameters": "parameters cannot be read in this version; write the values into [wires] and [case.wall]",
+        "roll_deg": 'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame',
+    }[info.field_name or ""]
+    if value == "fit" or info.field_name == "parameters":
+        raise _problem(problem)
+    return value
+
+
+SourceText = Annotated[Source, BeforeValidator(_source)]
+Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
+PathText = Annotated[Path, BeforeValidator(_path)]
+
+
+class Strict(BaseModel):
+    """Unknown keys are errors; values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Case(Strict):
+    """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
+
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    role: Literal["validation", "calibration"] = "validation"
+    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1)
+    reference: SourceText | None = None
+    frames: Sources = ()
+    entry_mm: Vector
+    entry_direction: Direction
+    material_axis: Axis | None = None
+    wire: Annotated[Wire, BeforeValidator(_wire)]
+    insertion_mm: tuple[Positive, ...] | None = None
+    spacing_mm: tuple[Positive, Positive, Positive] | None = None
+    lumen: SourceText | None = None
+    traces: Sources = ()
+    parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
+    roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
+    lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
+    truth: PathText | None = None
+    wall: Wall = Wall()
+
+    @property
+    def frame_count(self) -> int:
+        """Frames to report on: scans, or depths of a case without scans."""
+        return len(self.frames) or len(self.insertion_mm or ())
+
+    @property
+    def _one_file(self) -> bool:
+        """A single file may hold many volumes; their number is known once its header is read."""
+        return len(self.frames) == 1 and self.frames[0].path.is_file()
+
+    @model_validator(mode="after")
+    def _something_to_do(self) -> Case:
+        if not self.frames and self.insertion_mm is None:
+            msg = "neither frames nor insertion_mm: give scans to compare with, or depths to simulate"
+            raise ValueError(msg)
+        if not self.frames and self.reference is None and self.lumen is None:
+            msg = "no frames, no reference and no lumen: there is no vessel to simulate in"
+            raise ValueError(msg)
+        return self
+
+    @model_validator(mode="after")
+    def _one_per_frame(self) -> Case:
+        lists = {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
+        if problems := () if self._one_file else not_one_per_frame(lists, self.frame_count):
+            raise _problem(*problems)
+        return self
+
+
+def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:
+    """A sentence for each list that does not have one entry per frame; a single number and None stand for all."""
+    return [
+        f"{name} has {len(values)} entries for {count} frames; give one per frame"
+        for name, values in lists.items()
+        if isinstance(values, Sequence) and len(values) not in (0, count)
+    ]
+
+
+class ManifestTables(Strict):
+    """The whole file."""
+
+    schema_: Annotated[Literal[1], Field(alias="schema")]
+    wires: dict[str, Wire]
+    case: Annotated[list[Case], Field(min_length=1)]
+
+    @field_validator("wires", mode="before")
+    @classmethod
+    def _named(cls, value: Any) -> Any:
+        """A wire carries the name of its table."""
+        if not isinstance(value, dict):
+            return value
+        return {k: {"name": k} | table if isinstance(table, dict) else table for k, table in value.items()}
+
+    @field_validator("wires")
+    @classmethod
+    def _known_to_cases(cls, value: dict[str, Wire], info: ValidationInfo) -> dict[str, Wire]:
+        for name, wire in value.items():
+            if wire.name != name:
+                msg = f"{name}: unknown key 'name'; a wire has the name of its table"
+                raise ValueError(msg)
+        if info.context is not None:
+            info.context["wires"] = value
+        return value
+
+    @model_validator(mode="after")
+    def _unique(self) -> ManifestTables:
+        counts = Counter(case.id for case in self.case)
+        repeats = [name for name, count in counts.items() if count > 1]
+        if repeats:
+            what = "this id is used more than once; ids name output folders"
+            raise _problem(*(f"case {name!r}: {what}" for name in repeats))
+        return self
+
+
+class ManifestError(InputError):
+    """The manifest cannot be used."""
 
 
 @dataclass(frozen=True)

@@ -1,26 +1,41 @@
-"""Where each setting comes from: command line > config file > default; unknown or ill-typed ones are all listed."""
+"""Every setting of a run, one TOML table for each stage's frozen dataclass, and where each setting comes from.
+
+Command line > config file > default; unknown or ill-typed ones are all listed.
+"""
 
 from __future__ import annotations
 
 import json
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.study.config import Config
-from pipeline.study.suggest import did_you_mean
+from pipeline.compare.config import CompareConfig
+from pipeline.load.config import LoadConfig
+from pipeline.segment.config import SegmentConfig
+from pipeline.simulate.config import SimulateConfig, SolverConfig
+from pipeline.status import InputError, did_you_mean
+from pipeline.trace.config import TraceConfig
 
 
-class SettingsError(Exception):
-    """Settings that cannot be used; ``problems`` lists all of them."""
+@dataclass(frozen=True)
+class Config:
+    """All settings of a run."""
 
-    def __init__(self, problems: list[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = problems
+    load: LoadConfig = field(default_factory=LoadConfig)
+    segment: SegmentConfig = field(default_factory=SegmentConfig)
+    trace: TraceConfig = field(default_factory=TraceConfig)
+    solver: SolverConfig = field(default_factory=SolverConfig)
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
+    compare: CompareConfig = field(default_factory=CompareConfig)
+
+
+class SettingsError(InputError):
+    """Settings that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +48,11 @@ class Resolved:
     def as_dict(self) -> dict[str, dict[str, dict[str, Any]]]:
         """{table: {key: {"value", "source"}}}, as result.json holds it."""
         return {
-            table.name: {
-                item.name: {
-                    "value": getattr(getattr(self.config, table.name), item.name),
-                    "source": self.origin.get(f"{table.name}.{item.name}", "default"),
-                }
-                for item in fields(getattr(self.config, table.name))
+            table: {
+                key: {"value": value, "source": self.origin.get(f"{table}.{key}", "default")}
+                for key, value in values.items()
             }
-            for table in fields(self.config)
+            for table, values in asdict(self.config).items()
         }
 
 
@@ -85,7 +97,8 @@ def read_settings(path: Path) -> list[Setting]:
 
 def resolve(settings: Sequence[Setting]) -> Resolved:
     """Apply settings in order (later ones win); raises SettingsError listing every problem."""
-    config, origin, problems = Config(), {}, []
+    config, origin = Config(), {}
+    problems: list[str] = []
     for setting in settings:
         try:
             config = _applied(config, setting)
@@ -118,9 +131,7 @@ def to_toml(resolved: Resolved) -> str:
     """config.resolved.toml: every setting with a comment saying where it came from; reads back through -c."""
     lines: list[str] = []
     for table, items in resolved.as_dict().items():
-        lines.append(f"[{table}]")
-        lines += [_line(key, item) for key, item in items.items()]
-        lines.append("")
+        lines += [f"[{table}]", *(_line(key, item) for key, item in items.items()), ""]
     return "\n".join(lines)
 
 

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent, to_length
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
-from pipeline.model import Curve, Lumen, Simulated, arc_length
+from pipeline.model import Curve, Lumen, arc_length
+from solver import Solution, Status
 from solver.grid import Grid
 from tests.naive import curves as naive
 
@@ -42,7 +43,7 @@ def test_repeated_points_and_single_points_are_no_trouble() -> None:
 def test_blocks_of_points_give_the_same_as_one_block(monkeypatch: pytest.MonkeyPatch) -> None:
     points, curve = random_curve(3, 50), random_curve(4, 40)
     whole = point_to_curve(points, curve)
-    monkeypatch.setattr("pipeline.compare.distance.PAIRS_AT_ONCE", 100)
+    monkeypatch.setattr("pipeline.compare.metrics.PAIRS_AT_ONCE", 100)
     np.testing.assert_array_equal(whole, point_to_curve(points, curve))
 
 
@@ -79,8 +80,10 @@ def open_space() -> Lumen:
     return Lumen(grid, grid.with_values(np.ones((40, 40, 40), np.uint8)))
 
 
-def simulated(joints: np.ndarray) -> Simulated:
-    return Simulated(joints, np.zeros_like(joints), "converged", "", True, 0.0, 0.0, 0.0, 1, 0.0, 0.0)
+def simulated(joints: np.ndarray) -> Solution:
+    frames, forces, nothing = np.zeros((len(joints), 3, 3)), np.zeros_like(joints), (0.0,) * 4
+    rest = (forces[0], 0.0, *nothing, (), 0.0)
+    return Solution(joints, frames, *nothing, Status.CONVERGED, 1, forces, *rest)
 
 
 def traced(points: np.ndarray) -> Curve:

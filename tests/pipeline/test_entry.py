@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.model import Clamp, Curve
-from pipeline.simulate.clamp import measured_clamp
+from pipeline.simulate import measured_clamp
 
 
 def arc_wire(length: float, noise: float, seed: int, curvature: float = 0.03) -> Curve:

@@ -8,8 +8,8 @@ from scipy import ndimage
 from scipy.stats import ncx2
 
 from pipeline.arrays.jets import Blurred, jet
-from pipeline.segment._kernels.spline import hessian, value_gradient
-from pipeline.segment.blur import blur_of_wall, half_level_offset
+from pipeline.segment._kernels.wall import hessian, value_gradient
+from pipeline.segment.surface import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
 from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampled, sampling, tint_nodes
 from pipeline.trace.tube import evaluate as spline_points

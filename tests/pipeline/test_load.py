@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 import SimpleITK as sitk
 
-from pipeline.load import Crop, LoadError, Source, load, read_header, require_same_geometry
+from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
-from pipeline.load.raw import read_mha_box
-from pipeline.load.scans import each_volume
+from pipeline.load.files import read_mha_box
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

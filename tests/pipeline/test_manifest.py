@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.schema import natural_key
+from pipeline.study.manifest import ManifestError, natural_key, read_manifest
 
 GOOD = """
 schema = 1

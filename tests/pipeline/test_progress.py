@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from pipeline.run.progress import CaseProgress
+from pipeline.run.log import CaseProgress
 
 
 class Terminal(io.StringIO):

@@ -19,6 +19,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
 from reports.schema import ERRORS, POINTS, SUMMARY
+from solver import Status
 
 SIZE, FRAMES = 64, 4
 
@@ -256,7 +257,7 @@ def test_predictors_are_told_of_trusted_traces_alone(study: Path, tmp_path: Path
     frames = (
         Frame(0, curve=good),
         Frame(1, curve=bad).failed("trace", FrameStatus.LENGTH_MISMATCH, "why"),
-        Frame(2, curve=good).failed_with("simulate", "max_iterations", "why"),
+        Frame(2, curve=good).failed("simulate", Status.MAX_ITERATIONS),
     )
     assert [frame.trusted_curve for frame in frames] == [good, None, good]
     assert [p is not None and p is good.points_mm for p in _trusted_before(frames)] == [False, True, True]

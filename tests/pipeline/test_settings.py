@@ -7,15 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.commands.common import complain
+from pipeline.commands import complain
 from pipeline.model import Curve, Lumen
-from pipeline.run.keys import digest, file_hash, key_of
-from pipeline.run.store import Store
+from pipeline.run.store import Store, digest, file_hash, key_of
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
-from pipeline.study.config import Config
-from pipeline.study.settings import SettingsError, parse_assignment, read_settings, resolve, to_toml
+from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve, to_toml
 from pipeline.trace import trace
 from solver.grid import Grid
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.model import Clamp, Lumen, Simulated
+from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.load import rolls
-from pipeline.simulate import insertion_of, simulate
+from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
-from pipeline.simulate.replay import guide_wire
-from pipeline.study.manifest import read_manifest
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case, read_manifest
+from solver import Solution
 from solver.grid import Grid
 
 MANIFEST = """
@@ -47,7 +46,7 @@ def wide_open() -> Lumen:
     return Lumen(grid, grid.with_values(np.ones((20, 20, 20), np.uint8)))
 
 
-def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Simulated]:
+def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Solution]:
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis))
     insertion = insertion_of(case.wire, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
     return list(simulate(insertion, depths, [roll] * len(depths)))

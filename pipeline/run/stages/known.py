@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.compare import Comparison
-from pipeline.load import Crop
-from pipeline.load.scans import Scans
-from pipeline.model import Array, Clamp, Curve, Lumen, Simulated, Volume
+from pipeline.load import Crop, Scans
+from pipeline.model import Array, Clamp, Curve, Lumen, Volume
 from pipeline.register import Registration
-from pipeline.run.keys import key_of
 from pipeline.run.log import Log, Stage
-from pipeline.run.store import Store
+from pipeline.run.store import Store, key_of
 from pipeline.status import FrameStatus, StageError
-from pipeline.study.config import Config
-from pipeline.study.schema import Case
+from pipeline.study.manifest import Case
+from pipeline.study.settings import Config
+from solver import Solution, Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class Frame:
     depth_mm: float = float("nan")
     roll_deg: float = 0.0
     curve: Curve | None = None
-    simulated: Simulated | None = None
+    simulated: Solution | None = None
     comparison: Comparison | None = None
     registration: Registration | None = None
     truth_mm: Array | None = None
@@ -63,17 +62,13 @@ class Frame:
         """The traced curve of a frame that loading and tracing found nothing wrong with."""
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
 
-    def failed(self, stage: str, why: FrameStatus | StageError, message: str = "") -> Frame:
+    def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> Frame:
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
-        status = why.status if isinstance(why, StageError) else why
-        text = str(why) if isinstance(why, StageError) else message
-        return self.failed_with(stage, status.identifier, status.value, text)
-
-    def failed_with(self, stage: str, identifier: str, sentence: str, message: str = "") -> Frame:
-        """The same for a status that is not a FrameStatus (the solver's own)."""
         if not self.ok:
             return self
-        return replace(self, status=identifier, sentence=sentence, stage=stage, message=message)
+        status = why.status if isinstance(why, StageError) else why
+        text = str(why) if isinstance(why, StageError) else message
+        return replace(self, status=status.identifier, sentence=status.value, stage=stage, message=text)
 
 
 Result = TypeVar("Result", Lumen, Curve)

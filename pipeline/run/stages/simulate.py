@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from time import perf_counter
 
 import numpy as np
 
 from pipeline.model import Clamp
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.simulate import insertion_of, measured_clamp, simulate
+from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
 from pipeline.status import FrameStatus, StageError
 
 
@@ -23,14 +24,17 @@ def simulate_frames(run: Context, known: Known) -> Known:
     try:
         insertion = insertion_of(case.wire, case.wall, known.lumen, clamp, config.solver, config.simulate)
         found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay])
+        clock = perf_counter()
         for frame, wire in zip(replay, found, strict=True):
-            log.spent("simulate", wire.seconds, frame.index)
-            log.count("simulate", wire.work, wire.levels)
+            log.spent("simulate", perf_counter() - clock, frame.index)
+            work = dict(wire.work)
+            levels = {name: work.pop(name) for name in LEVELS}
+            log.count("simulate", work, levels)
             done = replace(frame, simulated=wire)
-            if not wire.converged:
-                done = done.failed_with("simulate", wire.status, wire.sentence)
-            frames[frame.index] = done
-            log.progress("simulate", frame.index + 1, len(frames), f"{wire.status} {wire.depth_mm:.1f} mm")
+            frames[frame.index] = done if wire.converged else done.failed("simulate", wire.status)
+            said = f"{wire.status.identifier} {wire.depth_mm:.1f} mm"
+            log.progress("simulate", frame.index + 1, len(frames), said)
+            clock = perf_counter()
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     return replace(known, frames=tuple(frames), entry=clamp)

@@ -1,38 +1,35 @@
-"""One frame as a row of errors.csv, all its points as points.csv.gz, and a case as a row of summary.csv."""
+"""What is written of a case beside result.json.
+
+A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5, and the files
+that 3D Slicer and ParaView open; LPS mm.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, counts, pooled, skill_of
-from pipeline.model import Array, arc_length
+from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.study.schema import Case
+from pipeline.run.stages.trace import projections
+from pipeline.study.manifest import Case
+from reports import export, frames_file
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
 
 
-@dataclass(frozen=True, eq=False)
-class CaseRows:
-    """What the tables hold of a case: rows of errors.csv and of failures.csv, and its row of summary.csv."""
-
-    errors: tuple[Row, ...]
-    failures: tuple[Row, ...]
-    summary: Row
-
-
-def rows_of(case: Case, known: Known, log: Log, draws: int) -> CaseRows:
-    """All rows of a case. draws : resamples behind the intervals."""
-    errors = tuple(error_row(frame, log) for frame in known.frames)
+def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
+    """The row of a case in summary.csv. errors : its rows of errors.csv; draws : resamples behind the intervals."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
     good = sum(frame.ok for frame in known.frames)
@@ -41,8 +38,7 @@ def rows_of(case: Case, known: Known, log: Log, draws: int) -> CaseRows:
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and counts(row, mm)]
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
-    summary = head | pooled(scored, draws) | _forces(known.frames) | times
-    return CaseRows(errors, tuple(_failures(case.id, known)), summary)
+    return head | pooled(scored, draws) | _forces(known.frames) | times
 
 
 def error_row(frame: Frame, log: Log) -> dict[str, Any]:
@@ -53,9 +49,7 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
         "insertion_mm": frame.depth_mm,
         "roll_deg": frame.roll_deg,
     }
-    row |= {
-        f"{s}_s": log.frame_seconds[frame.index, s] for s in TIMED if (frame.index, s) in log.frame_seconds
-    }
+    row |= {f"{stage}_s": s for (index, stage), s in log.frame_seconds.items() if index == frame.index}
     row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
     row |= frame.truth
     if frame.comparison is not None:
@@ -109,7 +103,7 @@ def _forces(frames: Sequence[Frame]) -> dict[str, float]:
     }
 
 
-def _failures(case: str, known: Known) -> list[Row]:
+def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
     """Rows of failures.csv: the case itself, or each frame that is not ok."""
     log = f"cases/{case}/log.txt"
     if known.failure is not None:
@@ -122,3 +116,75 @@ def _failures(case: str, known: Known) -> list[Row]:
         for f in known.frames
         if not f.ok
     ]
+
+
+SIMULATED_COLOUR = (0.835, 0.369, 0.0)
+
+
+def write_frames(path: Path, known: Known) -> None:
+    """frames.h5: curves of every frame, projections of its scan, and the lumen's outline."""
+    scan = None if known.lumen is None else _scan_of(known.lumen)
+    frames_file.write_frames(path, scan, map(_arrays_of, known.frames))
+
+
+def write_view(folder: Path, known: Known) -> None:
+    """The lumen and every frame's wires, each in a file."""
+    if known.lumen is not None:
+        _write_lumen(folder, known.lumen)
+    for frame in known.frames:
+        _write_wires(folder, frame)
+
+
+def _scan_of(lumen: Lumen) -> frames_file.ScanCrop:
+    """Geometry of the crop, with the lumen's silhouettes for outlines."""
+    grid = lumen.distance
+    inside = Volume((grid.values < 0).astype(np.uint8), grid.spacing_mm, grid.origin_mm, grid.direction)
+    silhouettes = dict(enumerate(projections(inside, (0.0, 1.0))))
+    return frames_file.ScanCrop(grid.spacing_mm, grid.origin_mm, grid.direction, grid.shape, silhouettes)
+
+
+def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
+    curve, wire, errors = frame.curve, frame.simulated, frame.comparison
+    return frames_file.FrameArrays(
+        frame.index,
+        traced_mm=None if curve is None else curve.points_mm,
+        trace_sigma_mm=None if curve is None else curve.sigma_mm,
+        trace_flags=None if curve is None else np.asarray(curve.flagged) + 2.0 * np.asarray(curve.in_plane),
+        simulated_mm=None if wire is None else wire.joints_mm,
+        contact_force_N=None if wire is None else wire.contact_force_N,
+        error_mm=None if errors is None else errors.error_mm,
+        arc_mm=None if errors is None else errors.arc_mm,
+        truth_mm=frame.truth_mm,
+        mips=dict(enumerate(frame.projections)),
+    )
+
+
+def _write_lumen(folder: Path, lumen: Lumen) -> None:
+    grid = lumen.distance
+    inside = (grid.values < 0).astype(np.uint8)
+    export.write_segmentation_nrrd(
+        folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
+    )
+    if inside.any() and not inside.all():
+        # a copy, since marching cubes wants to write
+        vertices, triangles, _, _ = marching_cubes(np.array(grid.values, dtype=np.float32), 0.0)
+        export.write_surface_vtp(folder / "lumen.vtp", grid.to_mm(vertices), triangles)
+
+
+def _write_wires(folder: Path, frame: Frame) -> None:
+    name = f"{frame.index:03d}"
+    if frame.curve is not None and frame.traced:
+        path = folder / f"wire_traced_{name}.mrk.json"
+        export.write_markups_curve(path, frame.curve.points_mm, f"traced {name}")
+    if frame.simulated is None:
+        return
+    points = joints = frame.simulated.joints_mm
+    path = folder / f"wire_simulated_{name}.mrk.json"
+    export.write_markups_curve(path, joints, f"simulated {name}", colour=SIMULATED_COLOUR)
+    arrays: dict[str, Any] = {"contact_force_N": frame.simulated.contact_force_N}
+    if frame.comparison is not None:
+        errors = frame.comparison
+        points = errors.sample_mm
+        arrays = {"error_mm": errors.error_mm, "arc_mm": errors.arc_mm}
+        arrays["contact_force_N"] = contact_at(frame, errors.arc_mm)
+    export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)
