@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.robust import spread
+from pipeline.arrays.grids import spread
 from solver.grid import Grid
 
 BOX_MM = 6.0

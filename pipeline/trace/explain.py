@@ -10,16 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import smooth_voxels
-from pipeline.arrays.robust import spread
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
-from pipeline.trace.level import levelled
 from pipeline.trace.noise import inflation
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import Tube, point_sigmas
 from pipeline.trace.verdict import LEAST_SEEN, SURE_CNR, Verdict, judge, note_of
 
@@ -159,7 +158,7 @@ def _no_wire(image: Subtraction) -> Curve:
 def _curve(image: Subtraction, best: Candidate) -> Curve:
     """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
     attempt, verdict, tube = best.attempt, best.verdict, best.attempt.tube
-    across, along = inflation(image, best.points, tube).at(image.depth_at(best.points))
+    across, along = inflation(image, best.points, tube)
     sigma = across * best.sigma
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.trace._kernels.skyline import factorise, inverse, substitute
+from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import (
     Blob,
     Claim,
@@ -262,7 +262,8 @@ def fit_tube(data: TubeData, tube: Tube, iterations: int = 12, tolerance: float 
             break
     found, claim, _ = _equations(data, tube, samples, prior, slot)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
-    covariance = inverse(*_factors(_damped(found.normal, tube, POLISHED))) * data.noise**2
+    factors = _factors(_damped(found.normal, tube, POLISHED))
+    covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * data.noise**2
     return replace(
         tube,
         covariance=covariance,
