@@ -35,7 +35,7 @@ def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
     return contiguous(reorder(grid, axes)), axes
 
 
-def integer_offset(grid: Grid, inner: Grid) -> Array | None:
+def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
     """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
 
     A lattice is the same when spacing and axes agree to a ten-thousandth and the shift is whole to 0.02 voxel.
@@ -44,7 +44,8 @@ def integer_offset(grid: Grid, inner: Grid) -> Array | None:
         grid.direction, inner.direction, atol=1e-4
     )
     shift = grid.to_index(inner.origin_mm)
-    return np.rint(shift) if same and np.all(np.abs(shift - np.rint(shift)) <= 0.02) else None
+    whole = same and np.all(np.abs(shift - np.rint(shift)) <= 0.02)
+    return np.rint(shift).astype(np.int64) if whole else None
 
 
 def corners_mm(grid: Grid) -> Array:

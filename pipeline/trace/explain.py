@@ -99,7 +99,8 @@ def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, conf
         return True
     best, attempt = found[0], found[0].attempt
     weak = attempt.cnr(image) < SURE_CNR or best.verdict.status is not FrameStatus.OK
-    doubts = best.verdict.doubts > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
+    unclear = best.verdict.faint_mm + best.verdict.double_mm
+    doubts = unclear > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
     return weak or doubts or missed_mm(best.length_mm, entry, config) > 0
 
 

@@ -59,9 +59,8 @@ def voxels_of(runs: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
     """The distance on the frame's lattice and the corner of its box; interpolated only where lattices differ."""
-    offset = integer_offset(frame, distance)
-    if offset is not None:
-        corner = offset.astype(np.int64)
+    corner = integer_offset(frame, distance)
+    if corner is not None:
         low = np.maximum(corner, 0)
         high = np.minimum(corner + distance.shape, frame.shape)
         if np.any(high <= low):
@@ -127,11 +126,13 @@ def _wall_model(scan: Grid, corner: NDArray[np.int64], region: Region, lumen: Lu
 def _on_box(reference: Volume, region: Region, axes: tuple[int, int, int]) -> tuple[Grid, NDArray[np.int64]]:
     """The reference, and where in it the region's box starts; interpolated onto the box if lattices differ."""
     grid = reorder(reference, axes)
-    offset = integer_offset(grid, region.box)
-    if offset is not None:
-        corner = offset.astype(np.int64)
-        if np.all(corner >= 0) and np.all(corner + region.box.shape <= np.array(grid.shape)):
-            return contiguous(grid), corner
+    corner = integer_offset(grid, region.box)
+    if (
+        corner is not None
+        and np.all(corner >= 0)
+        and np.all(corner + region.box.shape <= np.array(grid.shape))
+    ):
+        return contiguous(grid), corner
     return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
 
 

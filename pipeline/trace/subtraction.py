@@ -115,9 +115,9 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     region = region_of(grid, lumen, axes)
     background = background_of(grid, reference, region, lumen, axes)
     grey = sparse_zeros(region.box.shape, np.float32)
-    read = float(subtract(grid.values, background, region.corner, region.runs, grey))
+    subtract(grid.values, background, region.corner, region.runs, grey)
     noise = spread(grey.reshape(-1)[region.within])
-    total = float(np.prod(grid.shape))
+    total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     return Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, counters, {"noise": noise})

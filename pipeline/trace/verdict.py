@@ -57,11 +57,6 @@ class Verdict:
     faint_mm: float
     double_mm: float
 
-    @property
-    def doubts(self) -> float:
-        """How much speaks against the curve, mm of it."""
-        return self.faint_mm + self.double_mm
-
 
 def note_of(got: str, allowed: str, do: str) -> str:
     """What the report says of a curve that does not stand."""
@@ -144,15 +139,6 @@ def judge(
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def tangents(points_mm: Array, over_mm: float) -> Array:
-    """Unit tangents (n, 3) of a curve (n, 3), each from the chord over ``over_mm`` of it."""
-    arc = arc_length(points_mm)
-    ends = (np.clip(arc + sign * 0.5 * over_mm, 0.0, arc[-1]) for sign in (-1, 1))
-    back, ahead = (np.stack([np.interp(s, arc, points_mm[:, a]) for a in range(3)], axis=1) for s in ends)
-    chord = ahead - back
-    return np.asarray(chord / (np.linalg.norm(chord, axis=1)[:, None] + 1e-12))
-
-
 def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> NDArray[np.bool_]:
     """Points (n,) of a curve (n, 3) whose tangent is within ``limit_deg`` of the plane across ``axis`` (LPS).
 
@@ -163,5 +149,9 @@ def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> 
     if len(points_mm) < 2:
         return np.zeros(len(points_mm), bool)
     normal = np.asarray(axis, float) / np.linalg.norm(np.asarray(axis, float))
-    climb = np.abs(tangents(points_mm, TANGENT_MM) @ normal)
+    arc = arc_length(points_mm)
+    ends = (np.clip(arc + sign * 0.5 * TANGENT_MM, 0.0, arc[-1]) for sign in (-1, 1))
+    back, ahead = (np.stack([np.interp(s, arc, points_mm[:, a]) for a in range(3)], axis=1) for s in ends)
+    chord = ahead - back
+    climb = np.abs(chord / (np.linalg.norm(chord, axis=1)[:, None] + 1e-12) @ normal)
     return np.asarray(climb < np.sin(np.radians(limit_deg)))
