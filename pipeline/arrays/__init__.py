@@ -1,1 +1,1 @@
-"""What several stages share: arrays in memory order, sparse boxes, derivatives of sampled grey, splines, polylines."""
+"""What several stages share: grids, kernels on a lattice, derivatives of sampled grey, crests, polylines."""

@@ -12,9 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.motion import Motion
 from pipeline.model import Array, Lumen, Volume
-from pipeline.register.rigid import edge_mask, rigid
+from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import StaticPoints, fit_motion, static_points
 from solver.grid import Grid
 

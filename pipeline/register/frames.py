@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from pipeline.arrays.motion import Motion
-from pipeline.arrays.placement import sampled
+from pipeline.arrays.grids import sampled
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
+from pipeline.register.rigid import Motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.axis_order import in_memory_order
+from pipeline.arrays.grids import MAD, in_memory_order
 from pipeline.arrays.jets import Blurred, jets_at, values_at
-from pipeline.arrays.motion import Motion
-from pipeline.arrays.robust import MAD
 from pipeline.model import Array, Volume
+from pipeline.register.rigid import Motion
 
 BLUR_VOXELS = 1.0
 """Gaussian in which grey is read: wide enough to see a wall 2 voxels away, and it takes noise to 0.15."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.axis_order import in_memory_order, reorder
+from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning

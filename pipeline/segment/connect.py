@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL, READ, Affinity, Search, flood, strengths
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, SIDE
 from pipeline.segment.region import GreyLevels, Index

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.contact import (
     Cores,
     Inner,

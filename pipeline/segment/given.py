@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.axis_order import in_memory_order, reorder
+from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Branches, Lumen, Shapes, Volume
 from pipeline.segment._kernels.distance import Owned, propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles

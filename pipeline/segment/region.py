@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.robust import spread
+from pipeline.arrays.grids import spread
 from pipeline.model import Counters
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import (

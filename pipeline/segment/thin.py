@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.jets import Blurred, smooth_voxels
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.contact import Inner, along_cores

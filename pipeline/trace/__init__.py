@@ -12,8 +12,8 @@ from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.explain import explained, missed_mm
-from pipeline.trace.in_plane import near_rotation_plane
 from pipeline.trace.subtraction import subtracted
+from pipeline.trace.verdict import near_rotation_plane
 
 __all__ = ["trace"]
 

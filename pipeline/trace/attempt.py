@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
-from pipeline.trace.link import Path, link, with_doubles
+from pipeline.trace.link import Path, cut_at_tip, link, resampled, with_doubles
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
-from pipeline.trace.tip import cut_at_tip, resampled
 from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, spline_through, tint_nodes
 
 ENTRY_REACH_MM = 4.0

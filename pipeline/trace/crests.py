@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import Blurred, smooth_voxels
-from pipeline.arrays.robust import spread
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.runs import above
 from pipeline.trace._kernels.tracklets import Ground, Rules, tracklets

@@ -10,16 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import smooth_voxels
-from pipeline.arrays.robust import spread
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
-from pipeline.trace.level import levelled
 from pipeline.trace.noise import inflation
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import Tube, point_sigmas
 from pipeline.trace.verdict import LEAST_SEEN, SURE_CNR, Verdict, judge, note_of
 
@@ -100,7 +99,8 @@ def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, conf
         return True
     best, attempt = found[0], found[0].attempt
     weak = attempt.cnr(image) < SURE_CNR or best.verdict.status is not FrameStatus.OK
-    doubts = best.verdict.doubts > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
+    unclear = best.verdict.faint_mm + best.verdict.double_mm
+    doubts = unclear > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
     return weak or doubts or missed_mm(best.length_mm, entry, config) > 0
 
 
@@ -159,7 +159,7 @@ def _no_wire(image: Subtraction) -> Curve:
 def _curve(image: Subtraction, best: Candidate) -> Curve:
     """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
     attempt, verdict, tube = best.attempt, best.verdict, best.attempt.tube
-    across, along = inflation(image, best.points, tube).at(image.depth_at(best.points))
+    across, along = inflation(image, best.points, tube)
     sigma = across * best.sigma
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {

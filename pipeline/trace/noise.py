@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -27,25 +24,6 @@ LEAST = 50
 """Places below which nothing is measured."""
 HALF = 4
 """Half width of the templates in voxels."""
-
-
-@dataclass(frozen=True)
-class Inflation:
-    """Factors on standard deviations of a fit that took the noise for white: across the wire, and at its tip.
-
-    depth : (g,) signed distances to the wall (mm, ascending) at which ``across`` and ``along`` (g,) were measured.
-    """
-
-    depth: Array
-    across: Array
-    along: Array
-
-    def at(self, depth: NDArray[Any]) -> tuple[Array, Array]:
-        """Both factors (n,) at signed distances to the wall (n,)."""
-        return np.interp(depth, self.depth, self.across), np.interp(depth, self.depth, self.along)
-
-
-NO_INFLATION = Inflation(np.zeros(1), np.ones(1), np.ones(1))
 
 
 def _templates(sigma: float) -> tuple[list[Array], list[Array]]:
@@ -108,26 +86,26 @@ def _patches(image: Subtraction, tube: Tube, index: NDArray[np.int64]) -> tuple[
     return patches, np.asarray(np.mean(patches != 0, axis=(1, 2, 3)))
 
 
-def inflation(image: Subtraction, curve: Array, tube: Tube) -> Inflation:
-    """Measured at places of the lumen beside the wire; 1 where there is no room to measure.
+def inflation(image: Subtraction, curve: Array, tube: Tube) -> tuple[Array, Array]:
+    """Factors (n,) on standard deviations of a fit that took the noise for white: across the wire, and at its tip.
 
-    curve : (n, 3) kernel coordinates of the ``tube`` that was fitted. White noise gives 1 by construction.
+    curve : (n, 3) kernel coordinates of the ``tube`` that was fitted. Measured at places of the lumen beside the wire,
+    at several depths in it; 1 where there is no room to measure. White noise gives 1 by construction.
     """
-    h = image.voxel
+    h, white = image.voxel, (np.ones(len(curve)), np.ones(len(curve)))
     index = _places(image, curve)
     if image.spacing.max() > 1.5 * h or len(index) < LEAST:
-        return NO_INFLATION
+        return white
     patches, read = _patches(image, tube, index)
     known = read > 0.8
     if known.sum() < LEAST:
-        return NO_INFLATION
+        return white
     # voxels outside the halo were not read and are 0: the response is put on the scale of those that were
     scale = image.noise**2 * read[known, None]
-    across, along = (_responses(patches[known], t) / scale for t in _templates(tube.sigma / h))
+    squares = [_responses(patches[known], t) / scale for t in _templates(tube.sigma / h)]
     depth = image.region.box.values[tuple(index[known].T)]
     groups = np.array_split(np.argsort(depth), max(1, min(DEPTHS, len(depth) // LEAST)))
-    return Inflation(
-        np.array([np.mean(depth[g]) for g in groups]),
-        np.array([max(0.8, _spread(across[g])) for g in groups]),
-        np.array([max(0.8, _spread(along[g])) for g in groups]),
-    )
+    middle = [np.mean(depth[g]) for g in groups]
+    factors = ([max(0.8, _spread(square[g])) for g in groups] for square in squares)
+    across, along = (np.interp(image.depth_at(curve), middle, f) for f in factors)
+    return across, along

@@ -1,30 +1,43 @@
-"""What a wire stands out from: the frame minus its background, on the lumen's box, at the lumen's voxels alone."""
+"""What a wire stands out from: the frame minus its background, on the lumen's box, at the lumen's voxels alone.
+
+Where no reference scan shows the background, the grey under the wire is taken from beside it (:func:`levelled`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+from scipy.special import ndtr
 
-from pipeline.arrays.axis_order import in_memory_order
+from pipeline.arrays.grids import in_memory_order, spread
 from pipeline.arrays.jets import Blurred, values_at
-from pipeline.arrays.robust import spread
-from pipeline.arrays.sparse import sparse_zeros
-from pipeline.model import Lumen, Volume
+from pipeline.arrays.lattice import sparse_zeros
+from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
-from pipeline.trace.background import from_reference, from_wall, wall_blur
-from pipeline.trace.region import Region, region_of
-from solver.grid import Array
+from pipeline.trace._kernels.tube import active_voxels
+from pipeline.trace.region import HALO_VOXELS, Region, background_of, region_of, voxels_of, wall_blur
 
 BLUR_VOXELS = 0.8
 """The scanner's blur over the smallest voxel, from which the shape of the blur in thick slices is taken."""
 CREST_VOXELS = 0.7
 """Blur in which grey is read along a curve."""
+CLEAR_BLURS = 3.5
+"""Distance from the wire's axis, in its blurs, from which grey is taken for the lumen's: 0.2 % of the peak is left."""
+DEEP_VOXELS = 1.0
+"""Depth in the lumen from which a voxel shows the lumen's own grey: nearer the wall its blur mixes in."""
+BLOCK = 4
+"""Edge (voxels) of the blocks in which grey is averaged first."""
+SMOOTH_BLOCKS = 1.25
+"""Gaussian over block means: 5 voxels, wide enough to reach across the wire, short against changes of contrast."""
+LEAST_SHARE = 0.02
+"""Share of the voxels of a full block below which the smoothed blocks say nothing and the level is left alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +113,49 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
-    if reference is None:
-        background: NDArray[Any] = from_wall(grid, region, lumen)
-    else:
-        background = from_reference(reference, region, lumen, axes)
+    background = background_of(grid, reference, region, lumen, axes)
     grey = sparse_zeros(region.box.shape, np.float32)
-    read = float(subtract(grid.values, background, region.corner, region.runs, grey))
+    subtract(grid.values, background, region.corner, region.runs, grey)
     noise = spread(grey.reshape(-1)[region.within])
-    total = float(np.prod(grid.shape))
+    total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     return Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, counters, {"noise": noise})
+
+
+def _smooth(sums: Array, counts: Array) -> Array:
+    """Mean of the blocks around each block, 0 where they hold next to nothing."""
+    top, below = (ndimage.gaussian_filter(a, SMOOTH_BLOCKS, mode="constant") for a in (sums, counts))
+    return np.asarray(np.where(below > LEAST_SHARE * BLOCK**3, top / np.maximum(below, 1e-9), 0.0))
+
+
+def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
+    """The image with the lumen's own unevenness taken away: contrast that fades, mixes or settles along the vessel.
+
+    curve : (n, 3) kernel coordinates of the wire, ``sigma`` its blur (mm). The grey of the lumen's inner voxels that
+    the wire does not reach is averaged over about 5 voxels, carried under the wire, and out through the wall by the
+    wall's own blurred step.
+    """
+    voxel = float(np.min(image.region.box.spacing_mm))
+    index = voxels_of(image.region.runs).T
+    at = tuple(index)
+    distance, grey = image.region.box.values[at], image.grey[at].astype(float)
+    # a blur is wider than half the halo only where the wall was not found; its step is not carried further than that
+    share = ndtr(-distance / min(image.wall_blur_mm, 0.5 * HALO_VOXELS * voxel))
+    wire = sparse_zeros(image.grey.shape, np.int32)
+    active_voxels(wire, image.spacing, np.ascontiguousarray(curve), CLEAR_BLURS * sigma)
+    clear = (wire[at] == 0) & (distance < -DEEP_VOXELS * voxel)
+    shape = tuple(-(-n // BLOCK) for n in image.grey.shape)
+    block = np.ravel_multi_index(tuple(index[:, clear] // BLOCK), shape)
+    counts = np.bincount(block, minlength=int(np.prod(shape))).reshape(shape).astype(float)
+    sums = np.bincount(block, grey[clear], minlength=int(np.prod(shape))).reshape(shape)
+    # voxel n lies at (n + 1/2) / BLOCK - 1/2 in blocks
+    level = ndimage.map_coordinates(
+        _smooth(sums, counts), (index + 0.5) / BLOCK - 0.5, order=1, mode="nearest"
+    )
+    # zeros, not a copy: memory is touched at the lumen alone
+    out = sparse_zeros(image.grey.shape, np.float32)
+    rest = grey - share * level
+    out[at] = rest
+    noise = spread(rest[clear]) if np.count_nonzero(clear) > 100 else image.noise
+    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise})

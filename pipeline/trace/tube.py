@@ -8,19 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.sparse import sparse_zeros
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
-from pipeline.trace._kernels.skyline import factorise, inverse, substitute
-from pipeline.trace._kernels.tube import (
-    Blob,
-    Claim,
-    Equations,
-    Line,
-    Samples,
-    active_voxels,
-    normal_equations,
-    render,
-)
+from pipeline.trace._kernels import tube as kernels
+from pipeline.trace._kernels.skyline import factorise, substitute
+from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
@@ -70,7 +62,8 @@ class Tube:
 
     def at(self, u: Array) -> Array:
         """Points (n, 3) of the curve at parameters from 0 to ``intervals``."""
-        return evaluate(self.controls, u)[0]
+        first, value, _ = weights_at(u, self.intervals)
+        return _combined(self.controls, first, value)
 
     def blob(self, voxel: float) -> Blob:
         """What one of its points looks like."""
@@ -108,12 +101,6 @@ def weights_at(u: Array, intervals: int) -> tuple[NDArray[np.int64], Array, Arra
 def _combined(controls: Array, first: NDArray[np.int64], weights: Array) -> Array:
     """Sums (n, 3) of four control points each."""
     return np.asarray(np.einsum("nk,nkd->nd", weights, controls[first[:, None] + np.arange(4)]))
-
-
-def evaluate(controls: Array, u: Array) -> tuple[Array, Array]:
-    """Points (n, 3) and derivatives (n, 3) of the spline at parameters u."""
-    first, value, slope = weights_at(u, len(controls) - 3)
-    return _combined(controls, first, value), _combined(controls, first, slope)
 
 
 def tint_nodes(intervals: int) -> int:
@@ -173,7 +160,7 @@ def _prior(tube: Tube, data: TubeData) -> Array:
 
 def _claim(data: TubeData, curve: Array, radius: float, slot: NDArray[np.int32]) -> Claim:
     """The voxels near the curve; those before the start plane have no weight."""
-    voxels = active_voxels(slot, data.spacing, curve, radius)
+    voxels = kernels.active_voxels(slot, data.spacing, curve, radius)
     if data.start_plane is None:
         return Claim(voxels, slot, np.ones(len(voxels)))
     point, direction = data.start_plane
@@ -187,7 +174,7 @@ def _equations(
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(data.voxel), len(tube.controls)
     claim = _claim(data, line.curve, blob.radius, slot)
-    e = normal_equations(data.grey, data.spacing, claim, line, blob, k, len(tube.tint))
+    e = kernels.normal_equations(data.grey, data.spacing, claim, line, blob, k, len(tube.tint))
     slot.reshape(-1)[claim.voxels] = 0
     e.right[: 3 * k] -= prior @ tube.controls.ravel()
     e.normal[: 3 * k, : 3 * k] += prior
@@ -262,7 +249,8 @@ def fit_tube(data: TubeData, tube: Tube, iterations: int = 12, tolerance: float 
             break
     found, claim, _ = _equations(data, tube, samples, prior, slot)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
-    covariance = inverse(*_factors(_damped(found.normal, tube, POLISHED))) * data.noise**2
+    factors = _factors(_damped(found.normal, tube, POLISHED))
+    covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * data.noise**2
     return replace(
         tube,
         covariance=covariance,
@@ -277,8 +265,8 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
     """Standard deviation across the wire per axis at parameters u (n,), and along the wire at its end, mm."""
     if tube.covariance is None:
         return np.full(len(u), np.nan), float("nan")
-    i, value, _ = weights_at(u, tube.intervals)
-    _, velocity = evaluate(tube.controls, u)
+    i, value, slope = weights_at(u, tube.intervals)
+    velocity = _combined(tube.controls, i, slope)
     t = velocity / np.linalg.norm(velocity, axis=1)[:, None]
     column = 3 * i[:, None] + np.arange(12)
     blocks = tube.covariance[column[:, :, None], column[:, None, :]].reshape(-1, 4, 3, 4, 3)
@@ -292,5 +280,5 @@ def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     """Voxels (flat) that the tube lights up and the grey it gives them."""
     line, blob = sampled(tube, sampling(tube, data.voxel)), tube.blob(data.voxel)
     slot = sparse_zeros(data.grey.shape, np.int32)
-    voxels = active_voxels(slot, data.spacing, line.curve, blob.radius)
-    return voxels, render(slot, data.spacing, len(voxels), line, blob)
+    voxels = kernels.active_voxels(slot, data.spacing, line.curve, blob.radius)
+    return voxels, kernels.render(slot, data.spacing, len(voxels), line, blob)

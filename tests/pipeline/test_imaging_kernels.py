@@ -12,7 +12,6 @@ from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.surface import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
 from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampled, sampling, tint_nodes
-from pipeline.trace.tube import evaluate as spline_points
 
 
 def test_spline_derivatives_are_those_of_its_value():
@@ -86,8 +85,7 @@ def test_tube_fit_finds_a_noise_free_tube_again():
     start = Tube(controls + 0.2 * np.sin(np.arange(27)).reshape(9, 3), truth.tint * 0.8, 0.3, 0.0)
     fit = fit_tube(TubeData(grey, spacing, 1.0), start, iterations=30, tolerance=1e-4)
     u = np.linspace(0, 6, 60)
-    dense = spline_points(truth.controls, np.linspace(0, 6, 6000))[0]
-    found = spline_points(fit.controls, u)[0]
+    dense, found = truth.at(np.linspace(0, 6, 6000)), fit.at(u)
     off = np.min(np.linalg.norm(found[:, None] - dense[None], axis=2), axis=1)
     assert off[3:-3].max() < 0.01 * 0.3
     assert off.max() < 0.05 * 0.3

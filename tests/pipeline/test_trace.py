@@ -16,9 +16,8 @@ from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import trace
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.in_plane import near_rotation_plane
-from pipeline.trace.level import levelled
-from pipeline.trace.subtraction import subtracted
+from pipeline.trace.subtraction import levelled, subtracted
+from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
 from tests.bench.imaging.topology import earlier, plain
 from tests.pipeline import phantoms, tangles

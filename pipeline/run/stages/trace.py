@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.placement import corners_mm
+from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume

@@ -3,7 +3,7 @@
 Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246. Grey values are smoothed and quantised in tiles of
 8^3 voxels as the search comes to them. A cell is a voxel's place in memory, tile after tile: tile * CELLS + place in
 the tile. There is a cell for every voxel, and a layer of tiles around the volume; but cells take memory only where
-they are written to (:mod:`pipeline.arrays.sparse`), so cost and memory follow the object, not the volume.
+they are written to (:mod:`pipeline.arrays.lattice`), so cost and memory follow the object, not the volume.
 """
 
 from __future__ import annotations

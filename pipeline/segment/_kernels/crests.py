@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.jets import Blurred
+from pipeline.arrays.jets import Blurred, new_probe, ridge_step, to_ridge
 from pipeline.arrays.lattice import entry_point, unravelled
-from pipeline.arrays.ridges import new_probe, ridge_step, to_ridge
 
 ROUNDS = 6
 STILL = 0.1

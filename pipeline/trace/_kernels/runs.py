@@ -91,15 +91,12 @@ def denoised(
 @entry_point
 def subtract(
     frame: NDArray[Any], background: NDArray[Any], corner: NDArray[Any], runs: NDArray[Any], out: NDArray[Any]
-) -> int:
-    """frame - background on ``runs`` of the box ``out``; ``background`` is on the box. Returns the voxels read."""
-    read = 0
+) -> None:
+    """frame - background on ``runs`` of the box ``out``; ``background`` is on the box."""
     for i, j, first, stop in runs:
         a, b, c = i + corner[0], j + corner[1], corner[2]
         for k in range(first, stop):
             out[i, j, k] = frame[a, b, k + c] - background[i, j, k]
-        read += stop - first
-    return read
 
 
 @entry_point

@@ -54,16 +54,3 @@ def substitute(lower: NDArray[Any], first: NDArray[Any], right: NDArray[Any]) ->
         for k in range(first[i], i):
             x[k] -= lower[i, k] * x[i]
     return x
-
-
-@entry_point
-def inverse(lower: NDArray[Any], first: NDArray[Any]) -> NDArray[Any]:
-    """The inverse of L L^T, column by column."""
-    n = lower.shape[0]
-    out = np.empty((n, n))
-    unit = np.zeros(n)
-    for m in range(n):
-        unit[m] = 1.0
-        out[m] = substitute(lower, first, unit)
-        unit[m] = 0.0
-    return out

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.jets import Blurred
+from pipeline.arrays.jets import Blurred, Probe, new_probe, to_ridge
 from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
-from pipeline.arrays.ridges import Probe, new_probe, to_ridge
 
 LAG = 12
 """Steps over which the run of a walk is compared with the local tangent: a swing from one strand to another that it

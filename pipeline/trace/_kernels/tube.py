@@ -64,7 +64,7 @@ class Claim(NamedTuple):
 
 class _Rows(NamedTuple):
     """The model (n,) of n voxels and its derivatives: by sigma (n,), and by those controls and nodes (``ids``) that a
-    voxel sees, of which it has ``used`` so many.
+    voxel sees, of which it has ``used`` so many. What finds a row full goes into its last place, which nobody reads.
     """
 
     model: NDArray[Any]
@@ -143,16 +143,12 @@ def render(slot: NDArray[Any], spacing: NDArray[Any], count: int, line: Line, bl
 
 
 @kernel
-def _place(ids: NDArray[Any], used: NDArray[Any], s: int, wanted: int) -> int:
-    """Where a voxel's row keeps the column ``wanted``, which is taken up if it is new there; -1 if the row is full."""
-    for m in range(used[s]):
-        if ids[s, m] == wanted:
+def _find(row: NDArray[Any], count: int, wanted: int) -> int:
+    """The place of ``wanted`` among the first ``count`` of a row; -1 if it is not there."""
+    for m in range(count):
+        if row[m] == wanted:
             return m
-    if used[s] >= ids.shape[1]:
-        return -1
-    ids[s, used[s]] = wanted
-    used[s] += 1
-    return int(used[s] - 1)
+    return -1
 
 
 @kernel
@@ -167,91 +163,66 @@ def _add_tints(
 ) -> None:
     """Add to a voxel's derivatives by the two amplitude nodes that a sample lies between."""
     for q in range(2):
-        at = _place(ids, used, s, first + q)
-        if at >= 0:
-            by_tint[s, at] += shade * (share if q else 1.0 - share)
+        at = _find(ids[s], used[s], first + q)
+        if at < 0:
+            at = used[s]
+            ids[s, at] = first + q
+            used[s] = min(at + 1, TINTS)
+        by_tint[s, at] += shade * (share if q else 1.0 - share)
 
 
 @kernel
-def _add_control(
-    ids: NDArray[Any], used: NDArray[Any], by_control: NDArray[Any], s: int, at: int, wanted: int, gain: Three
-) -> int:
-    """Add ``gain`` to a voxel's derivative by the control ``wanted``; returns its column, mostly that after ``at``."""
-    at += 1
-    if at >= used[s] or ids[s, at] != wanted:
-        at = _place(ids, used, s, wanted)
-    if at >= 0:
-        by_control[s, at, 0] += gain[0]
-        by_control[s, at, 1] += gain[1]
-        by_control[s, at, 2] += gain[2]
-    return at
-
-
-@kernel
-def _add(rows: _Rows, line: Line, m: int, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob) -> None:
-    """Add what sample m of the wire gives the voxels around it."""
+def _add_line(rows: _Rows, line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob) -> None:
+    """Add what every sample m of the wire gives the voxels s around it."""
     model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
     curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share) = line
     (sigma, radius, _), (hx, hy, hz) = blob, (spacing[0], spacing[1], spacing[2])
     norm, inverse = 1.0 / (np.sqrt(2.0 * np.pi) * sigma), 1.0 / (sigma * sigma)
-    x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
-    vx, vy, vz = velocity[m, 0], velocity[m, 1], velocity[m, 2]
-    (i0, i1), (j0, j1), (k0, k1) = _around(x, y, z, radius, spacing, slot.shape)
-    gz = np.empty(k1 - k0)
-    for k in range(k0, k1):
-        gz[k - k0] = np.exp(-0.5 * inverse * (k * hz - z) ** 2)
-    for i in range(i0, i1):
-        dx = i * hx - x
-        gx = norm * measure[m] * np.exp(-0.5 * inverse * dx * dx)
-        for j in range(j0, j1):
-            dy = j * hy - y
-            if dx * dx + dy * dy > radius * radius:
-                continue
-            gxy = gx * np.exp(-0.5 * inverse * dy * dy)
-            for k in range(k0, k1):
-                dz, s = k * hz - z, slot[i, j, k] - 1
-                square = dx * dx + dy * dy + dz * dz
-                if s < 0 or square > radius * radius:
-                    continue
-                g, at = gxy * gz[k - k0], -1
-                shade, pull = g * speed[m], amplitude[m] * g / speed[m]
-                push = amplitude[m] * shade * inverse
-                model[s] += amplitude[m] * shade
-                for q in range(4):
-                    b, d = push * value[m, q], pull * slope[m, q]
-                    gain = b * dx + d * vx, b * dy + d * vy, b * dz + d * vz
-                    at = _add_control(ids, used, by_control, s, at, first[m] + q, gain)
-                _add_tints(tint_ids, tint_used, by_tint, s, tint_first[m], tint_share[m], shade)
-                by_sigma[s] += amplitude[m] * shade * (square * inverse - 1.0) / sigma
+    for m in range(curve.shape[0]):
+        x, y, z = curve[m, 0], curve[m, 1], curve[m, 2]
+        vx, vy, vz, base = velocity[m, 0], velocity[m, 1], velocity[m, 2], first[m]
+        (i0, i1), (j0, j1), (k0, k1) = _around(x, y, z, radius, spacing, slot.shape)
+        gz = np.exp(-0.5 * inverse * (np.arange(k0, k1) * hz - z) ** 2)
+        for i in range(i0, i1):
+            dx = i * hx - x
+            gx = norm * measure[m] * np.exp(-0.5 * inverse * dx * dx)
+            for j in range(j0, j1):
+                dy = j * hy - y
+                gxy = gx * np.exp(-0.5 * inverse * dy * dy)
+                for k in range(k0, k1):
+                    dz, s = k * hz - z, slot[i, j, k] - 1
+                    square = dx * dx + dy * dy + dz * dz
+                    if s < 0 or square > radius * radius:
+                        continue
+                    g = gxy * gz[k - k0]
+                    shade, pull = g * speed[m], amplitude[m] * g / speed[m]
+                    push = amplitude[m] * shade * inverse
+                    model[s] += amplitude[m] * shade
+                    by_sigma[s] += amplitude[m] * shade * (square * inverse - 1.0) / sigma
+                    at = _find(ids[s], used[s] - 3, base)
+                    together = at >= 0 and ids[s, at + 3] == base + 3
+                    for q in range(4):
+                        place = at + q if together else _find(ids[s], used[s], base + q)
+                        if place < 0:
+                            place = used[s]
+                            ids[s, place], used[s] = base + q, min(place + 1, BLOCKS)
+                        b, d = push * value[m, q], pull * slope[m, q]
+                        by_control[s, place, 0] += b * dx + d * vx
+                        by_control[s, place, 1] += b * dy + d * vy
+                        by_control[s, place, 2] += b * dz + d * vz
+                    _add_tints(tint_ids, tint_used, by_tint, s, tint_first[m], tint_share[m], shade)
 
 
 @kernel
 def _rows(line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob, total: int) -> _Rows:
     """The model and its derivatives at the ``total`` voxels numbered in ``slot``."""
     rows = _Rows(
-        np.full(total, blob.offset), np.zeros(total), np.empty((total, BLOCKS), np.int32), np.zeros(total, np.int32),
-        np.zeros((total, BLOCKS, 3)), np.empty((total, TINTS), np.int32), np.zeros(total, np.int32),
-        np.zeros((total, TINTS)),
+        np.full(total, blob.offset), np.zeros(total), np.empty((total, BLOCKS + 1), np.int32),
+        np.zeros(total, np.int32), np.zeros((total, BLOCKS + 1, 3)), np.empty((total, TINTS + 1), np.int32),
+        np.zeros(total, np.int32), np.zeros((total, TINTS + 1)),
     )  # fmt: skip
-    for m in range(line.curve.shape[0]):
-        _add(rows, line, m, slot, spacing, blob)
+    _add_line(rows, line, slot, spacing, blob)
     return rows
-
-
-@kernel
-def _row(rows: _Rows, s: int, controls: int, tints: int, column: NDArray[Any], row: NDArray[Any]) -> int:
-    """The derivatives of one voxel that are not 0, and their columns; returns how many there are."""
-    n = 0
-    for m in range(rows.used[s]):
-        for q in range(3):
-            column[n], row[n] = 3 * rows.ids[s, m] + q, rows.by_control[s, m, q]
-            n += 1
-    for m in range(rows.tint_used[s]):
-        column[n], row[n] = 3 * controls + rows.tint_ids[s, m], rows.by_tint[s, m]
-        n += 1
-    column[n], row[n] = 3 * controls + tints, rows.by_sigma[s]
-    column[n + 1], row[n + 1] = 3 * controls + tints + 1, 1.0
-    return n + 2
 
 
 @entry_point
@@ -264,20 +235,31 @@ def normal_equations(
     """
     voxels, slot, weight = claim
     rows = _rows(line, slot, spacing, blob, voxels.shape[0])
+    model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
     size = 3 * controls + tints + 2
     normal, right, residual = np.zeros((size, size)), np.zeros(size), np.zeros(voxels.shape[0])
     column, row = np.empty(3 * BLOCKS + TINTS + 2, np.int64), np.empty(3 * BLOCKS + TINTS + 2)
     total = 0.0
     for s in range(voxels.shape[0]):
         i, j, k = unravelled(voxels[s], grey.shape)
-        r = residual[s] = grey[i, j, k] - rows.model[s]
-        if weight[s] == 0.0:
+        w, r = weight[s], grey[i, j, k] - model[s]
+        residual[s] = r
+        if w == 0.0:
             continue
-        n = _row(rows, s, controls, tints, column, row)
-        total += weight[s] * r * r
-        for a in range(n):
-            ja = weight[s] * row[a]
+        n = 0
+        for m in range(used[s]):
+            for q in range(3):
+                column[n], row[n] = 3 * ids[s, m] + q, by_control[s, m, q]
+                n += 1
+        for m in range(tint_used[s]):
+            column[n], row[n] = 3 * controls + tint_ids[s, m], by_tint[s, m]
+            n += 1
+        column[n], row[n] = 3 * controls + tints, by_sigma[s]
+        column[n + 1], row[n + 1] = 3 * controls + tints + 1, 1.0
+        total += w * r * r
+        for a in range(n + 2):
+            ja = w * row[a]
             right[column[a]] += ja * r
-            for b in range(n):
-                normal[column[a], column[b]] += ja * row[b]
-    return Equations(normal, right, residual, total)
+            for b in range(a + 1):  # the lower half: both halves together take twice as long
+                normal[max(column[a], column[b]), min(column[a], column[b])] += ja * row[b]
+    return Equations(normal + np.tril(normal, -1).T, right, residual, total)

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import SimpleITK as sitk
 
-from pipeline.arrays.placement import corners_mm
+from pipeline.arrays.grids import corners_mm
 from pipeline.load import load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.segment import segment

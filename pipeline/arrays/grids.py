@@ -1,0 +1,70 @@
+"""Grids: the order of their memory, where one lies in another, and the noise in their values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from solver.grid import Array, Grid
+
+MAD = 1.4826
+"""Standard deviation of normal noise over its median absolute deviation."""
+
+
+def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
+    """The same grid (same points in mm) with its index axes in another order; a view, never a copy."""
+    order = list(axes)
+    return Grid(grid.values.transpose(axes), grid.spacing_mm[order], grid.origin_mm, grid.direction[:, order])
+
+
+def contiguous(grid: Grid) -> Grid:
+    """The grid itself if its values are C-contiguous, otherwise with a copy (of a crop, say) that is."""
+    return grid if grid.values.flags.c_contiguous else grid.with_values(np.ascontiguousarray(grid.values))
+
+
+def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
+    """The grid with C-contiguous values, its axes reversed if that is how they lie in memory (Fortran), and its axes.
+
+    Both orders are their own inverse, so ``reorder(result, axes)`` gives the first order back.
+    """
+    reverse = grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous
+    axes = (2, 1, 0) if reverse else (0, 1, 2)
+    return contiguous(reorder(grid, axes)), axes
+
+
+def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
+    """Index (3,) in ``grid`` of voxel (0, 0, 0) of ``inner`` if both lie on one lattice, else None.
+
+    A lattice is the same when spacing and axes agree to a ten-thousandth and the shift is whole to 0.02 voxel.
+    """
+    same = np.allclose(grid.spacing_mm, inner.spacing_mm, rtol=1e-4) and np.allclose(
+        grid.direction, inner.direction, atol=1e-4
+    )
+    shift = grid.to_index(inner.origin_mm)
+    whole = same and np.all(np.abs(shift - np.rint(shift)) <= 0.02)
+    return np.rint(shift).astype(np.int64) if whole else None
+
+
+def corners_mm(grid: Grid) -> Array:
+    """The centres of the grid's eight corner voxels (8, 3), LPS mm."""
+    ends = np.stack(np.meshgrid(*[(0, n - 1) for n in grid.shape], indexing="ij"), -1).reshape(-1, 3)
+    return grid.to_mm(ends)
+
+
+def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
+    """``grid`` interpolated (trilinear) at the voxels of ``like``, float32; ``outside`` beyond it."""
+    matrix = (grid.direction.T @ like.direction) * like.spacing_mm / grid.spacing_mm[:, None]
+    values = np.empty(like.shape, np.float32)
+    ndimage.affine_transform(
+        grid.values.astype(np.float32), matrix, grid.to_index(like.origin_mm), like.shape,
+        output=values, order=1, mode="constant", cval=outside,
+    )  # fmt: skip
+    return like.with_values(values)
+
+
+def spread(values: NDArray[Any]) -> float:
+    """Standard deviation (of normal noise) from the median absolute deviation: what stands out of it has no say."""
+    return MAD * float(np.median(np.abs(values - np.median(values))))
