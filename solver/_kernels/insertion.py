@@ -38,20 +38,14 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     Place, report, force and state 0 of the handle are those of the wire reached.
     laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
-    problem, table, k = handle.problem, handle.table, laid
-    if laid > 0:
-        anchor_friction(problem, k)
-        outcome, iterations, energy = relax_current(handle, k, 0.0)
-        arrive(handle, to_depth, to_roll, energy, k)
-    else:
-        outcome, iterations = go(handle, to_depth, to_roll)
-        k, _ = segments_at(handle.place[0].inserted, table.segment)
-    measure(problem, table, k, handle.report[0], handle.force)
+    outcome, iterations = go(handle, to_depth, to_roll, laid)
+    k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
+    measure(handle.problem, handle.table, k, handle.report[0], handle.force)
     return outcome, iterations, k
 
 
 @merged
-def go(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
+def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
     at, introducer, limits = handle.place[0], handle.introducer, handle.limits
     counters = handle.problem.scratch.counters[0]
@@ -62,9 +56,11 @@ def go(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         counters.rolls_proven_idle += 1
-    while abs(to_depth - at.inserted) >= tol.MATCH_DEPTH_MM or at.roll != to_roll:
-        outcome, used = step(handle, to_depth, to_roll)
+    while laid > 0 or abs(to_depth - at.inserted) >= tol.MATCH_DEPTH_MM or at.roll != to_roll:
+        outcome, used = step(handle, to_depth, to_roll, laid)
         iterations += used
+        if laid > 0:
+            break
         if iterations > limit or counters.passed >= limits.work:
             outcome = MAX_ITERATIONS
             break
@@ -80,24 +76,41 @@ def go(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
 
 
 @merged
-def step(handle: Any, to_depth: float, to_roll: float) -> tuple[int, int]:
-    """Take one step towards a depth and roll, or take it back where it fails; return outcome and iterations."""
-    problem, introducer, at = handle.problem, handle.introducer, handle.place[0]
-    ahead, turn = to_depth - at.inserted, to_roll - at.roll
-    share = evenly(at.shrink * allowed(problem, handle.table, introducer, at.inserted, ahead, turn))
-    depth, roll = at.inserted + share * ahead, at.roll + share * turn
-    k = set_out(handle, depth, roll)
+def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
+    """Take one step towards a depth and roll, or take it back where it fails; return outcome and iterations.
+
+    A wire that is laid out already is relaxed as it lies, and stays where that leads it.
+    """
+    problem, at = handle.problem, handle.place[0]
+    depth, roll, k = to_depth, to_roll, laid
+    if laid > 0:
+        anchor_friction(problem, k)
+    else:
+        depth, roll = next_place(handle, to_depth, to_roll)
+        k = set_out(handle, depth, roll)
     outcome, used, energy = CONVERGED, 0, 0.0
     if k > 0:
         outcome, used, energy = relax_current(handle, k, likeness(problem, at, depth, roll))
-    walled = outcome == CONVERGED and problem.stiffness > 0.0
-    if walled and furthest_outside(problem.field, problem.state.x[CURRENT], k) > introducer.margin:
+    walled = laid == 0 and outcome == CONVERGED and problem.stiffness > 0.0
+    if walled and furthest_outside(problem.field, problem.state.x[CURRENT], k) > handle.introducer.margin:
         outcome = LEFT_GRID
-    if outcome == CONVERGED:
-        arrive(handle, depth, roll, energy, k)
+    if laid > 0 or outcome == CONVERGED:
+        note_change(problem, CURRENT, k)
+        at.last_step = depth - at.inserted if roll == at.roll else 0.0
+        at.inserted, at.roll, at.energy = depth, roll, energy
     else:
         take_back(handle)
     return outcome, used
+
+
+@merged
+def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
+    """Depth, mm, and roll, degrees, that the next step leads to."""
+    at = handle.place[0]
+    ahead, turn = to_depth - at.inserted, to_roll - at.roll
+    share = allowed(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
+    share = evenly(at.shrink * share)
+    return at.inserted + share * ahead, at.roll + share * turn
 
 
 @merged
@@ -112,15 +125,6 @@ def relax_current(handle: Any, k: int, share: float) -> tuple[int, int, float]:
     if start != CURRENT:
         copy_state(problem, start, CURRENT, k)
     return outcome, used, energy
-
-
-@merged
-def arrive(handle: Any, depth: float, roll: float, energy: float, k: int) -> None:
-    """Make the wire as it is the one that the next step begins with."""
-    at = handle.place[0]
-    note_change(handle.problem, CURRENT, k)
-    at.last_step = depth - at.inserted if roll == at.roll else 0.0
-    at.inserted, at.roll, at.energy = depth, roll, energy
 
 
 @merged

@@ -9,7 +9,7 @@ from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
 from solver._kernels.data import CONVERGED, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of
-from solver._kernels.flags import cached, merged
+from solver._kernels.flags import merged
 from solver._kernels.forces import forget_forces
 from solver._kernels.newton import costate
 
@@ -18,7 +18,7 @@ NEWTON, CLOSED_FORM = range(2)
 """``Limits.method`` of each."""
 
 
-@cached
+@merged
 def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -> tuple[int, int, int, float]:
     """Relax the state in a slot, whose energy is known; the report is that of the result.
 

@@ -12,7 +12,7 @@ from typing import Any
 from solver import _tolerances as tol
 from solver._kernels.convergence import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
-from solver._kernels.flags import merged
+from solver._kernels.flags import cached, merged
 from solver._kernels.newton import costate, sweep
 from solver._kernels.newton_moves import (
     accept,
@@ -45,7 +45,7 @@ def rests(problem: Problem, k: int, now: Any) -> bool:
     return True
 
 
-@merged
+@cached
 def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -> int:
     """Do one iteration; return how the relaxation ended, or UNFINISHED."""
     counters = problem.scratch.counters[0]
