@@ -13,10 +13,8 @@ from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver.errors import refuse
-from solver.introducer import base_frame, unit, vector
-from solver.relax import Settings
-from solver.solution import Solution
-from solver.status import Status
+from solver.relax import Settings, base_frame, unit, vector
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import Workspace

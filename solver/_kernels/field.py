@@ -197,11 +197,15 @@ def to_world(m: Any, jet: Any) -> None:
 
 
 @inlined
-def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> None:
-    """Fill jet (10,) as ``spline``, but per mm; m is a field's to_index, weights (3, 3, 4) is work space."""
+def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> float:
+    """Fill jet (10,) as ``spline``, but per mm; return its value, mm.
+
+    m is a field's to_index, weights (3, 3, 4) is work space.
+    """
     set_basis(cell, weights)
     spline(c, cell, weights, jet)
     to_world(m, jet)
+    return float(jet[0])
 
 
 @entry_point

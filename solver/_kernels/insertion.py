@@ -23,12 +23,11 @@ from solver._kernels.data import (
     Problem,
     WireTable,
 )
-from solver._kernels.extrapolation import extrapolate_start, note_change
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
-from solver._kernels.follow import follow
 from solver._kernels.forces import copy_state, forget_forces, furthest_outside
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
-from solver._kernels.relaxation import measure, relax_with_friction
+from solver._kernels.minimise import measure, relax_with_friction
+from solver._kernels.start import extrapolate_start, follow, note_change
 
 
 @entry_point
@@ -117,7 +116,7 @@ def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, flo
 def relax_current(handle: Any, k: int, share: float) -> tuple[int, int, float]:
     """Relax the wire as it is laid out, in place; return the outcome, iterations and energy, N mm.
 
-    share : how much of the last step's change to begin with, see ``extrapolation``.
+    share : how much of the last step's change to begin with, see ``start.extrapolate_start``.
     """
     problem = handle.problem
     start = extrapolate_start(problem, CURRENT, k, share, handle.place[0].energy)
