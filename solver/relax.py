@@ -15,12 +15,11 @@ from solver._kernels.data import CURRENT, Limits
 from solver._kernels.minimise import CLOSED_FORM, METHODS
 from solver._kernels.start import follow
 from solver.errors import refuse
+from solver.grid import Array
 from solver.solution import Solution
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import QUADRATURES, Workspace
-
-Array = NDArray[np.float64]
 
 
 def vector(name: str, value: ArrayLike) -> Array:

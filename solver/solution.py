@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from solver._kernels.data import WORK
+from solver.grid import Array
 
 
 class Status(Enum):
@@ -34,9 +32,6 @@ class Status(Enum):
     def identifier(self) -> str:
         """The short name used in tables."""
         return self.name.lower()
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +70,7 @@ class Solution:
     def work(self) -> Mapping[str, float]:
         """Counters of what was computed and what was proven unnecessary, by name."""
         work = {name: float(count) for name, count in zip(WORK, self.counts, strict=False)}
-        looked = (
-            work["wall_look_ups"] + work["wall_look_ups_cheap"] + work["wall_look_ups_proven_unnecessary"]
-        )
+        looked = sum(count for name, count in work.items() if name.startswith("wall_look_ups"))
         work["wall_look_ups_done_fraction"] = work["wall_look_ups"] / looked if looked else 0.0
         work["start_energy_N_mm"] = self.start_energy_N_mm
         return work

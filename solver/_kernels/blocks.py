@@ -40,12 +40,6 @@ from solver._kernels.rotation import jacobian_curvature
 
 
 @inlined
-def normal_at(frame: Nine, jet: Any) -> Three:
-    """Gradient of the distance at a point, in the frame of its node."""
-    return apply_transposed(frame, (jet[1], jet[2], jet[3]))
-
-
-@inlined
 def wall_hessian(frame: Nine, jet: Any, n: Three, law: tuple[float, float], project: bool) -> Six:
     """Hessian of the wall's energy at a point in contact, U'' ∇φ ∇φᵀ + U' ∇²φ; law holds U' and U''.
 
@@ -54,7 +48,7 @@ def wall_hessian(frame: Nine, jet: Any, n: Three, law: tuple[float, float], proj
     f = law[0]
     bend = (f * jet[4], f * jet[5], f * jet[6], f * jet[7], f * jet[8], f * jet[9])
     bend = conjugate(transpose(frame), bend)
-    return add6(dyad(law[1], n), without_negative(bend, n) if project else bend)
+    return add6(dyad(scaled(law[1], n), n), without_negative(bend, n) if project else bend)
 
 
 @inlined
@@ -112,7 +106,8 @@ def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Thr
         d = state.penetration[slot, p]
         if d != 0.0:
             size = wall_law.force(problem.stiffness, chain.weight[p], d)
-            force = scaled(size, normal_at(frame, state.jet[slot, p]))
+            jet = state.jet[slot, p]
+            force = scaled(size, apply_transposed(frame, (jet[1], jet[2], jet[3])))
             f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
         if problem.friction.coefficient > 0.0 and problem.friction.load[p] > 0.0:
             force, _ = friction_derivatives(problem, slot, n, p, frame)
@@ -134,7 +129,7 @@ def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool
         if d != 0.0:
             jet, weight = state.jet[slot, i], chain.weight[i]
             law = wall_law.force(stiffness, weight, d), wall_law.curvature(stiffness, weight, d)
-            normal = normal_at(frame, jet)
+            normal = apply_transposed(frame, (jet[1], jet[2], jet[3]))
             force, hessian = scaled(law[0], normal), wall_hessian(frame, jet, normal, law, project)
         if rubbing:
             more, stiffer = friction_derivatives(problem, slot, n, i, frame)
@@ -194,17 +189,7 @@ def solve_block(q: Six, twisting: bool) -> Nine:
     c12 = q[3] * q[4] - q[0] * q[5]
     c22 = q[0] * q[1] - q[3] * q[3]
     det = -(q[0] * c00 + q[3] * c01 + q[4] * c02)
-    return (
-        c00 / det,
-        c01 / det,
-        c02 / det,
-        c01 / det,
-        c11 / det,
-        c12 / det,
-        c02 / det,
-        c12 / det,
-        c22 / det,
-    )
+    return full((c00 / det, c11 / det, c22 / det, c01 / det, c02 / det, c12 / det))
 
 
 @kernel

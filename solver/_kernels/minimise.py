@@ -1,4 +1,4 @@
-"""One relaxation to its end: the one loop around either method, friction's rounds around it, what the result is worth.
+"""One relaxation to its end: the one loop around either method, friction's rounds around it.
 
 A method proposes, the total energy decides, and a state that is no minimum is never called one.
 """
@@ -19,11 +19,10 @@ from solver._kernels.data import (
     UNFINISHED,
     Limits,
     Problem,
-    WireTable,
 )
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import merged
-from solver._kernels.forces import contact_forces, copy_state, forget_forces, least_turn_cosine, push_force
+from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.friction import take_loads
 from solver._kernels.newton import costate
 
@@ -100,16 +99,3 @@ def relax_with_friction(
     if outcome == CONVERGED and least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
         outcome = FOLDED
     return outcome, iterations, energy
-
-
-@merged
-def measure(problem: Problem, table: WireTable, k: int, report: Any, force: Any) -> None:
-    """Forces of the wire at rest: force (capacity + 1, 3) N per joint; deepest contact and push force."""
-    for n in range(k + 1):
-        force[n, 0] = force[n, 1] = force[n, 2] = 0.0
-    report.penetration = report.push = 0.0
-    if k == 0:
-        return
-    if problem.stiffness > 0.0:
-        report.penetration = contact_forces(problem, k, force)
-    report.push = push_force(problem, table, k, report)
