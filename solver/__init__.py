@@ -35,8 +35,7 @@ from __future__ import annotations
 from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.relax import relax
-from solver.solution import Solution
-from solver.status import Status
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire

@@ -18,10 +18,6 @@ def read_only(array: ArrayLike, dtype: Any = None) -> NDArray[Any]:
     return view
 
 
-def _identity() -> Array:
-    return np.eye(3)
-
-
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Values on a regular grid, indexed x, y, z.
@@ -34,7 +30,7 @@ class Grid:
     values: NDArray[Any]
     spacing_mm: Array = field(default_factory=lambda: np.ones(3))
     origin_mm: Array = field(default_factory=lambda: np.zeros(3))
-    direction: Array = field(default_factory=_identity)
+    direction: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse a geometry that is not one."""

@@ -13,10 +13,8 @@ from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver.errors import refuse
-from solver.introducer import base_frame, unit, vector
-from solver.relax import Settings
-from solver.solution import Solution
-from solver.status import Status
+from solver.relax import Settings, base_frame, unit, vector
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import Workspace
@@ -67,7 +65,10 @@ class Insertion:
         self._started = False
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
-        self._outside = wall is not None and self._is_outside(wall, entry)
+        self._outside = False
+        if wall is not None:
+            margin = tol.ENTRY_MARGIN_VOXELS * float(np.linalg.norm(wall.distance.spacing_mm))
+            self._outside = bool(wall.look_up(entry)[0][0] > margin)
 
     @property
     def depth_mm(self) -> float:
@@ -105,19 +106,10 @@ class Insertion:
         if not self._started:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
             work.place["roll"], self._started = roll, True
-        status, iterations = self._refusal(depth), 0
-        if status is Status.CONVERGED:
+        if depth >= self._too_long:
+            status, iterations = Status.TOO_LONG, 0
+        elif self._outside:
+            status, iterations = Status.ENTRY_OUTSIDE, 0
+        else:
             status, iterations = work.advance(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
-
-    def _refusal(self, depth: float) -> Status:
-        """A status for depths that need not be tried."""
-        if depth >= self._too_long:
-            return Status.TOO_LONG
-        return Status.ENTRY_OUTSIDE if self._outside else Status.CONVERGED
-
-    @staticmethod
-    def _is_outside(wall: VesselWall, entry: ArrayLike) -> bool:
-        """Whether an entry point lies more than a voxel outside the lumen."""
-        diagonal = float(np.linalg.norm(wall.distance.spacing_mm))
-        return bool(wall.look_up(entry)[0][0] > tol.ENTRY_MARGIN_VOXELS * diagonal)

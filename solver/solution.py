@@ -1,17 +1,37 @@
-"""What a relaxation returns."""
+"""What a relaxation returns: how it ended, every status with the sentence that the user reads, and the wire."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from enum import Enum
 
 from solver._kernels.data import WORK
-from solver.status import Status
+from solver.grid import Array
 
-Array = NDArray[np.float64]
+
+class Status(Enum):
+    """Outcome of one depth; the name is its identifier, the value its sentence."""
+
+    CONVERGED = "the wire is at rest: a minimum of the energy within solver.tolerance"
+    MAX_ITERATIONS = "stopped at the iteration limit; raise solver.max_iterations or loosen solver.tolerance"
+    STALLED = (
+        "the energy can no longer be lowered but the wire is not at rest within solver.tolerance; "
+        "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
+    )
+    FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
+    FOLDED = (
+        "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
+    )
+    LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
+    ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
+    TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise solver.max_joints"
+    NON_FINITE = "the energy became infinite or undefined; check stiffnesses and loads"
+
+    @property
+    def identifier(self) -> str:
+        """The short name used in tables."""
+        return self.name.lower()
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +70,7 @@ class Solution:
     def work(self) -> Mapping[str, float]:
         """Counters of what was computed and what was proven unnecessary, by name."""
         work = {name: float(count) for name, count in zip(WORK, self.counts, strict=False)}
-        looked = (
-            work["wall_look_ups"] + work["wall_look_ups_cheap"] + work["wall_look_ups_proven_unnecessary"]
-        )
+        looked = sum(count for name, count in work.items() if name.startswith("wall_look_ups"))
         work["wall_look_ups_done_fraction"] = work["wall_look_ups"] / looked if looked else 0.0
         work["start_energy_N_mm"] = self.start_energy_N_mm
         return work

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
 from solver.errors import refuse
-from solver.grid import Grid
-
-Array = NDArray[np.float64]
+from solver.grid import Array, Grid
 
 
 def _checked(grid: Grid) -> Array:
@@ -58,11 +56,8 @@ class VesselWall:
         _ = self.samples
         values = _checked(self.distance)
         prefilter(values)
-        padded = np.pad(values, 1)
-        for axis in range(3):
-            line = np.moveaxis(padded, axis, 0)
-            line[0] = 2 * line[1] - line[2]
-            line[-1] = 2 * line[-2] - line[-3]
+        # the ghost layers: c[-1] = 2 c[0] - c[1]
+        padded = np.pad(values, 1, mode="reflect", reflect_type="odd")
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
         coefficients = padded.astype(np.float32)
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))

@@ -13,10 +13,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from solver._kernels import closed_form
+from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.insertion import lay_along
-from solver._kernels.minimise import minimise
 from solver.grid import Grid
 from solver.relax import Settings, relax
 from solver.wall import VesselWall
@@ -50,7 +49,7 @@ def warm_up(*, beside: bool = False) -> None:
             return
         with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_beside()"]):
             # while the other process makes what ``advance`` needs besides
-            _compile(minimise)
+            _compile(newton_method.iterate)
             # a wall has no types of its own
             relax(WIRE, None, depth_mm=1.0)
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver._kernels.chain import segments_at
 from solver._kernels.data import Profile
 from solver.errors import refuse
-from solver.grid import read_only
+from solver.grid import Array, read_only
 
-Array = NDArray[np.float64]
 Quantity = float | ArrayLike | Callable[[Array], ArrayLike]
 
 CALLABLE_REACH_MM = 2000.0

@@ -3,55 +3,56 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver import skips
+from solver._kernels import data
 from solver._kernels.chain import lay_out, tabulate
-from solver._kernels.data import (
-    COUNTERS,
-    CURRENT,
-    DESCENT,
-    ENERGIES,
-    OUTCOMES,
-    PLACE,
-    REPORT,
-    Chain,
-    Field,
-    Friction,
-    Introducer,
-    Limits,
-    Problem,
-    Scratch,
-    State,
-    WireTable,
-)
-from solver._kernels.handle import Contents, handle_of
-from solver._kernels.insertion import advance
+from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
+from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
 from solver.errors import refuse
-from solver.quadrature import look_up_rule
-from solver.solution import Solution
-from solver.status import Status
+from solver.grid import Array
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
-Array = NDArray[np.float64]
+QUADRATURES = ("tip", "joints", "segments")
+TIP_PANELS = 5
+"""Panels of the last segment, each half as long as the one before: the last is 1/16 of it."""
+TIP_ZONE = 4
+"""Segments before the last with two Gauss points each: they cover the tip's contact run where segments are short."""
 
-NO_FIELD = Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
+
+def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> Rule:
+    """Where a wire's segments look the wall up.
+
+    The last segment has two Gauss points on each of a few panels that shrink towards the tip, so that a contact
+    run much shorter than the segment is still seen.
+    """
+    hull, reach = wall.hull_points(wire.radius_mm) if wall is not None else (np.zeros((0, 2)), 0.0)
+    if quadrature == "joints":
+        return Rule(hull, reach, np.zeros(1), np.ones(1), 0)
+    edges = np.concatenate([[0.0], 0.5 ** np.arange(TIP_PANELS - 1, -1, -1)])
+    width, centre = np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
+    offset = width / (2 * np.sqrt(3.0))
+    at, weight = np.concatenate([centre - offset, centre + offset]), np.concatenate([width, width]) / 2
+    return Rule(hull, reach, at, weight, TIP_ZONE if quadrature == "tip" else 2**62)
+
+
+NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
 """A stand-in where there is no wall; it is never looked up."""
 
 
 class Workspace:
     """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
 
-    problem, table, limits, place, report, force : see ``_kernels.handle.Contents``.
+    problem, table, limits, place, report, force : see ``_kernels.insertion.Contents``.
     """
 
     problem: Problem
-    table: WireTable
     introducer: Introducer | None = None
-    force: Array
 
     def __init__(self, wire: GuideWire, wall: VesselWall | None, quadrature: str, limits: Limits) -> None:
         if limits.method == CLOSED_FORM and wire.twists:
@@ -63,11 +64,11 @@ class Workspace:
         # rolling a straight wire with one bending stiffness and a round hull changes nothing
         self.round = wire.straight and (wall is None or wall.samples == 0)
         self.k, self.capacity = 0, 0
-        self.counters, self.place = np.zeros(1, COUNTERS), np.zeros(1, PLACE)
+        self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
         self.place["shrink"] = 1.0
-        self.report = np.zeros(2, REPORT)
+        self.report = np.zeros(2, data.REPORT)
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
@@ -76,14 +77,17 @@ class Workspace:
         state, scratch = self._empty_state(capacity, points), self._empty_scratch(capacity, points)
         if self.capacity:
             old = self.problem
-            pairs = [(state.u, old.state.u), (state.x, old.state.x), (state.r, old.state.r)]
-            for new, was in pairs:
+            for new, was in zip(state[:3], old.state[:3], strict=True):
                 new[:, : was.shape[1]] = was
             scratch.change[: self.capacity] = old.scratch.change
+        friction = float(self.wall.friction) if self.wall is not None else 0.0
+        rubbing = points if friction else 0
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
-            friction=self._empty_friction(points),
+            friction=data.Friction(
+                friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)
+            ),
             chain=self._empty_chain(capacity, points),
             state=state,
             scratch=scratch,
@@ -98,45 +102,22 @@ class Workspace:
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
-    def _empty_state(self, k: int, points: int) -> State:
-        return State(
-            u=np.zeros((3, k, 3)),
-            x=np.zeros((3, k + 1, 3)),
-            r=np.zeros((3, k + 1, 3, 3)),
-            penetration=np.zeros((3, points)),
-            jet=np.zeros((3, points, 10)),
-            energies=np.zeros(3, ENERGIES),
-        )
+    def _empty_state(self, k: int, points: int) -> data.State:
+        u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
+        penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
+        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES))
 
-    def _empty_scratch(self, k: int, points: int) -> Scratch:
-        return Scratch(
-            gain=np.zeros((k, 3, 7)),
-            anchor=np.ones((points, 4)),
-            weights=np.zeros((3, 3, 4)),
-            counters=self.counters,
-            descent=np.zeros(1, DESCENT),
-            start=np.zeros((k, 3)),
-            change=np.zeros((k, 3)),
-            keep=np.zeros((k, 3)),
-        )
+    def _empty_scratch(self, k: int, points: int) -> data.Scratch:
+        gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
+        start, change, keep = np.zeros((3, k, 3))
+        descent = np.zeros(1, data.DESCENT)
+        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep)
 
-    def _empty_chain(self, k: int, points: int) -> Chain:
-        return Chain(
-            length=np.zeros(k),
-            bend=np.zeros(k),
-            twist=np.zeros(k),
-            rest=np.zeros(k),
-            load=np.zeros((k + 1, 3)),
-            first=np.zeros(k + 2, dtype=np.int64),
-            offset=np.zeros((points, 3)),
-            weight=np.zeros(points),
-            reach=self.rule.reach,
-        )
-
-    def _empty_friction(self, points: int) -> Friction:
-        coefficient = float(self.wall.friction) if self.wall is not None else 0.0
-        n = points if coefficient else 0
-        return Friction(coefficient, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
+    def _empty_chain(self, k: int, points: int) -> data.Chain:
+        length, bend, twist, rest = np.zeros((4, k))
+        load, first = np.zeros((k + 1, 3)), np.zeros(k + 2, dtype=np.int64)
+        offset, weight = np.zeros((points, 3)), np.zeros(points)
+        return data.Chain(length, bend, twist, rest, load, first, offset, weight, self.rule.reach)
 
     def clamp(
         self,
@@ -196,19 +177,14 @@ class Workspace:
     def advance(self, depth_mm: float, roll_deg: float, laid: int = 0) -> tuple[Status, int]:
         """Go to a depth and roll, see ``_kernels.insertion.advance``; return the status and the iterations."""
         outcome, iterations, self.k = advance(self._handle, depth_mm, roll_deg, laid)
-        return Status[OUTCOMES[outcome]], iterations
+        return Status[data.OUTCOMES[outcome]], iterations
 
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_ = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
-        arrays = [
-            state.x[CURRENT, :n].copy(),
-            state.r[CURRENT, :n].copy(),
-            self.force[:n].copy(),
-            force.copy(),
-        ]
+        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
         solution = object.__new__(Solution)

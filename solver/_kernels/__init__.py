@@ -1,16 +1,13 @@
 """Every compiled function of the solver. In: named tuples of arrays and scalars. Out: numbers, or filled arrays.
 
 flags            the five decorators                    data             what the kernels hand to each other
-handle           all of it behind one pointer           algebra          3x3 matrices as tuples of scalars
-rotation         exponential map and its derivatives    field            the interpolated signed distance
-wall_law         energy, force, curvature of the wall   chain            a wire cut into segments
-friction         Coulomb friction as a potential        energy           total energy (eq. 1-7)
-node, joint      their parts of a Newton step           rollout          joints and frames from the controls
+algebra          3x3 matrices as tuples of scalars      rotation         exponential map and its derivatives
+field            the interpolated signed distance       wall_law         energy, force, curvature of the wall
+chain            a wire cut into segments               friction         Coulomb friction as a potential
+energy           total energy (eq. 1-7)                 forces           forces and moments of a wire at rest
+rollout          joints and frames from the controls    blocks           a node's and a joint's part of Newton's step
 newton           the step, by a Riccati recursion       newton_straight  the same for a straight round wire
-newton_moves     from a state to a lower one            newton_method    one iteration of Newton's method
-closed_form      one sweep of the seed's eq. 8-10       convergence      when a state counts as a minimum
-minimise         the loop around either method          relaxation       friction's rounds around that loop
-follow           the wire laid along a curve            extrapolation    a better start, from the last step
-crossing         whether a way passes through a wall    forces           forces of a wire at rest
-insertion        the steps to a depth, and the one entry point to all of it
+newton_method    one iteration of Newton's method       closed_form      one sweep of the seed's eq. 8-10
+minimise         the loop around either method          crossing         whether a way passes through a wall
+start            the wire laid along a curve            insertion        the steps to a depth, behind one pointer
 """

@@ -128,16 +128,9 @@ def gram(q: Nine, k: Nine) -> Six:
 
 
 @inlined
-def dyad(s: float, n: Three) -> Six:
-    """S n nᵀ."""
-    return (
-        s * n[0] * n[0],
-        s * n[1] * n[1],
-        s * n[2] * n[2],
-        s * n[0] * n[1],
-        s * n[0] * n[2],
-        s * n[1] * n[2],
-    )
+def dyad(a: Three, b: Three) -> Six:
+    """A bᵀ where that is symmetric."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2], a[0] * b[1], a[0] * b[2], a[1] * b[2]
 
 
 @inlined

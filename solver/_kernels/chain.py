@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from solver._kernels.data import Chain, Profile, Rule, WireTable
 from solver._kernels.flags import entry_point, kernel
 
@@ -44,19 +42,20 @@ def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
 
 
 @kernel
-def cell(profile: Profile, inner: float, outer: float, result: Any) -> None:
+def cell(profile: Profile, inner: float, outer: float) -> tuple[float, float]:
     """Compliance 1/c and rest bend of a joint whose cell reaches from ``inner`` to ``outer`` mm from the tip."""
-    result[0] = integral(profile.stiffness_at, profile.stiffness, outer, True)
-    result[0] -= integral(profile.stiffness_at, profile.stiffness, inner, True)
-    result[1] = integral(profile.rest_at, profile.rest, outer, False)
-    result[1] -= integral(profile.rest_at, profile.rest, inner, False)
+    compliance = integral(profile.stiffness_at, profile.stiffness, outer, True)
+    compliance -= integral(profile.stiffness_at, profile.stiffness, inner, True)
+    rest = integral(profile.rest_at, profile.rest, outer, False)
+    return compliance, rest - integral(profile.rest_at, profile.rest, inner, False)
 
 
 @entry_point
 def tabulate(profile: Profile, segment_mm: float, cells: Any) -> None:
     """Fill cells (m, 2): compliance and rest bend of the whole cell around distance m * segment from the tip."""
     for m in range(cells.shape[0]):
-        cell(profile, max(m - 0.5, 0.0) * segment_mm, (m + 0.5) * segment_mm, cells[m])
+        inner = max(m - 0.5, 0.0) * segment_mm
+        cells[m, 0], cells[m, 1] = cell(profile, inner, (m + 0.5) * segment_mm)
 
 
 @entry_point
@@ -73,7 +72,6 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
     """Fill a chain of k segments whose first one is ``first_mm`` long."""
     profile, cells, segment_mm = table.profile, table.cells, table.segment
     depth = first_mm + (k - 1) * segment_mm
-    own = np.empty(2)
     for j in range(k):
         chain.length[j] = first_mm if j == 0 else segment_mm
         outer = depth if j == 0 else (k - j + 0.5) * segment_mm
@@ -83,11 +81,10 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
         elif j == 1:
             outer = depth - 0.5 * first_mm
         if j < 2 or not table.tabled:
-            cell(profile, inner, outer, own)
+            compliance, chain.rest[j] = cell(profile, inner, outer)
         else:
-            own[0], own[1] = cells[k - j, 0], cells[k - j, 1]
-        chain.bend[j] = 1.0 / own[0]
-        chain.rest[j] = own[1]
+            compliance, chain.rest[j] = cells[k - j, 0], cells[k - j, 1]
+        chain.bend[j] = 1.0 / compliance
         chain.twist[j] = profile.twist / (outer - inner)
     place_points(chain, table.rule, k)
 

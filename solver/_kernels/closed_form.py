@@ -29,13 +29,13 @@ from solver._kernels.algebra import (
     store9,
     times,
 )
-from solver._kernels.convergence import admissible, largest_moment, noise_of, scale_of, stiffest
+from solver._kernels.blocks import node_gradient
+from solver._kernels.crossing import admissible
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
-from solver._kernels.energy import total_energy
+from solver._kernels.energy import noise_of, scale_of, stiffest, total_energy
 from solver._kernels.flags import cached, inlined, kernel, merged
+from solver._kernels.forces import largest_moment
 from solver._kernels.newton import costate, sweep
-from solver._kernels.newton_moves import accept
-from solver._kernels.node import node_gradient
 from solver._kernels.rollout import copy_base
 from solver._kernels.rotation import bend_towards, jacobian, turn
 
@@ -163,7 +163,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         problem.scratch.counters[0].rollouts += 1
         trial = total_energy(problem, 1 - now.slot, 0, k)
         if trial <= now.energy and admissible(problem, now.slot, k):
-            accept(now, trial)
+            now.slot, now.energy = 1 - now.slot, trial
             now.share = min(1.0, 1.1 * now.share)
             return UNFINISHED
         now.share *= 0.5

@@ -109,3 +109,9 @@ def proven(field: Field, here: float, apart: float) -> int:
     if not (here < 0.0 and field.slope > 0.0):
         return 0
     return int(min(-here / (field.slope * apart), 1e6))
+
+
+@kernel
+def admissible(problem: Problem, slot: int, k: int) -> bool:
+    """Whether the trial state can be reached from the current one without passing through a wall."""
+    return problem.stiffness == 0.0 or not crossed(problem, slot, k)

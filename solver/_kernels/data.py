@@ -11,7 +11,7 @@ import numpy as np
 
 from solver.skips import Skips
 
-# how a relaxation or a step ends, by the names of ``status.Status``
+# how a relaxation or a step ends, by the names of ``solution.Status``
 OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID")
 CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID = range(7)
 UNFINISHED = -1
@@ -186,7 +186,7 @@ class State(NamedTuple):
 class Scratch(NamedTuple):
     """Work space.
 
-    gain : (k, 3, 7), see ``joint.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
+    gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
     distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``COUNTERS`` and
     ``DESCENT``.     start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in
     the last step, from the tip inwards.     keep : (k, 3) controls to come back to.

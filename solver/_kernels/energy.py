@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import Three, dot, load3, minus, store3
 from solver._kernels.data import Chain, Problem
 from solver._kernels.field import fill_jet, in_grid, indices, locate, trilinear, value
-from solver._kernels.flags import inlined, kernel
+from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.friction import friction_energy
+
+FLOOR = tol.ENERGY_FLOOR_ANGLE**2
 
 
 @kernel
@@ -67,10 +70,12 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
     x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
     anchor, weights = problem.scratch.anchor, problem.scratch.weights
-    clear, cheap, full = 0, 0, 0
+    clear, cheap = 0, 0
     for n in range(first_free + 1, k + 1):
         for p in range(first[n], first[n + 1]):
-            q = placed(x, r, n, offset[p, 0], offset[p, 1], offset[p, 2])
+            q = load3(x, n)
+            if offset[p, 0] != 0.0 or offset[p, 1] != 0.0 or offset[p, 2] != 0.0:
+                q = placed(q, r, n, load3(offset, p))
             penetration[p] = 0.0
             at = indices(m, o, q)
             inside = in_grid(c, at)
@@ -87,38 +92,35 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
                     cheap += 1
                     anchor[p, 3] = phi
                     continue
-            full += 1
             d = -1.0 if touched else value(c, cell) + reach
             if touched or d > 0.0:
-                fill_jet(c, m, cell, weights, jet[p])
-                d = jet[p, 0] + reach
+                d = fill_jet(c, m, cell, weights, jet[p]) + reach
             anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
             if d > 0.0:
                 penetration[p] = d
                 total += wall_law.energy(problem.stiffness, weight[p], d)
-    count(problem, clear, cheap, full)
+    count(problem, clear, cheap, first[k + 1] - first[first_free + 1] - clear - cheap)
     return total
 
 
 @inlined
-def placed(x: Any, r: Any, n: int, o0: float, o1: float, o2: float) -> Three:
-    """Where a point with offset o in the frame of node n is, mm."""
-    q0, q1, q2 = x[n, 0], x[n, 1], x[n, 2]
-    if o0 != 0.0 or o1 != 0.0 or o2 != 0.0:
-        q0 += r[n, 0, 0] * o0 + r[n, 0, 1] * o1 + r[n, 0, 2] * o2
-        q1 += r[n, 1, 0] * o0 + r[n, 1, 1] * o1 + r[n, 1, 2] * o2
-        q2 += r[n, 2, 0] * o0 + r[n, 2, 1] * o1 + r[n, 2, 2] * o2
-    return q0, q1, q2
+def placed(q: Three, r: Any, n: int, o: Three) -> Three:
+    """Where a point with offset o in the frame of node n, which is at q, is, mm."""
+    return (
+        q[0] + (r[n, 0, 0] * o[0] + r[n, 0, 1] * o[1] + r[n, 0, 2] * o[2]),
+        q[1] + (r[n, 1, 0] * o[0] + r[n, 1, 1] * o[1] + r[n, 1, 2] * o[2]),
+        q[2] + (r[n, 2, 0] * o[0] + r[n, 2, 1] * o[1] + r[n, 2, 2] * o[2]),
+    )
 
 
-@inlined
+@merged
 def still_clear(anchor: Any, p: int, q: Three, slope: float, clearance: float) -> bool:
     """Whether a point moved less since its last look-up than it was clear of the wall then: so it cannot touch."""
     way = minus(q, load3(anchor, p))
     return bool(clearance >= 0.0 and slope * slope * dot(way, way) <= clearance * clearance)
 
 
-@inlined
+@merged
 def count(problem: Problem, clear: int, cheap: int, full: int) -> None:
     """Add up how the points were looked up."""
     counters = problem.scratch.counters[0]
@@ -139,3 +141,25 @@ def taken_over(problem: Problem, slot: int, first_free: int) -> float:
             for a in range(10):
                 state.jet[slot, p, a] = state.jet[1 - slot, p, a]
     return total
+
+
+@kernel
+def scale_of(problem: Problem, slot: int, k: int) -> float:
+    """The energy that tolerances are relative to, N mm."""
+    parts = problem.state.energies[slot]
+    return float(parts.bending + parts.wall + parts.friction + FLOOR * stiffest(problem.chain, k))
+
+
+@kernel
+def noise_of(problem: Problem, slot: int, scale: float) -> float:
+    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``."""
+    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load)))
+
+
+@kernel
+def stiffest(chain: Chain, k: int) -> float:
+    """Largest joint stiffness, N mm/rad."""
+    largest = 0.0
+    for j in range(k):
+        largest = max(largest, chain.bend[j])
+    return largest

@@ -137,14 +137,6 @@ def basis(t: float, weights: Any) -> None:
 
 
 @kernel
-def set_basis(cell: Cell, weights: Any) -> None:
-    """Fill (3, 3, 4) weights for a place in a cell."""
-    basis(cell[3], weights[0])
-    basis(cell[4], weights[1])
-    basis(cell[5], weights[2])
-
-
-@kernel
 def spline(c: Any, cell: Cell, weights: Any, jet: Any) -> None:
     """Fill jet (10,): value, gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
     i, j, k, _, _, _ = cell
@@ -197,11 +189,17 @@ def to_world(m: Any, jet: Any) -> None:
 
 
 @inlined
-def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> None:
-    """Fill jet (10,) as ``spline``, but per mm; m is a field's to_index, weights (3, 3, 4) is work space."""
-    set_basis(cell, weights)
+def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> float:
+    """Fill jet (10,) as ``spline``, but per mm; return its value, mm.
+
+    m is a field's to_index, weights (3, 3, 4) is work space.
+    """
+    basis(cell[3], weights[0])
+    basis(cell[4], weights[1])
+    basis(cell[5], weights[2])
     spline(c, cell, weights, jet)
     to_world(m, jet)
+    return float(jet[0])
 
 
 @entry_point

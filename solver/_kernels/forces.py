@@ -1,13 +1,14 @@
-"""Forces of a wire at rest: they fall out of the minimum, as derivatives of the total energy."""
+"""Forces of a wire at rest, derivatives of the total energy; and whether the moments left are as good as none."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import dot, load3, load9, store3, store9
-from solver._kernels.data import CURRENT, Field, Problem, WireTable
+from solver._kernels.data import CURRENT, Chain, Field, Problem, WireTable
 from solver._kernels.flags import cached, kernel, merged
 from solver._kernels.friction import slide
 from solver._kernels.rotation import turn
@@ -139,3 +140,42 @@ def forget_forces(report: Any) -> None:
     """Report that there is no gradient, as without a force or a bend."""
     for a in range(3):
         report.force[a] = report.torque[a] = report.turned[0, a] = report.turned[1, a] = 0.0
+
+
+@kernel
+def largest_moment(chain: Chain, u: Any, k: int) -> float:
+    """Largest bending moment in the wire, N mm, with a floor."""
+    largest = 0.0
+    for j in range(k):
+        angle = max(abs(u[j, 0]), abs(u[j, 1]), tol.ENERGY_FLOOR_ANGLE)
+        largest = max(largest, chain.bend[j] * angle)
+    return largest
+
+
+@kernel
+def at_rest(problem: Problem, slot: int, k: int, report: Any) -> bool:
+    """Whether the moments that ``costate`` found left are nothing beside the moments in the wire."""
+    return bool(report.moment <= tol.MOMENT * largest_moment(problem.chain, problem.state.u[slot], k))
+
+
+@kernel
+def rounding_moment(problem: Problem, slot: int, k: int) -> float:
+    """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
+    chain, penetration = problem.chain, problem.state.penetration[slot]
+    force, lever = 0.0, 0.0
+    for n in range(1, k + 1):
+        lever += chain.length[n - 1]
+        for a in range(3):
+            force += abs(chain.load[n, a])
+        for p in range(chain.first[n], chain.first[n + 1]):
+            force += wall_law.force(problem.stiffness, chain.weight[p], penetration[p])
+    return tol.ROUND_OFF * force * lever
+
+
+@kernel
+def unloaded(chain: Chain, k: int) -> bool:
+    """No dead load on any joint."""
+    for n in range(k + 1):
+        if chain.load[n, 0] != 0.0 or chain.load[n, 1] != 0.0 or chain.load[n, 2] != 0.0:
+            return False
+    return True

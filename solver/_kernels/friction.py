@@ -1,6 +1,6 @@
 """Coulomb friction, as a potential that one step of the wire has: load times coefficient times the way slid.
 
-Load and direction of a contact are those of the last relaxation; ``relaxation`` repeats until they no longer change.
+Load and direction of a contact are those of the last relaxation; ``minimise`` repeats until they no longer change.
 """
 
 from __future__ import annotations

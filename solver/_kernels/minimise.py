@@ -1,4 +1,7 @@
-"""The one loop: a method proposes, the total energy decides, and a state that is no minimum is never called one."""
+"""One relaxation to its end: the one loop around either method, friction's rounds around it.
+
+A method proposes, the total energy decides, and a state that is no minimum is never called one.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,20 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
-from solver._kernels.data import CONVERGED, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
-from solver._kernels.energy import energy_of
-from solver._kernels.flags import cached, merged
-from solver._kernels.forces import forget_forces
+from solver._kernels.data import (
+    CONVERGED,
+    FOLDED,
+    FRICTION,
+    MAX_ITERATIONS,
+    NON_FINITE,
+    UNFINISHED,
+    Limits,
+    Problem,
+)
+from solver._kernels.energy import energy_of, total_energy
+from solver._kernels.flags import merged
+from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
+from solver._kernels.friction import take_loads
 from solver._kernels.newton import costate
 
 METHODS = ("newton", "closed_form")
@@ -18,7 +31,7 @@ NEWTON, CLOSED_FORM = range(2)
 """``Limits.method`` of each."""
 
 
-@cached
+@merged
 def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -> tuple[int, int, int, float]:
     """Relax the state in a slot, whose energy is known; the report is that of the result.
 
@@ -51,3 +64,38 @@ def begin(now: Any, slot: int, energy: float) -> None:
     now.first_free, now.patience, now.released = 0, 0, 0
     now.damping, now.last_damping = 0.0, tol.FIRST_DAMPING
     now.share, now.next_check, now.checked_energy = 1.0, tol.FIRST_CHECK, math.inf
+
+
+@merged
+def relax_with_friction(
+    problem: Problem, slot: int, k: int, limits: Limits, report: Any
+) -> tuple[int, int, float]:
+    """Relax the state in a slot, whose energy is known, in place; return the outcome, iterations and energy, N mm.
+
+    With friction the contact loads are taken from the last relaxation until they settle.
+    """
+    rubs, counters = problem.friction.coefficient > 0.0, problem.scratch.counters[0]
+    counters.relaxations_without_friction += not rubs
+    counters.relaxations_without_twist += not problem.twisting
+    if rubs:
+        for p in range(problem.friction.load.size):
+            problem.friction.load[p] = 0.0
+        take_loads(problem, slot, k)
+    outcome, iterations, energy = FRICTION, 0, 0.0
+    cost = k + problem.chain.first[k + 1]
+    for _ in range(tol.FRICTION_ROUNDS):
+        if rubs:
+            total_energy(problem, slot, 0, k)
+        allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // cost)
+        own = Limits(limits.method, limits.tolerance, allowed, limits.work)
+        outcome, used, result, energy = minimise(problem, slot, k, own, report)
+        iterations += used
+        counters.passed += used * cost
+        if result != slot:
+            copy_state(problem, result, slot, k)
+        if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
+            break
+        outcome = FRICTION
+    if outcome == CONVERGED and least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
+        outcome = FOLDED
+    return outcome, iterations, energy

@@ -39,19 +39,20 @@ from solver._kernels.algebra import (
     times_transposed,
     transpose,
 )
-from solver._kernels.data import Problem
-from solver._kernels.flags import inlined, kernel
-from solver._kernels.joint import (
+from solver._kernels.blocks import (
     Gains,
     joint_hessian,
     least_curvature,
+    node_gradient,
+    node_hessian,
     note_direction,
     solve_block,
     stiffened,
     store_gains,
 )
+from solver._kernels.data import Problem
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.newton_straight import sweep_straight
-from solver._kernels.node import node_gradient, node_hessian
 from solver._kernels.rotation import jacobian, turn
 
 Value = tuple[Six, Nine, Six, Three, Three]
@@ -62,7 +63,7 @@ Value = tuple[Six, Nine, Six, Three, Three]
 def add_node(
     value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float
 ) -> Value:
-    """Add what acts on a node and its segment, see ``node``, and Levenberg's term ``held`` on its position."""
+    """Add what acts on a node and its segment, see ``blocks``, and Levenberg's term ``held`` on its position."""
     p, c, h, f, g = value
     p = add6(p, hessian[0])
     p = (p[0] + held, p[1] + held, p[2] + held, p[3], p[4], p[5])

@@ -1,7 +1,10 @@
-"""Newton's method: one iteration. The step comes from ``newton``, and the total energy decides whether it is taken.
+"""Newton's method: its ways from one state to a lower one, and one iteration made of them.
+
+The step comes from ``newton``, and the total energy decides whether it is taken, in part, or after a few whole ones.
 
 Where it does not help, Levenberg's term holds the wire back; where the Hessian is not positive and no force is left,
-the wire is led out of its saddle. now is the record ``data.DESCENT``.
+the wire is led out of its saddle. now is the record ``data.DESCENT``: the current state and its
+energy; a trial is in the other slot.
 """
 
 from __future__ import annotations
@@ -10,21 +13,166 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.convergence import at_rest, noise_of, rounding_moment, scale_of, stiffest, unloaded
+from solver._kernels.algebra import ZERO3, load3, store3
+from solver._kernels.crossing import admissible
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
-from solver._kernels.flags import merged
+from solver._kernels.energy import energy_of, noise_of, scale_of, stiffest, total_energy
+from solver._kernels.flags import cached, kernel, merged
+from solver._kernels.forces import at_rest, rounding_moment, unloaded
 from solver._kernels.newton import costate, sweep
-from solver._kernels.newton_moves import (
-    accept,
-    damped_polish,
-    frozen_joints,
-    last_step,
-    leave_saddle,
-    polish,
-    rest_shape,
-    search,
-    watchdog,
-)
+from solver._kernels.rollout import copy_base, place, rollout
+
+
+@kernel
+def step(problem: Problem, slot: int, first_free: int, k: int, fraction: float) -> float:
+    """Take a fraction of Newton's step; return the energy of the trial state, N mm."""
+    rollout(problem, slot, first_free, k, fraction)
+    problem.scratch.counters[0].rollouts += 1
+    return total_energy(problem, 1 - slot, first_free, k)
+
+
+@kernel
+def search(problem: Problem, k: int, now: Any, fraction: float, noise: float, report: Any) -> float:
+    """Try Newton's whole step, or shorten it until the energy falls enough; return the new energy, or inf."""
+    decrement = report.decrement
+    for _ in range(1 if fraction == 1.0 else tol.SEARCHES - 1):
+        trial = step(problem, now.slot, now.first_free, k, fraction)
+        enough = trial <= now.energy - tol.SUFFICIENT * fraction * decrement
+        if (enough or (decrement <= noise and trial <= now.energy)) and admissible(problem, now.slot, k):
+            return trial
+        fraction *= 0.4
+    return math.inf
+
+
+@merged
+def watchdog(problem: Problem, k: int, now: Any, rise: float, report: Any) -> bool:
+    """Follow whole steps of Newton uphill until the energy is below where it started; False and back if it never is.
+
+    Close to a minimum a step fails because contacts open and close on its way. The model of the energy is a
+    quadratic for each set of contacts; whole steps find the right set within a few, short ones creep (semismooth
+    Newton; the watchdog of Chamberlain et al., 1982). The first whole step is the trial state already.
+    rise : how far uphill, N mm.
+    """
+    state, counters, keep = problem.state, problem.scratch.counters[0], problem.scratch.keep
+    slot, start = now.slot, now.slot
+    controls = state.u[start]
+    for j in range(k):
+        store3(keep, j, load3(controls, j))
+    goal = now.energy - tol.SUFFICIENT * report.decrement
+    for _ in range(tol.WATCHDOG_STEPS):
+        trial = energy_of(problem, 1 - slot)
+        if not (trial <= now.energy + rise and admissible(problem, slot, k)):
+            break
+        slot = 1 - slot
+        if trial <= goal:
+            now.slot, now.energy = slot, trial
+            return True
+        counters.sweeps += 1
+        if not sweep(problem, slot, 0, k, 0.0, report):
+            break
+        step(problem, slot, 0, k, 1.0)
+    for j in range(k):
+        store3(controls, j, load3(keep, j))
+    place(problem.chain, state, start, k)
+    total_energy(problem, start, 0, k)
+    sweep(problem, start, 0, k, 0.0, report)
+    counters.sweeps += 1
+    return False
+
+
+@merged
+def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) -> float:
+    """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
+    j, slot, gain = int(report.joint), now.slot, problem.scratch.gain
+    for a in range(3):
+        for b in range(7):
+            gain[j, a, b] = 0.0
+    for i in range(j + 1, k):
+        gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
+    size, least = 0.3, 0.1 * abs(report.curvature)
+    # joints further on may answer with a thousand times as much: nothing but rounding ends the search
+    while least * size * size > noise:
+        for side in (1.0, -1.0):
+            for a in range(2):
+                gain[j, a, 0] = side * size * report.bend[a]
+            gain[j, 2, 0] = side * size * report.twist
+            trial = step(problem, slot, j, k, 1.0)
+            if trial < now.energy - least * size * size and admissible(problem, slot, k):
+                return trial
+        size *= 0.25
+    return math.inf
+
+
+@merged
+def rest_shape(problem: Problem, slot: int, k: int) -> bool:
+    """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
+    state, u = problem.state, problem.state.u[1 - slot]
+    for j in range(k):
+        store3(u, j, ZERO3)
+    copy_base(state, slot, 1 - slot)
+    place(problem.chain, state, 1 - slot, k)
+    total_energy(problem, 1 - slot, 0, k)
+    parts = state.energies[1 - slot]
+    return parts.wall == 0.0 and parts.friction == 0.0 and admissible(problem, slot, k)
+
+
+@merged
+def last_step(problem: Problem, k: int, now: Any, report: Any) -> None:
+    """Take the step that squares the error, and leave the exact gradient of the result in the report."""
+    trial = step(problem, now.slot, now.first_free, k, 1.0)
+    if trial <= now.energy and admissible(problem, now.slot, k):
+        now.slot, now.energy = 1 - now.slot, trial
+    costate(problem, now.slot, k, report)
+
+
+@merged
+def polish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
+    """Newton's steps where the energy is flat to its last place: the fall that is left to foretell decides."""
+    definite = sweep(problem, now.slot, 0, k, 0.0, report)
+    for _ in range(tol.POLISHES):
+        left = report.decrement
+        if not definite or at_rest(problem, now.slot, k, report):
+            break
+        trial = step(problem, now.slot, 0, k, 1.0)
+        if not (trial <= now.energy + noise and admissible(problem, now.slot, k)):
+            break
+        definite = sweep(problem, 1 - now.slot, 0, k, 0.0, report)
+        problem.scratch.counters[0].sweeps += 1
+        if not (definite and report.decrement < left):
+            break
+        now.slot, now.energy = 1 - now.slot, trial
+        costate(problem, now.slot, k, report)
+
+
+@merged
+def damped_polish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
+    """Take the damped step where the energy is flat to its last place, if that lowers the moments that are left."""
+    costate(problem, now.slot, k, report)
+    moment = report.moment
+    trial = step(problem, now.slot, 0, k, 1.0)
+    if trial <= now.energy + noise and admissible(problem, now.slot, k):
+        costate(problem, 1 - now.slot, k, report)
+        if report.moment < moment:
+            now.slot, now.energy = 1 - now.slot, trial
+
+
+@merged
+def frozen_joints(problem: Problem, slot: int, k: int) -> int:
+    """How many joints, counted from the base, the last step hardly turned; 0 where these are too few to gain by it.
+
+    Hardly: by less than ``tol.UNMOVED`` of the joint that it turned most.
+    """
+    new, old = problem.state.u[slot], problem.state.u[1 - slot]
+    largest = 0.0
+    for j in range(k):
+        for a in range(3):
+            largest = max(largest, abs(new[j, a] - old[j, a]))
+    for j in range(k):
+        for a in range(3):
+            if abs(new[j, a] - old[j, a]) > tol.UNMOVED * largest:
+                return j if j > tol.WORTHWHILE * k else 0
+    return 0
+
 
 REST = 0.5 * tol.REST_ANGLE**2
 UNDECIDED = UNFINISHED - 1
@@ -45,7 +193,7 @@ def rests(problem: Problem, k: int, now: Any) -> bool:
     return True
 
 
-@merged
+@cached
 def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -> int:
     """Do one iteration; return how the relaxation ended, or UNFINISHED."""
     counters = problem.scratch.counters[0]
@@ -113,7 +261,7 @@ def take(problem: Problem, k: int, now: Any, trial: float, free: bool, tolerance
     """Take the step to the trial state, of energy ``trial``. free : Newton's own step, not held back."""
     missed = now.energy - trial - report.decrement
     foretold = tol.FORETOLD * missed * missed <= tolerance * scale_of(problem, now.slot, k) * report.decrement
-    accept(now, trial)
+    now.slot, now.energy = 1 - now.slot, trial
     if foretold and free:
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):

@@ -28,10 +28,17 @@ from solver._kernels.algebra import (
     mix,
     outer,
 )
+from solver._kernels.blocks import (
+    Gains,
+    least_curvature,
+    node_gradient,
+    node_hessian,
+    note_direction,
+    stiffened,
+    store_gains,
+)
 from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.joint import Gains, least_curvature, note_direction, stiffened, store_gains
-from solver._kernels.node import node_gradient, node_hessian
 from solver._kernels.rotation import jacobian_terms, sine_terms
 
 Value = tuple[Six, Six, Three, Three, Pair]
@@ -144,7 +151,7 @@ def column(c: Six, e: Three, p: Three, a: float, q: Three, b: float) -> Three:
 @kernel
 def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping: float, report: Any) -> bool:
     """``newton.sweep`` of a straight wire; same arguments, gains, report and result."""
-    chain, gain, twisting = problem.chain, problem.scratch.gain, problem.twisting
+    chain, gain = problem.chain, problem.scratch.gain
     bend, length, controls, frames = chain.bend, chain.length, problem.state.u[slot], problem.state.r[slot]
     value, decrement = (ZERO6, ZERO6, ZERO3, ZERO3, (0.0, 0.0)), 0.0
     for n in range(k, first_free, -1):
@@ -155,7 +162,7 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
         held = damping * bend[j] / (length[j] * length[j])
         value = cross_segment(length[j], add_node(value, gradient, hessian, held))
         turn, q_uu = joint_block(bend[j] * (1.0 + 0.01 * damping), u, value)
-        floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
+        floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, False)
         # written so that NaN, from an overflow in a long compressed chain, fails too
         if not least > -floor:
             note_direction(q_uu, j, least, report)

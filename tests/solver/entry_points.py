@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from solver._kernels import closed_form, energy, follow, newton, rollout, rotation
+from solver._kernels import closed_form, energy, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
 
 entry_point = numba.njit(**FAST)
@@ -39,7 +39,7 @@ def gradients(problem: Any, slot: int, k: int) -> None:
 
 @entry_point
 def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
-    follow.aim(chain, u, x, r, j)
+    start.aim(chain, u, x, r, j)
 
 
 @entry_point

@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver import Grid, GuideWire, Status, VesselWall
-from solver.introducer import base_frame
-from solver.relax import Settings
+from solver.relax import Settings, base_frame
 from solver.workspace import Workspace
 from tests.solver.entry_points import (
     aim,

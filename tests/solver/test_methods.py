@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import GuideWire, Insertion, VesselWall, relax
-from solver.introducer import base_frame
+from solver.relax import base_frame
 from tests.naive import chain as naive
 from tests.solver.scenes import Array, bend_grid, last, plane_grid
 

@@ -1,4 +1,8 @@
-"""What acts on a node and on its segment: gradient and Hessian of wall, friction and loads, in the node's frame."""
+"""What Newton's step is made of, node by node and joint by joint.
+
+What acts on a node and on its segment: gradient and Hessian of wall, friction and loads, in the node's frame. And a
+joint's block Q_uu of the Hessian, that block's inverse, and the joint's gains.
+"""
 
 from __future__ import annotations
 
@@ -29,15 +33,10 @@ from solver._kernels.algebra import (
     times,
     transpose,
 )
-from solver._kernels.data import Problem
-from solver._kernels.flags import inlined
+from solver._kernels.data import Chain, Problem
+from solver._kernels.flags import inlined, kernel
 from solver._kernels.friction import friction_derivatives
-
-
-@inlined
-def normal_at(frame: Nine, jet: Any) -> Three:
-    """Gradient of the distance at a point, in the frame of its node."""
-    return apply_transposed(frame, (jet[1], jet[2], jet[3]))
+from solver._kernels.rotation import jacobian_curvature
 
 
 @inlined
@@ -49,7 +48,7 @@ def wall_hessian(frame: Nine, jet: Any, n: Three, law: tuple[float, float], proj
     f = law[0]
     bend = (f * jet[4], f * jet[5], f * jet[6], f * jet[7], f * jet[8], f * jet[9])
     bend = conjugate(transpose(frame), bend)
-    return add6(dyad(law[1], n), without_negative(bend, n) if project else bend)
+    return add6(dyad(scaled(law[1], n), n), without_negative(bend, n) if project else bend)
 
 
 @inlined
@@ -107,7 +106,8 @@ def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Thr
         d = state.penetration[slot, p]
         if d != 0.0:
             size = wall_law.force(problem.stiffness, chain.weight[p], d)
-            force = scaled(size, normal_at(frame, state.jet[slot, p]))
+            jet = state.jet[slot, p]
+            force = scaled(size, apply_transposed(frame, (jet[1], jet[2], jet[3])))
             f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
         if problem.friction.coefficient > 0.0 and problem.friction.load[p] > 0.0:
             force, _ = friction_derivatives(problem, slot, n, p, frame)
@@ -129,7 +129,7 @@ def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool
         if d != 0.0:
             jet, weight = state.jet[slot, i], chain.weight[i]
             law = wall_law.force(stiffness, weight, d), wall_law.curvature(stiffness, weight, d)
-            normal = normal_at(frame, jet)
+            normal = apply_transposed(frame, (jet[1], jet[2], jet[3]))
             force, hessian = scaled(law[0], normal), wall_hessian(frame, jet, normal, law, project)
         if rubbing:
             more, stiffer = friction_derivatives(problem, slot, n, i, frame)
@@ -140,3 +140,84 @@ def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool
             dc, dh = lever(offset, force, hessian)
             c, h = add9(c, dc), add6(h, dh)
     return p, c, h
+
+
+Gains = tuple[Three, Nine, Nine]
+"""Of a joint: its step, and its answers to δp and δr."""
+
+
+@inlined
+def joint_hessian(
+    chain: Chain, j: int, u: Three, jac: Nine, hg: tuple[Six, Three], twisting: bool, damping: float
+) -> Six:
+    """Q_uu of a joint, from V_rr and V_r beyond it; damping adds that share of the joint's own stiffness."""
+    h, g = hg
+    q = add6(conjugate(transpose(jac), h), jacobian_curvature(g, u))
+    bend = chain.bend[j] * (1.0 + damping)
+    twist = chain.twist[j] * (1.0 + damping) if twisting else 0.0
+    return q[0] + bend, q[1] + bend, q[2] + twist, q[3], q[4], q[5]
+
+
+@inlined
+def least_curvature(q: Six, twisting: bool) -> float:
+    """Least eigenvalue of the bending block of Q_uu; -inf where the twist entry makes the whole indefinite."""
+    half = 0.5 * (q[0] - q[1])
+    least = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
+    if twisting and least > 0.0:
+        det = q[0] * q[1] - q[3] * q[3]
+        if not q[2] * det > q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]:
+            return -math.inf
+    return least
+
+
+@inlined
+def stiffened(q: Six, more: float) -> Six:
+    """Q_uu with more stiffness against bending."""
+    return q[0] + more, q[1] + more, q[2], q[3], q[4], q[5]
+
+
+@inlined
+def solve_block(q: Six, twisting: bool) -> Nine:
+    """Minus the inverse of Q_uu; without a twist variable its last row and column are zero."""
+    if not twisting:
+        det = q[0] * q[1] - q[3] * q[3]
+        return -q[1] / det, q[3] / det, 0.0, q[3] / det, -q[0] / det, 0.0, 0.0, 0.0, 0.0
+    c00 = q[1] * q[2] - q[5] * q[5]
+    c01 = q[4] * q[5] - q[3] * q[2]
+    c02 = q[3] * q[5] - q[4] * q[1]
+    c11 = q[0] * q[2] - q[4] * q[4]
+    c12 = q[3] * q[4] - q[0] * q[5]
+    c22 = q[0] * q[1] - q[3] * q[3]
+    det = -(q[0] * c00 + q[3] * c01 + q[4] * c02)
+    return full((c00 / det, c11 / det, c22 / det, c01 / det, c02 / det, c12 / det))
+
+
+@kernel
+def note_direction(q: Six, j: int, least: float, report: Any) -> None:
+    """Keep the direction of negative curvature of an indefinite block: the way off a saddle."""
+    report.joint = j
+    if least == -math.inf:
+        # bending alone is stable, together with twist it is not: bending follows the twist as it likes best
+        det = q[0] * q[1] - q[3] * q[3]
+        v0, v1 = (q[3] * q[5] - q[1] * q[4]) / det, (q[3] * q[4] - q[0] * q[5]) / det
+        size = math.sqrt(v0 * v0 + v1 * v1 + 1.0)
+        report.bend[0], report.bend[1], report.twist = v0 / size, v1 / size, 1.0 / size
+        report.curvature = (q[2] + q[4] * v0 + q[5] * v1) / (size * size)
+        return
+    half = 0.5 * (q[0] - q[1])
+    angle = 0.5 * math.atan2(q[3], half) + 0.5 * math.pi
+    report.bend[0], report.bend[1], report.twist = math.cos(angle), math.sin(angle), 0.0
+    report.curvature = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
+
+
+@inlined
+def store_gains(gain: Any, j: int, gains: Gains) -> None:
+    """Write joint j's gains, (3, 7): column 0 its step, 1-3 the answer to δp, 4-6 to δr."""
+    feed, p, r = gains
+    gain[j, 0, 0], gain[j, 1, 0], gain[j, 2, 0] = feed
+    gain[j, 0, 1], gain[j, 0, 2], gain[j, 0, 3] = p[:3]
+    gain[j, 1, 1], gain[j, 1, 2], gain[j, 1, 3] = p[3:6]
+    gain[j, 2, 1], gain[j, 2, 2], gain[j, 2, 3] = p[6:]
+    gain[j, 0, 4], gain[j, 0, 5], gain[j, 0, 6] = r[:3]
+    gain[j, 1, 4], gain[j, 1, 5], gain[j, 1, 6] = r[3:6]
+    gain[j, 2, 4], gain[j, 2, 5], gain[j, 2, 6] = r[6:]
