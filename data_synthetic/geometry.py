@@ -1,7 +1,5 @@
 """Vectors and curves as arrays; where the voxels of a scan lie, and which of them are near given points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The command line: argparse, never interactive; verbs are the modules of ``pipeline.commands``."""
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import os

@@ -4,8 +4,6 @@ Frozen dataclasses of read-only arrays; a Solution is the solver's own, a Compar
 Points are LPS mm, shape (n, 3), float64, ordered from entry to tip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar

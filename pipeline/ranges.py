@@ -1,7 +1,5 @@
 """Kinds of values that users may give; pydantic refuses any other at the door, naming the place and what was found."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Annotated
@@ -21,8 +19,7 @@ Profile = float | list[tuple[float, float]]
 
 def _not_zero(value: Vector) -> Vector:
     if math.hypot(*value) < 1e-9:
-        msg = "a direction of length zero; give three numbers that are not all 0"
-        raise ValueError(msg)
+        raise ValueError("a direction of length zero; give three numbers that are not all 0")
     return value
 
 
@@ -35,16 +32,13 @@ def _checked(value: Profile, info: ValidationInfo, *, lowest: float) -> Profile:
     name = info.field_name
     pairs = [(0.0, value)] if isinstance(value, (int, float)) else value
     if not pairs:
-        msg = f"{name}: an empty profile; give a number or [[distance from tip mm, value], ...]"
-        raise ValueError(msg)
+        raise ValueError(f"{name}: an empty profile; give a number or [[distance from tip mm, value], ...]")
     distances = [s for s, _ in pairs]
     if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
-        msg = f"{name}: distances from the tip {distances} must be >= 0 and must not decrease"
-        raise ValueError(msg)
+        raise ValueError(f"{name}: distances from the tip {distances} must be >= 0 and must not decrease")
     if any(not math.isfinite(v) or v < lowest for _, v in pairs):
         above = "" if lowest < 0 else " and above 0"
-        msg = f"{name}: values {[v for _, v in pairs]} must be finite{above}"
-        raise ValueError(msg)
+        raise ValueError(f"{name}: values {[v for _, v in pairs]} must be finite{above}")
     return value
 
 

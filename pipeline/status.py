@@ -1,7 +1,5 @@
 """What can go wrong, in the words that the user reads: with a frame, and with what the user wrote."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from enum import Enum
@@ -16,12 +14,8 @@ class FrameStatus(Enum):
     SEGMENT_FAILED = "no lumen could be segmented; see failures.csv for the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
     TRACE_FAILED = "the wire could not be followed as one curve from the entry; see failures.csv"
-    TRACE_LEFT_LUMEN = (
-        "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
-    )
-    TRACE_AMBIGUOUS = (
-        "the wire can be followed in more than one way here; look at the picture before using it"
-    )
+    TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
+    TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = "the wire's contrast over noise is too low to be traced alone; give a previous curve"
     LENGTH_MISMATCH = (
         "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "

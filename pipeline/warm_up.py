@@ -3,8 +3,6 @@
 The solver compiles in a process of its own beside the imaging kernels: on two cores that is nearly half the time.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

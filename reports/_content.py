@@ -1,7 +1,5 @@
 """What a page says, as text: values with three significant digits, trees, cards, tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -105,9 +103,7 @@ def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
     return table
 
 
-def grid(
-    table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = ""
-) -> Grid:
+def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = "") -> Grid:
     """Headings and rows for a template; columns without any value are left out.
 
     bad : for each row, whether it is marked.     nothing : what stands in an empty cell.

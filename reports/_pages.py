@@ -1,7 +1,5 @@
 """A page: its declared figures drawn and saved, its template filled and written."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every file is written to a temporary name beside its place, then renamed: nobody reads half a file."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

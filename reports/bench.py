@@ -20,9 +20,7 @@ from reports.tables import read, read_if_there, write_csv
 TARGETS_MM = (0.1, 0.01)
 
 
-def render_bench(
-    bench_csv: Path, out_dir: Path, *others: Path | None, note: str = "", embed: bool = False
-) -> Path:
+def render_bench(bench_csv: Path, out_dir: Path, *others: Path | None, note: str = "", embed: bool = False) -> Path:
     """Draw the figures and write bench.html into ``out_dir``; returns its path.
 
     others : as for ``read_bench``.     note : what the reader must know of machine and reference.
@@ -62,9 +60,7 @@ def read_bench(bench_csv: Path, *others: Path | None) -> BenchFiles:
     return BenchFiles(rows, stress, claims, orders)
 
 
-def pareto_front(
-    error: np.ndarray[Any, Any], cost: np.ndarray[Any, Any]
-) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def pareto_front(error: np.ndarray[Any, Any], cost: np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Mark the points (n,) that no other point beats in error and cost; NaN is never on the front."""
     order = np.lexsort((cost, error))
     costs = np.where(np.isfinite(error), cost, np.nan)[order]
@@ -114,8 +110,6 @@ def _claims(claims: pd.DataFrame) -> Grid | None:
 def _grid(table: pd.DataFrame, bad: Any = None) -> Grid | None:
     """Every column, with its meaning where it has one; None without rows."""
     known = {column.name: column.meaning for column in (*BENCH, *STRESS, *CLAIMS)}
-    kinds = {
-        n: "float" if pd.api.types.is_numeric_dtype(table[n]) else "text" for n in map(str, table.columns)
-    }
+    kinds = {n: "float" if pd.api.types.is_numeric_dtype(table[n]) else "text" for n in map(str, table.columns)}
     columns = [Column(name, "-", known.get(name, ""), kind) for name, kind in kinds.items()]
     return grid(table, columns, bad, nothing=NOTHING) if len(table) else None

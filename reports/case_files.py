@@ -1,7 +1,5 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -71,11 +69,9 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        msg = f"{path}: not JSON ({error}); remove the folder and run the case again"
-        raise ValueError(msg) from error
+        raise ValueError(f"{path}: not JSON ({error}); remove the folder and run the case again") from error
     if not isinstance(content, dict):
-        msg = f"{path}: got a {type(content).__name__}, expected an object; run the case again"
-        raise ValueError(msg)
+        raise ValueError(f"{path}: got a {type(content).__name__}, expected an object; run the case again")
     return content
 
 
@@ -95,5 +91,6 @@ def _frames(path: Path) -> tuple[ScanCrop | None, tuple[int, ...]]:
     try:
         return frames_file.read_scan(path), frames_file.frame_numbers(path)
     except OSError as error:
-        msg = f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"
-        raise ValueError(msg) from error
+        raise ValueError(
+            f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"
+        ) from error

@@ -3,8 +3,6 @@
 Reads errors.csv of every case of both folders and nothing else, so a folder of golden tables is enough.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -74,8 +72,7 @@ def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
     for name, value in table.items():
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not value >= 0:
-            msg = f"{path}: {name} = {value!r}; give the allowed change, a number from 0 up"
-            raise ValueError(msg)
+            raise ValueError(f"{path}: {name} = {value!r}; give the allowed change, a number from 0 up")
     return {name: float(value) for name, value in table.items()}
 
 
@@ -90,8 +87,7 @@ def diff_folders(out_a: Path, out_b: Path, tolerance: Mapping[str, float]) -> Di
         for out in (out_a, out_b)
     )
     if not before:
-        msg = f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote"
-        raise ValueError(msg)
+        raise ValueError(f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote")
     return diff_tables(before, after, tolerance)
 
 

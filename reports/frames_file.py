@@ -8,8 +8,6 @@
 Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The pages: one per case, one for the run. Built from files on disk, so they can be rebuilt at any time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -71,9 +69,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         "failures": failures,
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(next((run["overall"] for run in infos if run.get("overall")), {})),
-        "sections": draw_sections(
-            "run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed
-        ),
+        "sections": draw_sections("run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),

@@ -4,8 +4,6 @@ Needs the extra ``report3d`` (plotly). The script is written once per run, besid
 scene refers to it: 4.8 MB once instead of in each of 300 cases.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -93,9 +91,7 @@ def _line(points: Array, name: str, go: Any) -> Any:
 def _lumen(vertices: Array, triangles: Index, go: Any) -> Any:
     x, y, z = np.round(vertices, 3).T
     i, j, k = triangles.T
-    return go.Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, color="#9AA5B1", opacity=0.25, name="lumen", hoverinfo="skip"
-    )
+    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, color="#9AA5B1", opacity=0.25, name="lumen", hoverinfo="skip")
 
 
 def _layout(counts: Mapping[int, int], n_fixed: int) -> dict[str, Any]:

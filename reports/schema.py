@@ -59,8 +59,7 @@ class Column:
         known = ("float", "integer", "boolean", "text", "low", "high", *POOLED, *PLACES)
         wrong = {self.kind, self.better, self.pooled, *self.shown} - {"", *known}
         if wrong:
-            msg = f"column {self.name}: got {min(wrong)!r}; known are {', '.join(known)}"
-            raise ValueError(msg)
+            raise ValueError(f"column {self.name}: got {min(wrong)!r}; known are {', '.join(known)}")
 
     def with_word(self, word: str) -> str:
         """The name with a word before its unit: tip_mm with median is tip_median_mm."""
@@ -117,8 +116,7 @@ class Table:
         Raises ValueError where the table has a column of that name, or none of the name ``before``.
         """
         if column.name in self.names:
-            msg = f"{self.file} has a column {column.name!r}; choose another name"
-            raise ValueError(msg)
+            raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
         followers = [before] if before else [c.name for c in self.columns if c.unit == "s"]
         self.check(followers, self.file)
         place = self.names.index(followers[0]) if followers else len(self.columns)
@@ -131,8 +129,7 @@ class Table:
         if unknown:
             near = difflib.get_close_matches(unknown[0], self.names, n=1)
             hint = f"did you mean {near[0]}?" if near else f"known columns: {', '.join(self.names)}"
-            msg = f"unknown column {unknown[0]!r} in {where}; {hint}"
-            raise ValueError(msg)
+            raise ValueError(f"unknown column {unknown[0]!r} in {where}; {hint}")
 
     def _pool(self, column: Column) -> None:
         if self._pooled_in and column.pooled and column.pooled_name not in self._pooled_in.names:

@@ -32,8 +32,7 @@ def write(path: Path, table: Table, content: pd.DataFrame | Mapping[str, Any] | 
         table.check(content, path.name)
         sizes = {name: len(values) for name, values in content.items()}
         if len(set(sizes.values())) > 1:
-            msg = f"columns of {path.name} differ in length: {sizes}; give one value per point in each"
-            raise ValueError(msg)
+            raise ValueError(f"columns of {path.name} differ in length: {sizes}; give one value per point in each")
         content = pd.DataFrame(dict(content))
     elif not isinstance(content, pd.DataFrame):
         rows = [dict(row) for row in content]
@@ -56,8 +55,9 @@ def read(path: Path, table: Table) -> pd.DataFrame:
     try:
         return _conform(raw, table)
     except (ValueError, TypeError) as error:
-        msg = f"{path}: a field is not what its column says ({error}); write it again with `wireval run`"
-        raise ValueError(msg) from error
+        raise ValueError(
+            f"{path}: a field is not what its column says ({error}); write it again with `wireval run`"
+        ) from error
 
 
 def read_if_there(path: Path | None, table: Table) -> pd.DataFrame:
@@ -94,6 +94,5 @@ def _boolean(value: Any) -> bool | None:
     if pd.isna(value) or value == "":
         return None
     if str(value) not in _BOOLEANS:
-        msg = f"got {value!r} where True or False is expected"
-        raise ValueError(msg)
+        raise ValueError(f"got {value!r} where True or False is expected")
     return _BOOLEANS[str(value)]

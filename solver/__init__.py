@@ -30,8 +30,6 @@ What differs from the seed, and why, is said where it happens, in ``_kernels``: 
 fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 """
 
-from __future__ import annotations
-
 from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.relax import relax

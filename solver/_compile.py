@@ -5,8 +5,6 @@ inside ``minimise``. Here the mark that it compares is a hash of every file of o
 directly or through others. ``solver`` and ``data_synthetic`` hold one copy each, since they share no imports.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Named numbers of the solver, each with its reason."""
 
-from __future__ import annotations
-
 DECREMENT = 1e-9
 """Newton decrement relative to the energy at which a step counts as converged: the step that follows squares it."""
 ROUND_OFF = 1e-13

@@ -38,18 +38,14 @@ class Grid:
         for name, shape in (("spacing_mm", (3,)), ("origin_mm", (3,)), ("direction", (3, 3))):
             value = read_only(np.array(getattr(self, name), dtype=np.float64))
             if value.shape != shape or not np.all(np.isfinite(value)):
-                msg = f"grid {name}: got {value.tolist()}, expected {shape} finite numbers"
-                raise ValueError(msg)
+                raise ValueError(f"grid {name}: got {value.tolist()}, expected {shape} finite numbers")
             object.__setattr__(self, name, value)
         if self.values.ndim != 3:
-            msg = f"grid values: got an array of shape {self.values.shape}, expected three axes x, y, z"
-            raise ValueError(msg)
+            raise ValueError(f"grid values: got an array of shape {self.values.shape}, expected three axes x, y, z")
         if np.any(self.spacing_mm <= 0):
-            msg = f"grid spacing_mm: got {self.spacing_mm.tolist()}, expected three positive lengths in mm"
-            raise ValueError(msg)
+            raise ValueError(f"grid spacing_mm: got {self.spacing_mm.tolist()}, expected three positive lengths in mm")
         if not np.allclose(self.direction.T @ self.direction, np.eye(3), atol=1e-4):
-            msg = f"grid direction: got {self.direction.tolist()}, expected an orthonormal matrix"
-            raise ValueError(msg)
+            raise ValueError(f"grid direction: got {self.direction.tolist()}, expected an orthonormal matrix")
 
     @property
     def shape(self) -> tuple[int, int, int]:

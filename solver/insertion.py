@@ -3,8 +3,6 @@
 Several minima exist, so a depth is reached by replaying its history, never by jumping to it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -80,9 +78,7 @@ class Insertion:
         """Where the base is turned to."""
         return float(self._work.place["roll"][0])
 
-    def to_depths(
-        self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0
-    ) -> Iterator[Solution]:
+    def to_depths(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base, one for all or

@@ -3,8 +3,6 @@
 Also the settings of a relaxation, and the frame in which the introducer holds the wire.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

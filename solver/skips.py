@@ -7,8 +7,6 @@ An insertion or a relaxation that is made inside ``off`` works without the named
 answer stays the same, and the benchmark to measure what each skip saves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar

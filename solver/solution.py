@@ -1,7 +1,5 @@
 """What a relaxation returns: how it ended, every status with the sentence that the user reads, and the wire."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -20,9 +18,7 @@ class Status(Enum):
         "loosen solver.tolerance, or lower the ratio of wall to bending stiffness"
     )
     FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
-    FOLDED = (
-        "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
-    )
+    FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
     TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise solver.max_joints"

@@ -1,7 +1,5 @@
 """The vessel wall: Hooke's law on the signed distance to the lumen, interpolated so that energies can be checked."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,9 +17,7 @@ def _checked(grid: Grid) -> Array:
     """The distances as float64, or a refusal of what no distance can be."""
     values = np.array(grid.values, dtype=np.float64, order="C")
     if min(values.shape) < 2:
-        refuse(
-            "wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map"
-        )
+        refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
     bad = ~np.isfinite(values)
     if bad.any():
         where = [int(i) for i in np.argwhere(bad)[0]]
@@ -48,9 +44,7 @@ class VesselWall:
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
         if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
-            refuse(
-                "wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual"
-            )
+            refuse("wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual")
         if not (math.isfinite(self.friction) and self.friction >= 0):
             refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
         _ = self.samples
@@ -71,9 +65,7 @@ class VesselWall:
             return 0
         name, _, count = self.hull.partition(":")
         if name != "samples" or not count.isdigit() or not 1 <= int(count) <= 256:
-            refuse(
-                "wall", "hull", self.hull, '"offset" or "samples:N", N from 1 to 256', "samples:16 is usual"
-            )
+            refuse("wall", "hull", self.hull, '"offset" or "samples:N", N from 1 to 256', "samples:16 is usual")
         return int(count)
 
     def hull_points(self, radius_mm: float) -> tuple[Array, float]:

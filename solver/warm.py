@@ -1,7 +1,5 @@
 """Compile everything once, so that no measurement and no user's first step pays for it."""
 
-from __future__ import annotations
-
 import gc
 import inspect
 import subprocess

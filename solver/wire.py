@@ -1,7 +1,5 @@
 """The guide wire: radius, and stiffness and rest shape as functions of the distance from its tip."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -33,13 +31,7 @@ def _table(name: str, value: Quantity, segment_mm: float) -> tuple[Array, Array]
         allowed = "a number, rows of [distance from tip mm, value], or a callable"
         refuse("wire", name, array.tolist(), allowed, "write [[0.0, a], [30.0, b]]")
     if np.any(np.diff(array[:, 0]) < 0) or array[0, 0] < 0:
-        refuse(
-            "wire",
-            name,
-            array[:, 0].tolist(),
-            "distances from the tip that never fall, from 0",
-            "sort the rows",
-        )
+        refuse("wire", name, array[:, 0].tolist(), "distances from the tip that never fall, from 0", "sort the rows")
     return array[:, 0].copy(), array[:, 1].copy()
 
 
@@ -68,13 +60,7 @@ class GuideWire:
         if not (math.isfinite(self.radius_mm) and self.radius_mm >= 0):
             refuse("wire", "radius_mm", self.radius_mm, "a length of 0 or more", "0.18 is a 0.014 inch wire")
         if not self.torsional_stiffness_N_mm2 > 0:
-            refuse(
-                "wire",
-                "torsional_stiffness_N_mm2",
-                self.torsional_stiffness_N_mm2,
-                "above 0, or inf",
-                "use inf",
-            )
+            refuse("wire", "torsional_stiffness_N_mm2", self.torsional_stiffness_N_mm2, "above 0, or inf", "use inf")
         bend_at, bend = _table("bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, self.segment_mm)
         rest_at, rest = _table("rest_curvature_per_mm", self.rest_curvature_per_mm, self.segment_mm)
         if not np.all(np.isfinite(bend)) or np.any(bend <= 0):

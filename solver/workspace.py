@@ -1,7 +1,5 @@
 """A wire in memory: the arrays that the kernels work on, grown as the wire goes in, and the way into the kernels."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -85,9 +83,7 @@ class Workspace:
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
-            friction=data.Friction(
-                friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)
-            ),
+            friction=data.Friction(friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)),
             chain=self._empty_chain(capacity, points),
             state=state,
             scratch=scratch,
@@ -156,9 +152,7 @@ class Workspace:
     def _bind(self) -> None:
         """Take a handle of the arrays, wherever in memory they are now."""
         settings = self.introducer, self.limits
-        self._handle = handle_of(
-            Contents(self.problem, self.table, *settings, self.place, self.report, self.force)
-        )
+        self._handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""

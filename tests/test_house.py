@@ -19,9 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("solver", "pipeline", "reports", "data_synthetic")
 SOURCES = [p for package in PACKAGES for p in sorted((ROOT / package).rglob("*.py")) if "out" not in p.parts]
 MAX_LINES, MAX_ARGUMENTS = 40, 7
-LONG = {
-    "solver/_kernels/newton.py:sweep": "parted, the compiler fuses other operations: the last bit differs",
-}
+LONG = {"solver/_kernels/newton.py:sweep": "parted, the compiler fuses other operations: the last bit differs"}
 MANY_ARGUMENTS = {
     "solver/relax.py:relax": "public contract",
     "solver/insertion.py:__init__": "public contract",
@@ -63,9 +61,7 @@ def test_every_module_says_what_it_is_for(path: Path) -> None:
 
 def test_functions_stay_readable() -> None:
     assert set(beyond(SOURCES, code_lines, MAX_LINES)) == set(LONG), "split these, or say in LONG why not"
-    assert set(beyond(SOURCES, argument_count, MAX_ARGUMENTS)) == set(MANY_ARGUMENTS), (
-        "named tuples, as the kernels do"
-    )
+    assert set(beyond(SOURCES, argument_count, MAX_ARGUMENTS)) == set(MANY_ARGUMENTS), "named tuples, as the kernels do"
 
 
 def test_the_limits_bite(tmp_path: Path) -> None:
@@ -99,9 +95,7 @@ def test_texts_name_no_machine(path: Path) -> None:
 def test_help_imports_nothing_heavy() -> None:
     """`wireval --help` must be instant: the command line imports a command's modules inside the command."""
     code = "import sys, pipeline.cli; pipeline.cli._parser(); print(*sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT)
     assert not {"numpy", "SimpleITK", "numba", "matplotlib", "pandas"} & set(done.stdout.split())
 
 

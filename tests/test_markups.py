@@ -21,9 +21,7 @@ POINTS = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [8.0, 8.0, 9.0]])
     [({}, 1.0), ({"coordinateSystem": "LPS"}, 1.0), ({"coordinateSystem": "RAS"}, -1.0)],
     ids=["unsaid", "LPS", "RAS"],
 )
-def test_both_readers_agree_on_the_coordinate_system(
-    tmp_path: Path, said: dict[str, Any], flip: float
-) -> None:
+def test_both_readers_agree_on_the_coordinate_system(tmp_path: Path, said: dict[str, Any], flip: float) -> None:
     """A file that does not say is LPS, as for 3D Slicer itself."""
     path = tmp_path / "curve.mrk.json"
     radius = {"name": "Radius", "controlPointValues": [1.0, 1.0, 1.0]}

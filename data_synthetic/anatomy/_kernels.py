@@ -1,7 +1,5 @@
 """Compiled signed distance of a smooth union of swept tubes: arrays and numbers in, arrays out."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -137,11 +135,7 @@ def tube_distance(p: Vector, t: int, limit: float, tubes: TubeTables) -> tuple[f
     if sample < 0:
         return FAR, 0.0, 0.0, 0.0
     if tubes.starts[t + 1] - first == 1:
-        vx, vy, vz = (
-            p[0] - tubes.points[first, 0],
-            p[1] - tubes.points[first, 1],
-            p[2] - tubes.points[first, 2],
-        )
+        vx, vy, vz = (p[0] - tubes.points[first, 0], p[1] - tubes.points[first, 1], p[2] - tubes.points[first, 2])
         length = max(np.sqrt(vx * vx + vy * vy + vz * vz), TINY_LENGTH_MM)
         return length - tubes.radii[first], vx / length, vy / length, vz / length
     s = foot(p, sample, t, tubes)

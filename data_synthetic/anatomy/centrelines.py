@@ -1,7 +1,5 @@
 """Centrelines with radii from files: SWC trees (BraVa) and 3D Slicer curves with a Radius measurement."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,21 +39,21 @@ def read_tree(path: str | Path) -> Tree:
         ends = np.cumsum([len(own) for own, _ in curves])
         starts = np.setdiff1d(np.arange(ends[-1]), ends - 1)  # of the edges: a curve's last point begins none
         return Tree(points, radii, np.column_stack([starts, starts + 1]), slice(0, int(ends[0])))
-    msg = f"anatomy: {path}: got {path.suffix!r}; allowed: .swc, .mrk.json (with a Radius measurement); convert it"
-    raise ValueError(msg)
+    raise ValueError(
+        f"anatomy: {path}: got {path.suffix!r}; allowed: .swc, .mrk.json (with a Radius measurement); convert it"
+    )
 
 
 def _read_swc(path: Path) -> Tree:
     """Columns id, type, x, y, z, radius, parent; comments start with #."""
     rows = np.loadtxt(path, comments="#", ndmin=2)
     if rows.shape[1] != 7:
-        msg = f"anatomy: {path}: got {rows.shape[1]} columns; an SWC line has 7: id type x y z radius parent"
-        raise ValueError(msg)
+        raise ValueError(
+            f"anatomy: {path}: got {rows.shape[1]} columns; an SWC line has 7: id type x y z radius parent"
+        )
     place = {int(i): k for k, i in enumerate(rows[:, 0])}
     points, radii = rows[:, 2:5], rows[:, 5]
-    edges = np.array(
-        [(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64
-    )
+    edges = np.array([(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     # points that coincide (BraVa repeats branch points) are one, of the larger radius: an edge between them has no way
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
@@ -73,10 +71,9 @@ def _read_curve(path: Path) -> tuple[Array, Array]:
     points = np.array([p["position"] for p in markup["controlPoints"]], dtype=np.float64)
     if markup.get("coordinateSystem", "LPS") in ("RAS", 0):
         points *= [-1.0, -1.0, 1.0]
-    radii = next(
-        (m.get("controlPointValues") for m in markup.get("measurements", []) if m["name"] == "Radius"), None
-    )
+    radii = next((m.get("controlPointValues") for m in markup.get("measurements", []) if m["name"] == "Radius"), None)
     if radii is None or len(radii) != len(points):
-        msg = f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
-        raise ValueError(msg)
+        raise ValueError(
+            f"anatomy: {path}: got no Radius measurement per control point; add one in Slicer (Extract Centerline)"
+        )
     return points, np.array(radii, dtype=np.float64)

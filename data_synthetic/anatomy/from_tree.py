@@ -1,7 +1,5 @@
 """Swept tubes from a jagged tree: one smooth tube along the way of the wire, one for every branch near it."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import coo_array
@@ -95,8 +93,9 @@ def _widest_path(tree: Tree) -> Index:
                 score = min(_length(tree, path), LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
                 best = max(best, (score, path), key=lambda found: found[0])
     if len(best[1]) < 4:
-        msg = f"anatomy: got no path with radii from {WIDEST_MM} down to {NARROWEST_MM} mm; check the file's units (mm)"
-        raise ValueError(msg)
+        raise ValueError(
+            f"anatomy: got no path with radii from {WIDEST_MM} down to {NARROWEST_MM} mm; check the file's units (mm)"
+        )
     return best[1]
 
 

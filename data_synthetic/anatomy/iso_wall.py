@@ -4,8 +4,6 @@ Deliberately not the way in which the judged pipeline finds its lumen: one thres
 marching cubes, exact distances to triangles, a cubic B-spline through them on a grid of half a voxel.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Vessels that can be drawn on paper; every one starts below z = 0 and leads upwards, +z, at the origin."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep

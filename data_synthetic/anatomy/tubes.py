@@ -5,8 +5,6 @@ and inside as long as the radius stays below the centreline's radius of curvatur
 smooth minimum (C2, of compact support: nothing changes where two values differ by more than the blend width).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -56,8 +54,9 @@ def sweep(name: str, points_mm: ArrayLike, radii_mm: ArrayLike, *, blend_mm: flo
     control = np.atleast_2d(np.asarray(points_mm, dtype=np.float64))
     radius = np.broadcast_to(np.asarray(radii_mm, dtype=np.float64), len(control))
     if len(control) < 2 or control.shape[1] != 3 or np.any(radius <= 0):
-        msg = f"tube {name}: got points {control.shape} and radii from {radius.min():g} mm; give (n >= 2, 3) and > 0"
-        raise ValueError(msg)
+        raise ValueError(
+            f"tube {name}: got points {control.shape} and radii from {radius.min():g} mm; give (n >= 2, 3) and > 0"
+        )
     chord = arc_lengths(control)
     curve = CubicSpline(chord, control, bc_type="natural" if len(control) > 2 else "not-a-knot")
     fine = np.linspace(0.0, chord[-1], max(200, int(chord[-1] / 0.01)))

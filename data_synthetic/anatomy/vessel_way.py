@@ -1,7 +1,5 @@
 """A way through the vessel of a real scan: from its widest end past its widest place."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, convolve, distance_transform_edt, label, maximum_filter
@@ -60,9 +58,7 @@ def _ends(vessel: Mask) -> Index:
     return np.argwhere(skeleton & (neighbours == 2))
 
 
-def _past(
-    search: MCP_Geometric, ends: Index, widest: Index, inside: Array, grid: ScanGrid
-) -> tuple[Index, int]:
+def _past(search: MCP_Geometric, ends: Index, widest: Index, inside: Array, grid: ScanGrid) -> tuple[Index, int]:
     """The path that shares most with the one to the widest place and goes on furthest; where the two part."""
     to_widest = [tuple(p) for p in search.traceback(tuple(widest.tolist()))]
     best: tuple[float, Index, int] = (-np.inf, np.zeros((0, 3), dtype=np.int64), 0)

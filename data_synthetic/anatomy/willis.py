@@ -6,8 +6,6 @@ Diameters in mm, mean (sd). Rai et al., J NeuroIntervent Surg 5 (2013) 371: cave
 P1 2.14 (length 5), P2 2.10, basilar length 29. Where no spread is given, 15 % is taken. LPS mm, about the sella.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,9 +63,7 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -
     drawn = mean + sd * np.clip(rng.normal(0.0, plan.spread, len(mean)), -SPREAD_LIMIT, SPREAD_LIMIT)
     radius = dict(zip(DIAMETERS_MM, (0.5 * drawn).tolist(), strict=True))
     rows = np.loadtxt(CENTRELINES, dtype=str, delimiter=",", skiprows=1)
-    points = {
-        name: rows[rows[:, 0] == name, 1:].astype(np.float64) for name in np.unique(rows[:, 0]).tolist()
-    }
+    points = {name: rows[rows[:, 0] == name, 1:].astype(np.float64) for name in np.unique(rows[:, 0]).tolist()}
     if plan.tortuous_vertebrals:
         points["vertebral"] += SWING_MM
     wide, end = radius["cavernous"], radius["terminus"]

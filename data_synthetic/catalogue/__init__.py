@@ -3,8 +3,6 @@
 A new scene is one function in ``plain``, ``hard`` or ``willis``, below the decorator ``scene``.
 """
 
-from __future__ import annotations
-
 from data_synthetic.catalogue import hard, plain, willis
 from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.own_anatomy import from_anatomy
@@ -35,8 +33,7 @@ def names() -> tuple[str, ...]:
 def describe(name: str) -> NamedScene:
     """The scene of that name; KeyError with the allowed names otherwise."""
     if name not in _BY_NAME:
-        msg = f"synthetic scene: got {name!r}; allowed: {', '.join(_BY_NAME)}; choose one of these"
-        raise KeyError(msg)
+        raise KeyError(f"synthetic scene: got {name!r}; allowed: {', '.join(_BY_NAME)}; choose one of these")
     return _BY_NAME[name]
 
 
@@ -58,8 +55,9 @@ def build(
     until that moves nothing by more than 0.01 mm.
     """
     if scanner not in SCANNERS:
-        msg = f"synthetic scene {name}: scanner: got {scanner!r}; allowed: {', '.join(SCANNERS)}; choose one"
-        raise ValueError(msg)
+        raise ValueError(
+            f"synthetic scene {name}: scanner: got {scanner!r}; allowed: {', '.join(SCANNERS)}; choose one"
+        )
     wanted = Wanted(frames, size, voxel_mm, seed)
     problems = wanted.problems()
     if problems:

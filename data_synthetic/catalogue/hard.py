@@ -1,7 +1,5 @@
 """Scans that go wrong: what a scanner, a phantom or a person does to an otherwise simple scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a study needs to be one: at least one frame, voxels that show lumen and wire, a scan that holds the way."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from dataclasses import dataclass

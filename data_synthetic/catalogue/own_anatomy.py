@@ -1,7 +1,5 @@
 """A scene whose anatomy comes from a file: real vessels, made-up wire."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A scene in a real scan: real voxels, real vessel, a made-up wire whose shape is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

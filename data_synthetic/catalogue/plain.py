@@ -1,7 +1,5 @@
 """Vessels that can be drawn on paper: what they should show is known beforehand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A named situation, and what it is made of before anything is computed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """From a scene to a study: truth computed, phantom voxelised, manifest made as inexact as a real one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -50,18 +48,14 @@ class Study:
         return (self.frame(i) for i in range(len(self.truth)))
 
 
-def make_study(
-    scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth_step_mm: float | None
-) -> Study:
+def make_study(scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth_step_mm: float | None) -> Study:
     """Build a scene; one in a real scan brings its own voxels and scanner. truth_step_mm : as in converged_truth."""
     seed, (frames, size, voxel_mm) = wanted.seed, wanted.of(scene)
     setup = scene.setup(np.random.default_rng([seed, 1]), frames)
     grid, scanner = scene.scan or (scan_grid(setup, size, voxel_mm), scanner)
     truth, quality = converged_truth(setup.insertion(), setup.depths_mm, setup.rolls_deg, truth_step_mm)
     # voxelising is done once per place of the phantom, the last one kept; moving it by +shift moves the grid by -shift
-    at = lru_cache(maxsize=1)(
-        lambda shift: scanner(setup, replace(grid, origin_mm=grid.origin_mm - np.array(shift)))
-    )
+    at = lru_cache(maxsize=1)(lambda shift: scanner(setup, replace(grid, origin_mm=grid.origin_mm - np.array(shift))))
 
     def frame(number: int) -> Scan:
         shift = np.zeros(3) if setup.motion_mm is None else setup.motion_mm[number]

@@ -1,7 +1,5 @@
 """The circle of Willis: the anatomy of the work that this project validates."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -46,9 +44,7 @@ def willis_setup(
     return Setup(anatomy, carotid, ENTRY_ARC_MM, depths, rolls, CENTRE_MM, bone=skull_base())
 
 
-@scene(
-    "circle-of-willis", tries="load segment trace simulate compare report", fov_mm=76.8, size=256, frames=30
-)
+@scene("circle-of-willis", tries="load segment trace simulate compare report", fov_mm=76.8, size=256, frames=30)
 def terminus(rng: np.random.Generator, frames: int) -> Setup:
     """a whole circle of Willis: through the siphon into an aneurysm of the carotid terminus"""
     return willis_setup(rng, frames, WillisPlan(), 6.0)

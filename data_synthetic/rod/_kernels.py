@@ -6,8 +6,6 @@ angles, so stretch and twist cost energy instead of being ruled out. Edge 0 is t
 edge j >= 1 ends in node j. Unknowns are interleaved: angle of edge j at 4(j-1), node j at 4(j-1)+1..3.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

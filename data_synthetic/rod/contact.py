@@ -4,16 +4,12 @@ A wire bears on a crest (an aneurysm's neck, a fork) over sqrt(2 d rho), 0.2 to 
 as that, the wall's energy would depend on where the nodes happen to lie, and the truth would converge in first order.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from data_synthetic.geometry import Array, Index
 from data_synthetic.rod.rod import Rod, Wall
 
-PLACES, WEIGHTS = (
-    0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True)
-)
+PLACES, WEIGHTS = (0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
 """Gauss points of an edge, as shares of it, and their weights, which add up to one."""
 
 STEEPEST = 1.1

@@ -7,8 +7,6 @@ Slip about the wire's own axis (rolling) is not resisted: its arm is the wire's 
 this is computed.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Equilibrium of a clamped, stretchable Kirchhoff rod against a wall: Newton's method on node positions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ wall as an analytic distance instead of voxels. What is shared is the physics: b
 as functions of the distance from the tip, a wall energy of half k d squared per mm, a clamp at the entry.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -91,9 +89,7 @@ def replay(
             jump = max(jump, float(np.linalg.norm(moved)) - abs(depth_next - depth))
             depth, roll, effort = depth_next, roll_next, effort + state.iterations
         rod = _rod(insertion, depth, roll)
-        state = relax_with_friction(
-            rod, state.shape, state.anchor, state.contact_N, insertion.friction, NEWTON_FORCE_N
-        )
+        state = relax_with_friction(rod, state.shape, state.anchor, state.contact_N, insertion.friction, NEWTON_FORCE_N)
         yield TrueFrame(
             depth_mm=depth,
             roll_deg=roll,
@@ -112,9 +108,7 @@ def _advances(
     """Depths and rolls on the way from one frame to the next, each given as (from, to); the last is the target."""
     (depth, target), (roll, target_roll) = depths, rolls
     advance = insertion.advance_mm or insertion.step_mm
-    count = max(
-        int(np.ceil(abs(target - depth) / advance)), int(np.ceil(abs(target_roll - roll) / ROLL_STEP_DEG)), 1
-    )
+    count = max(int(np.ceil(abs(target - depth) / advance)), int(np.ceil(abs(target_roll - roll) / ROLL_STEP_DEG)), 1)
     for i in range(1, count + 1):
         yield depth + (target - depth) * i / count, roll + (target_roll - roll) * i / count
 
@@ -127,9 +121,7 @@ def _rod(insertion: TrueInsertion, depth: float, roll_deg: float) -> Rod:
     return replace(rod, wall=insertion.wall, stiffness_N_mm2=insertion.stiffness_N_mm2)
 
 
-def _advance(
-    insertion: TrueInsertion, state: Equilibrium, old: float, new: float, roll_deg: float
-) -> Equilibrium:
+def _advance(insertion: TrueInsertion, state: Equilibrium, old: float, new: float, roll_deg: float) -> Equilibrium:
     """Push (or pull) and roll a little, then relax: the guess is the wire slid along its own curve."""
     rod = _rod(insertion, new, roll_deg)
     ends, arcs = ends_of(edge_lengths(old, insertion.step_mm)), ends_of(rod.lengths)

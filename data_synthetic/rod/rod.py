@@ -1,7 +1,5 @@
 """A wire cut into edges, and the shape that its nodes give it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

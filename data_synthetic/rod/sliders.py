@@ -45,11 +45,7 @@ class Sliders:
         stiffness = self.limit / np.maximum(size, ELASTIC_SLIP_MM)
         gradient.reshape(-1, 4)[:, 1:] += (stiffness[:, None] * stretch)[1:]
         along = np.where(slides[:, None], stretch / np.maximum(size, ELASTIC_SLIP_MM)[:, None], 0.0)
-        block = (
-            np.eye(3)
-            - self.normal[:, :, None] * self.normal[:, None, :]
-            - along[:, :, None] * along[:, None, :]
-        )
+        block = np.eye(3) - self.normal[:, :, None] * self.normal[:, None, :] - along[:, :, None] * along[:, None, :]
         block *= stiffness[:, None, None]
         node = 4 * np.arange(len(points) - 1)
         for a in range(3):

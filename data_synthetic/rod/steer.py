@@ -1,7 +1,5 @@
 """Which roll keeps the wire on its way: tried out coarsely, as an operator would."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The true wire of a study, on nodes so close that halving their spacing moves nothing, and how far to trust it."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os
@@ -81,10 +79,7 @@ def at_step(insertion: TrueInsertion, step_mm: float) -> TrueInsertion:
 
 
 def converged_truth(
-    insertion: TrueInsertion,
-    depths_mm: Sequence[float],
-    rolls_deg: Sequence[float],
-    step_mm: float | None = None,
+    insertion: TrueInsertion, depths_mm: Sequence[float], rolls_deg: Sequence[float], step_mm: float | None = None
 ) -> tuple[tuple[TrueFrame, ...], dict[str, float]]:
     """The true wire at every depth, and its quality; nodes are put closer until halving them moves nothing.
 

@@ -1,7 +1,5 @@
 """The true wire's properties: profiles over the distance from its tip, and their means over cells."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,9 +39,7 @@ def cell_means(profile: Sequence[tuple[float, float]], low: Array, high: Array) 
         inside = np.clip(s, place[0], place[-1])
         k = np.clip(np.searchsorted(place, inside, side="right") - 1, 0, max(len(place) - 2, 0))
         width = np.diff(place, append=place[-1] + 1.0)[k]
-        slope = np.where(
-            width > 0, np.diff(value, append=value[-1])[k] / np.where(width > 0, width, 1.0), 0.0
-        )
+        slope = np.where(width > 0, np.diff(value, append=value[-1])[k] / np.where(width > 0, width, 1.0), 0.0)
         u = inside - place[k]
         middle = integral[k] + value[k] * u + 0.5 * slope * u * u
         return np.asarray(middle + (s - inside) * np.where(s > place[-1], value[-1], value[0]))

@@ -1,7 +1,5 @@
 """From vessels and wires to grey values: partial volume, point spread, noise; or a whole rotational X-ray run."""
 
-from __future__ import annotations
-
 from data_synthetic.scanner.phantom import Greys, Phantom
 from data_synthetic.scanner.psf import PsfScanner
 

@@ -4,8 +4,6 @@ RTK (itk-rtk, extra [conebeam]): Rit et al., J. Phys. Conf. Ser. 489 (2014) 0120
 (Med Phys 9 (1982) 254), FDK (JOSA A 1 (1984) 612), projections after Joseph (IEEE TMI 1 (1982) 192).
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,9 +15,7 @@ from scipy.ndimage import find_objects
 
 from data_synthetic.geometry import Array, ScanGrid, Volume
 
-ABSENT = (
-    "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
-)
+ABSENT = "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
 """What is said where RTK is missing."""
 
 MARGIN = 1.16

@@ -1,7 +1,5 @@
 """Partial volume: which share of every voxel lies inside a shape."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from data_synthetic._compile import on_disk

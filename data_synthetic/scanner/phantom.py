@@ -1,7 +1,5 @@
 """What a scanner sees of a scene, and in which grey values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field

@@ -1,7 +1,5 @@
 """A study as files that any other tool can read: volumes, manifest.toml, truth.json."""
 
-from __future__ import annotations
-
 from data_synthetic.write.earlier import earlier_files, in_the_way
 from data_synthetic.write.study_files import write_study
 from data_synthetic.write.volumes import FORMATS

@@ -1,7 +1,5 @@
 """What lies already in the folder of a study: an earlier study of ours is replaced, nothing else is touched."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import tomllib
@@ -28,9 +26,7 @@ def earlier_files(folder: Path) -> list[Path]:
         return []
     paths = [folder / HDF5_FILE] if format == "h5" else [folder / n for n in volume_names(format, frames)]
     # a DICOM series is a folder of slices: those that are numbered as we number them
-    slices = [
-        p for path in paths for p in ([path] if path.is_file() else sorted(path.glob("[0-9]" * 4 + ".dcm")))
-    ]
+    slices = [p for path in paths for p in ([path] if path.is_file() else sorted(path.glob("[0-9]" * 4 + ".dcm")))]
     return [*slices, folder / TRUTH, folder / MANIFEST]
 
 

@@ -1,7 +1,5 @@
 """The files of a study: its volumes, what is known of it as truth.json, and the manifest by which it is run."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping
@@ -15,9 +13,7 @@ from data_synthetic.write.volumes import FORMATS, manifest_names, write_volume
 Progress = Callable[[int, int], None]
 
 
-def write_study(
-    study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None
-) -> Path:
+def write_study(study: Study, folder: str | Path, format: str = "mha", progress: Progress | None = None) -> Path:
     """Write reference, frames, truth.json and manifest.toml into ``folder``; returns the manifest's path.
 
     format : one of FORMATS.     progress : called with (frames done, frames in all).
@@ -26,8 +22,7 @@ def write_study(
     folder, frames = Path(folder), len(study.truth)
     if format not in FORMATS:
         allowed = f"allowed: {', '.join(FORMATS)}; choose one"
-        msg = f"synthetic study {study.name}: format: got {format!r}; {allowed}"
-        raise ValueError(msg)
+        raise ValueError(f"synthetic study {study.name}: format: got {format!r}; {allowed}")
     problems = in_the_way(folder, format, frames)
     if problems:
         raise ValueError("; ".join(problems))

@@ -1,7 +1,5 @@
 """Volumes on disk in the containers that scanners and their software use; arrays are indexed x, y, z."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Grids: the order of their memory, where one lies in another, and the noise in their values."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

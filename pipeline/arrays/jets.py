@@ -3,8 +3,6 @@
 Coordinates of points are index * spacing (mm along the grid's axes); derivatives are per mm.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

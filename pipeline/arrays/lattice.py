@@ -4,8 +4,6 @@ No fast-math: a result does not depend on how the work is split into functions. 
 a named tuple: counting references to its fields once a round makes the loop five times as long.
 """
 
-from __future__ import annotations
-
 import contextlib
 import mmap
 from typing import Any

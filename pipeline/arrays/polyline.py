@@ -1,7 +1,5 @@
 """Polylines: resampling, truncation and extension by arc length, tangents."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The promises of the solver, each one function: numbers, their aims, and whether they are met."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -205,10 +203,7 @@ def skips() -> Iterator[Claim]:
         where = f"skip {name} off ({scene.name}, hull {hull})"
         yield Claim(f"{where}: wire apart", apart, "mm", aim, apart <= 1e-6)
         asked = SolverSetting(segment, hull=hull)
-        seconds = [
-            [timed(partial(_without, s, scene, asked, wall), 1)[0] for s in (None, name)]
-            for _ in range(PAIRS)
-        ]
+        seconds = [[timed(partial(_without, s, scene, asked, wall), 1)[0] for s in (None, name)] for _ in range(PAIRS)]
         quick, slow = np.median(seconds, axis=0)
         yield Claim(f"{where}: time, times", float(slow / quick), "1")
 

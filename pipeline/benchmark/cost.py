@@ -1,7 +1,5 @@
 """Run time against error: scenes x settings, one row each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -60,9 +58,7 @@ def costs(
             yield _row(scene, setting, run, seconds, limit)
 
 
-def _row(
-    scene: BenchScene, setting: SolverSetting, run: Run, seconds: float, limit: Reference
-) -> dict[str, Any]:
+def _row(scene: BenchScene, setting: SolverSetting, run: Run, seconds: float, limit: Reference) -> dict[str, Any]:
     """Cost and error of one run; the errors of a run that did not reach the depth are NaN."""
     shape, tip, energy = limit.errors_of(run)
     looked = run.work.get("wall_look_ups", 0.0)

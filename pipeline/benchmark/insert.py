@@ -1,7 +1,5 @@
 """One insertion of one scene with one setting, and what it cost."""
 
-from __future__ import annotations
-
 import statistics
 from collections import Counter
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Work in a process of its own: what crashes or hangs costs itself alone."""
 
-from __future__ import annotations
-
 import multiprocessing
 import signal
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A user's own study as a scene of the benchmark: its lumen, its wire, its depth."""
 
-from __future__ import annotations
-
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
@@ -24,8 +22,7 @@ def scene_of(case: Case, config: Config) -> BenchScene:
     silent = Log(lambda *_: None)
     known = run_stages(Context(case, config, Store(default_root()), silent), until="segment")
     if known.failure is not None or known.lumen is None:
-        msg = f"bench: case {case.id!r}: {known.failure}"
-        raise NoScene(msg)
+        raise NoScene(f"bench: case {case.id!r}: {known.failure}")
     return BenchScene(
         case.id,
         max(case.insertion_mm),

@@ -1,7 +1,5 @@
 """The page of a benchmark, made of the tables that its parts have left in the folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

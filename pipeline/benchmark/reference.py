@@ -1,7 +1,5 @@
 """The curve that errors are measured against: the limit of short segments by Richardson's extrapolation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 
@@ -58,8 +56,7 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
             return Reference(arcs, limit, second + (second - first) / 3.0, shape_error(fine, limit)[0])
     last = next(run.last for run in runs if not run.reached)
     where = f"its reference stopped at {last.depth_mm:.2f} of {scene.depth_mm:g} mm: {last.status.value}"
-    msg = f"benchmark: scene {scene.name}: {where}; allowed: a scene that can be passed; lower its depth"
-    raise ValueError(msg)
+    raise ValueError(f"benchmark: scene {scene.name}: {where}; allowed: a scene that can be passed; lower its depth")
 
 
 def arc_samples(depth_mm: float) -> Array:

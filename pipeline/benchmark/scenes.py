@@ -1,7 +1,5 @@
 """The scenes of the benchmark: vessels with a closed form, sampled as the voxel wall that a scan would give."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial

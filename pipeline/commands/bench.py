@@ -1,7 +1,5 @@
 """``wireval bench [MANIFEST] -o OUT``: run time against error; --peers the rivals, --stress the stress study."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

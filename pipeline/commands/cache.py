@@ -1,7 +1,5 @@
 """``wireval cache --info | --prune``: the stage store."""
 
-from __future__ import annotations
-
 import argparse
 
 from pipeline.commands import say

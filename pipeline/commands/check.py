@@ -1,7 +1,5 @@
 """``wireval check MANIFEST``: every problem at once, headers only."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``wireval diff OUT_A OUT_B``: paired differences, the gate for CI."""
 
-from __future__ import annotations
-
 import argparse
 import tomllib
 from pathlib import Path

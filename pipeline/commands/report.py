@@ -1,7 +1,5 @@
 """``wireval report OUT``: tables, figures and pages again, from result files alone."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
@@ -13,9 +11,7 @@ HELP = "rebuild tables, figures and pages from result files"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     parser.add_argument("out", type=Path, metavar="OUT")
-    parser.add_argument(
-        "--embed", action="store_true", help="put the pictures into the pages: one file a page"
-    )
+    parser.add_argument("--embed", action="store_true", help="put the pictures into the pages: one file a page")
 
 
 def main(args: argparse.Namespace) -> int:

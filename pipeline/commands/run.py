@@ -30,13 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--resume", action="store_true", help="go on in an OUT made from another manifest or settings")
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
-    add(
-        "--sweep",
-        action="append",
-        default=[],
-        metavar="TABLE.KEY=V1,V2",
-        help="also run with each of these values",
-    )
+    add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither read nor write the stage store")

@@ -1,7 +1,5 @@
 """compare: how far the simulated wire is from the real one, and from what anybody would guess."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -35,9 +33,7 @@ class Comparison:
         return self.values[name]
 
 
-def compare(
-    simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()
-) -> Comparison:
+def compare(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
     pair = pair_of(simulated, traced, lumen, config)
     values = {name: metric(pair) for name, metric in METRICS.items()}
@@ -45,10 +41,7 @@ def compare(
 
 
 def compare_truth(
-    truth_mm: Array,
-    traced: Curve | None,
-    simulated: Solution | None,
-    config: CompareConfig = CompareConfig(),
+    truth_mm: Array, traced: Curve | None, simulated: Solution | None, config: CompareConfig = CompareConfig()
 ) -> dict[str, float]:
     """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.
 

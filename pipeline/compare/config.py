@@ -1,7 +1,5 @@
 """Settings of how curves are compared."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pipeline.ranges import Count, Positive

@@ -4,8 +4,6 @@ A number is a function of a :class:`Pair` under the name of its column; ``report
 and how a case pools it. ``register`` adds one, with its column.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -41,8 +39,9 @@ def point_to_curve(points: ArrayLike, curve: ArrayLike) -> tuple[Array, Array]:
     p = np.atleast_2d(np.asarray(points, dtype=np.float64))
     c = np.atleast_2d(np.asarray(curve, dtype=np.float64))
     if p.shape[1:] != (3,) or c.shape[1:] != (3,) or len(c) == 0:
-        msg = f"point_to_curve: got points {p.shape} and curve {c.shape}; expected (n, 3) and (m, 3) with m >= 1"
-        raise ValueError(msg)
+        raise ValueError(
+            f"point_to_curve: got points {p.shape} and curve {c.shape}; expected (n, 3) and (m, 3) with m >= 1"
+        )
     if len(c) == 1:
         return np.linalg.norm(p - c[0], axis=1), np.zeros(len(p))
     start, chord, arc = c[:-1], np.diff(c, axis=0), arc_length(c)
@@ -90,8 +89,7 @@ def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareCon
     """Sample both curves and measure their distances; ValueError where one of them is empty."""
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
-        msg = f"compare: got {len(wire)} simulated joints and {len(curve)} traced points, need 2 of each"
-        raise ValueError(msg)
+        raise ValueError(f"compare: got {len(wire)} simulated joints and {len(curve)} traced points, need 2 of each")
     arc = samples(float(arc_length(wire)[-1]), config.sample_mm)
     points = at_arc(wire, arc)
     error, foot = point_to_curve(points, curve)

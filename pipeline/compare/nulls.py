@@ -4,8 +4,6 @@ All but ``previous`` are told where the wire ends up (the deepest traced tip), w
 not easy, and that is the point. ``register`` adds one, with its column.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Points are pooled, RMSEs never averaged. Neighbouring frames of one insertion ar
 resamples blocks: cases (groups) where there are several, runs of consecutive frames within a single case.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ against each other before any voxel is read, ``Crop.load`` the voxels of a box a
 A format is a module with three functions: ``recognises`` a path, ``read_header`` of a source, ``read`` voxels of a box.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -147,10 +145,7 @@ def each_volume(header: Header) -> Iterator[Header]:
 
 
 def read_headers(
-    reference: Source | None,
-    frames: Sequence[Source],
-    config: LoadConfig,
-    spacing_mm: ArrayLike | None = None,
+    reference: Source | None, frames: Sequence[Source], config: LoadConfig, spacing_mm: ArrayLike | None = None
 ) -> Scans:
     """Headers of a case's scans; raises LoadError where one is unusable or its geometry differs from the first's."""
     empty = read_header(reference, config, spacing_mm) if reference else None

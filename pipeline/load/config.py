@@ -1,7 +1,5 @@
 """How scans are read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -92,12 +90,8 @@ def read_truth(path: Path, frame_count: int) -> list[Array]:
         frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
         curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in frames]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        why = (
-            f'cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
-        )
+        why = f'cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
         raise unusable(path, why) from None
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
-        raise unusable(
-            path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame"
-        )
+        raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
     return curves

@@ -8,8 +8,6 @@ the first frames alone: with a frame missing it says 1 mm, it hides a tilt, and 
 with the wrong direction. So the functional groups are read here.
 """
 
-from __future__ import annotations
-
 import struct
 from collections import Counter
 from dataclasses import dataclass
@@ -190,9 +188,7 @@ def _require_uniform(source: Source, where: Frames, sizes: list[Any]) -> None:
     for name, values in (("orientation", where.orientations), ("pixel spacing", pixels), ("size", sizes)):
         kinds = Counter(tuple(np.round(v, 5)) for v in values)
         if len(kinds) > 1:
-            found = "; ".join(
-                f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items()
-            )
+            found = "; ".join(f"{count} slices with {list(map(float, kind))}" for kind, count in kinds.items())
             why = f"slices of different {name}: {found}. Mixed series: keep one stack a folder."
             raise unusable(source.path, why)
 
@@ -209,16 +205,12 @@ def irregularities(stack: Stack) -> list[str]:
     odd = np.flatnonzero(np.abs(gaps - usual) > GAP_TOLERANCE * usual)
     if len(odd) and usual > 1e-3:
         where = ", ".join(f"{gaps[i]:.3f} mm after {stack.name(i)}" for i in odd[:4])
-        whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(
-            gaps[odd] > usual
-        )
+        whole = np.allclose(gaps[odd] / usual, np.round(gaps[odd] / usual), atol=0.02) and np.all(gaps[odd] > usual)
         kind = "missing slices" if whole else "irregular slice gaps"
         problems.append(f"{kind}: {len(odd)} of {len(gaps)} gaps differ from {usual:.3f} mm ({where})")
     drift = np.abs(stack.drift_px[-1]).max() / len(gaps)
     if drift > TILT_TOLERANCE:
-        angle = np.degrees(
-            np.arctan2(np.linalg.norm(stack.drift_px[-1] * stack.pixel_mm), np.ptp(stack.heights))
-        )
+        angle = np.degrees(np.arctan2(np.linalg.norm(stack.drift_px[-1] * stack.pixel_mm), np.ptp(stack.heights)))
         problems.append(f"gantry tilt: the stack leans {angle:.1f} degrees from the slice normal")
     return problems
 

@@ -5,8 +5,6 @@ straight from the file, plane by plane: ITK reads a region row by row, which tak
 file; here only the box's rows of every plane are read, in one go, and what is held is the box and one plane.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -96,11 +94,10 @@ def _reader(source: Source) -> sitk.ImageFileReader:
         reader.ReadImageInformation()
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1]
-        msg = (
+        raise LoadError(
             f"cannot read {source.path}: {reason}\n  allowed: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .dcm, .h5 "
             "or a folder with one DICOM series. Check that the file is complete."
-        )
-        raise LoadError(msg) from None
+        ) from None
     return reader
 
 

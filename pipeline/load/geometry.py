@@ -1,7 +1,5 @@
 """What a scan's header says, and whether two scans share one geometry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -109,9 +107,8 @@ def require_same_geometry(reference: Header, other: Header) -> None:
     shift = corner_shift_voxels(reference, other)
     if shift > SAME_VOXELS:
         found = "the shapes differ" if np.isinf(shift) else f"their corners lie {shift:.2f} voxels apart"
-        msg = (
+        raise LoadError(
             f"geometry differs between scans of one case: {found}, allowed {SAME_VOXELS} voxel.\n"
             f"  {describe(reference)}\n  {describe(other)}\n"
             "  Resample the scans onto one grid, or split them into two cases."
         )
-        raise LoadError(msg)

@@ -4,8 +4,6 @@ A dataset's attributes give spacing_mm (needed), origin_mm (default 0), directio
 (the default: x fastest, as in other formats) or "x,y,z". A 4-D dataset has the volume's number as its first axis.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +28,7 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
     if isinstance(node, h5py.Dataset) and node.ndim in (3, 4):
         return [node]
     held: list[str] = []
-    file.visititems(
-        lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None
-    )
+    file.visititems(lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None)
     none = f"no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held) or 'none'}. "
     raise unusable(source.path, none + "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name.")
 

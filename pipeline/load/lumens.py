@@ -1,7 +1,5 @@
 """A lumen that the user brings: a centreline with radius, a closed surface or a label map. Out: LPS mm."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +40,7 @@ def read_markups_branches(path: Path) -> Branches:
         values = named.get("radius", {}).get("controlPointValues")
         if values is None or len(values) != len(points):
             allowed = "a measurement named Radius with one of controlPointValues for every point"
-            raise refused(
-                path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc"
-            )
+            raise refused(path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc")
         radius = np.array(values, dtype=float)
         branches.append((points[:-1], points[1:], radius[:-1], radius[1:]))
     if not branches:

@@ -3,8 +3,6 @@
 Out: LPS mm.
 """
 
-from __future__ import annotations
-
 import base64
 import itertools
 import re
@@ -104,9 +102,7 @@ def read_vtp(path: Path) -> Shapes:
     piece = file.root.find("./PolyData/Piece")
     node = None if piece is None else piece.find("./Points/DataArray")
     if piece is None or node is None:
-        raise refused(
-            path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData"
-        )
+        raise refused(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
     points = _to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3))
     fans = [
         np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)

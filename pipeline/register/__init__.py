@@ -4,8 +4,6 @@ A cheap look at the lumen's wall comes first (least squares at a few thousand po
 than a tenth of a voxel is registered (SimpleITK), and the cheap look then sharpens the result and says what is left.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Frames put back into their place: the phantom's motion found, the geometry corrected, and all of it said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

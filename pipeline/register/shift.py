@@ -4,8 +4,6 @@ A wall that moves by d changes grey by -gradient . d there. Values and gradients
 taken at a few thousand points alone, so that noise falls to a fifth and nothing is interpolated.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,9 +84,7 @@ class Fit:
 def inside(scan: Volume, points_mm: Array) -> NDArray[np.bool_]:
     """Which points (n, 3) lie well inside a scan."""
     index = scan.to_index(points_mm)
-    return np.asarray(
-        np.all((index > BORDER_VOXELS) & (index < np.array(scan.shape) - 1 - BORDER_VOXELS), axis=1)
-    )
+    return np.asarray(np.all((index > BORDER_VOXELS) & (index < np.array(scan.shape) - 1 - BORDER_VOXELS), axis=1))
 
 
 def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
@@ -143,9 +139,7 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[A
     h, radius = s.voxel_mm, max(s.radius_mm, s.voxel_mm)
     gradient = s.gradient @ motion.rotation.T
     arm = (at_mm - motion.moved(s.centre_mm)) / radius
-    design = np.column_stack(
-        [-h * gradient, -h * np.cross(arm, gradient), s.grey - s.grey.mean(), np.ones(len(grey))]
-    )
+    design = np.column_stack([-h * gradient, -h * np.cross(arm, gradient), s.grey - s.grey.mean(), np.ones(len(grey))])
     slope = h * s.steepness
     solution, scale, residual = _reweighted(design, grey, np.ones(len(grey), bool))
     clear = ~near_metal(s.points_mm, residual > METAL_SCALES * scale, METAL_VOXELS * h)

@@ -3,8 +3,6 @@
 And to a JUnit summary for CI: one test a frame, so that a build server shows which frame failed and why.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -103,12 +101,7 @@ def write_junit(path: Path, found: Sequence[Result]) -> None:
     """Write one test suite a case, one test a frame (or one for a case that has no frames to show)."""
     root = ET.Element("testsuites", name="wireval")
     for result in found:
-        whole = {
-            "frame": "case",
-            "status": result.status,
-            "sentence": result.sentence,
-            "message": result.sentence,
-        }
+        whole = {"frame": "case", "status": result.status, "sentence": result.sentence, "message": result.sentence}
         frames = result.frames or [whole]
         bad = [f for f in frames if f["status"] not in ("ok", "simulated")]
         suite = ET.SubElement(root, "testsuite", name=result.case, errors="0")

@@ -4,8 +4,6 @@ Every executor gives the same outcomes. A job that took its worker with it is ru
 a second death names it.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import threading
@@ -19,12 +17,7 @@ from typing import Any, Generic, TypeVar
 
 J = TypeVar("J")
 R = TypeVar("R")
-THREADS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS",
-)
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS")
 LOST = "the worker process was killed (out of memory?); run this case alone with -j 1"
 
 
@@ -43,9 +36,7 @@ class Outcome(Generic[J, R]):
         return not self.error
 
 
-def run_all(
-    jobs: Sequence[J], work: Callable[[J], R], workers: int = 1, address: str = ""
-) -> Iterator[Outcome[J, R]]:
+def run_all(jobs: Sequence[J], work: Callable[[J], R], workers: int = 1, address: str = "") -> Iterator[Outcome[J, R]]:
     """Run ``work`` on every job, yielding outcomes as they come.
 
     With one worker in this process, else in as many processes, or on the dask cluster at ``address``.

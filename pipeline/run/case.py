@@ -1,7 +1,5 @@
 """Run one case and leave its folder complete; top level and picklable, so that any executor can take it."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import os

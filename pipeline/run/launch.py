@@ -5,8 +5,6 @@ depend on the solver's settings, so the stage store answers them: a sweep costs 
 agreement that no parameter moves is suspicious.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What a case writes down on its way: times and counters, assumptions and warnings, and progress for the reader."""
 
-from __future__ import annotations
-
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator

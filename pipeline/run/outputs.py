@@ -4,8 +4,6 @@ A frame as a row of errors.csv, its points as points.csv.gz, the case as a row o
 that 3D Slicer and ParaView open; LPS mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

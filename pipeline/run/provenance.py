@@ -1,7 +1,5 @@
 """Where a result comes from: versions, command line, machine, code state."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re
@@ -13,17 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = (
-    "numpy",
-    "scipy",
-    "scikit-image",
-    "SimpleITK",
-    "pandas",
-    "h5py",
-    "matplotlib",
-    "numba",
-    "pydantic",
-)
+PACKAGES = ("numpy", "scipy", "scikit-image", "SimpleITK", "pandas", "h5py", "matplotlib", "numba", "pydantic")
 
 
 def package_version() -> str:
@@ -37,18 +25,14 @@ def package_version() -> str:
 def _git(*args: str) -> str:
     command = ["git", "-C", str(Path(__file__).parent), *args]
     try:
-        return subprocess.check_output(
-            command, stderr=subprocess.DEVNULL, encoding="utf-8", timeout=10
-        ).strip()
+        return subprocess.check_output(command, stderr=subprocess.DEVNULL, encoding="utf-8", timeout=10).strip()
     except (OSError, subprocess.SubprocessError):
         return ""
 
 
 def _processor() -> str:
     info = Path("/proc/cpuinfo")
-    found = (
-        re.search(r"^model name.*?:(.*)$", info.read_text(encoding="utf-8"), re.M) if info.exists() else None
-    )
+    found = re.search(r"^model name.*?:(.*)$", info.read_text(encoding="utf-8"), re.M) if info.exists() else None
     return found[1].strip() if found else platform.processor() or platform.machine()
 
 

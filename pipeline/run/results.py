@@ -1,7 +1,5 @@
 """result.json: what became of a case, written last, so that its presence says that the case is complete."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ that a stage is called with, so nothing can be forgotten. A file counts by its c
 that moving a study recomputes nothing.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import inspect
@@ -77,8 +75,7 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, (list, tuple)):
         yield from ((str(i), part) for i, part in enumerate(value))
     else:
-        msg = f"a {type(value).__name__} cannot be part of a key: its content is not known; got {value!r}"
-        raise TypeError(msg)
+        raise TypeError(f"a {type(value).__name__} cannot be part of a key: its content is not known; got {value!r}")
 
 
 def file_hash(path: Path) -> str:

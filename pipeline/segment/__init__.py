@@ -1,7 +1,5 @@
 """segment: scan -> lumen. A method finds the vessel's voxels, its grey values say where the wall lies."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

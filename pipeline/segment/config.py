@@ -1,7 +1,5 @@
 """Settings of fuzzy connectedness and of the lumen's surface."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Fuzzy connectedness of a grid: absolute at one threshold, all strengths, or relative to a rival object."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -61,8 +59,9 @@ def estimate_affinity(
 def neighbours(adjacency: int) -> Index:
     """Offsets (n, 3) of the 6 face neighbours or of all 26."""
     if adjacency not in (6, 26):
-        msg = f"segment.adjacency: got {adjacency}; expected 6 or 26; 6 keeps vessels apart that touch at an edge"
-        raise ValueError(msg)
+        raise ValueError(
+            f"segment.adjacency: got {adjacency}; expected 6 or 26; 6 keeps vessels apart that touch at an edge"
+        )
     steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), -1).reshape(-1, 3)
     size = np.abs(steps).sum(axis=1)
     return np.asarray(steps[size == 1] if adjacency == 6 else steps[size > 0], np.int64)
@@ -84,9 +83,7 @@ def _read(search: Search) -> float:
     return float(np.count_nonzero(search.tiles == READ) * CELLS)
 
 
-def connect(
-    grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index
-) -> tuple[Index, float]:
+def connect(grid: Grid, seeds: Index, affinity: Affinity, threshold: float, offsets: Index) -> tuple[Index, float]:
     """Flat indices of the voxels connected to the seeds at ``threshold``, and the number of voxels read."""
     search = _search(grid, affinity, offsets)
     return flood(search, seeds, cut_level(threshold)), _read(search)

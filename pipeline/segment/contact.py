@@ -5,8 +5,6 @@ flank to flank the opening between them is shallow, so their cores stay apart; a
 one of them ends there. Merged is what meets without being near along the cores, and goes on both ways on both sides.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,15 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.lattice import sparse_zeros
-from pipeline.segment._kernels.contact import (
-    Cores,
-    Inner,
-    along_cores,
-    meetings,
-    nearest_core,
-    runs_on,
-    thickness,
-)
+from pipeline.segment._kernels.contact import Cores, Inner, along_cores, meetings, nearest_core, runs_on, thickness
 from pipeline.segment.region import Index
 from solver.grid import Array, Grid
 
@@ -127,6 +117,4 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
     face = float(np.prod(spacing) ** (2 / 3))
     groups = [places[group == n] for n in range(group.max() + 1)]
-    return tuple(
-        Contact(distance.to_mm(g.mean(axis=0)), len(g) * face) for g in groups if len(g) >= LEAST_FACES
-    )
+    return tuple(Contact(distance.to_mm(g.mean(axis=0)), len(g) * face) for g in groups if len(g) >= LEAST_FACES)

@@ -3,8 +3,6 @@
 Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """The signed distance of a lumen that the user brings: a label map, a closed surface, or a centreline with radius."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -59,9 +57,7 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     voxel = float(spacing[0])
     box = Owned(np.zeros(grid.shape, np.int32), np.zeros(grid.shape, np.uint8), spacing)
     enclosed(corners, spacing, box.inside)
-    area = 0.5 * np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     corners = np.ascontiguousarray(corners[area > 1e-9 * voxel**2])
     foot = np.zeros((int(8 * area.sum() / voxel**2) + 8 * len(corners) + 1000, 3))
     voxels = splat_triangles(corners, spacing, 1.5 * voxel, box.owner, foot)[:, 0]
@@ -69,9 +65,7 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     propagate(box, voxels, foot, config.outer_mm)
     flat = (foot, np.zeros_like(foot), np.zeros(len(foot)))
     distance = signed(box, flat, config.outer_mm, 0)
-    return _lumen(
-        grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)"
-    )
+    return _lumen(grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)")
 
 
 def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:

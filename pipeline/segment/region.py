@@ -3,8 +3,6 @@
 A method is a function like :func:`fuzzy.fuzzy_region`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,8 +47,7 @@ def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> t
     """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
     half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
     a, b, c = (
-        slice(max(0, int(i - h)), min(n, int(i + h) + 1))
-        for i, h, n in zip(index, half, grid.shape, strict=True)
+        slice(max(0, int(i - h)), min(n, int(i + h) + 1)) for i, h, n in zip(index, half, grid.shape, strict=True)
     )
     return a, b, c
 
@@ -59,9 +56,7 @@ def _median(values: NDArray[Any], otherwise: float) -> float:
     return float(np.median(values)) if values.size >= 8 else otherwise
 
 
-def _two_levels(
-    grey: NDArray[Any], seed: float, at: tuple[int, ...]
-) -> tuple[float, float, NDArray[np.bool_]]:
+def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[float, float, NDArray[np.bool_]]:
     """Median grey of the bright region that holds the seed and of what is darker, by fixed-point iteration.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.

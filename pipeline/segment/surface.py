@@ -5,8 +5,6 @@ sigma^2 (k1 + k2) / 2; for a tube as thin as the blur it is far more, so the off
 blurred cylinder (a Marcum Q function, here the non-central chi^2).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,15 +16,7 @@ from scipy.stats import ncx2
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
-from pipeline.segment._kernels.wall import (
-    PAD,
-    Wall,
-    dilate,
-    feet,
-    mean_around,
-    smooth_lattice,
-    surface_voxels,
-)
+from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
 from pipeline.segment.region import GreyLevels, Index, failed, plateau, scanner_blur
 from solver.grid import Array, Grid
 
@@ -59,9 +49,7 @@ def _table() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float
     d = 1e-4
     fall = ncx2.cdf(radii**2, 2, (half - d) ** 2) - ncx2.cdf(radii**2, 2, (half + d) ** 2)
     slope = np.sqrt(2 * np.pi) * fall / (2 * d)
-    bulge, offset, slope = (
-        np.concatenate([[a], b]) for a, b in ((0.0, 1.0 / half), (0.0, radii - half), (1.0, slope))
-    )
+    bulge, offset, slope = (np.concatenate([[a], b]) for a, b in ((0.0, 1.0 / half), (0.0, radii - half), (1.0, slope)))
     return bulge, offset, slope
 
 
@@ -126,14 +114,10 @@ def padded_box(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, tupl
 def into_box(voxels: Index, grid: Grid, corner: Index, shape: tuple[int, ...]) -> Index:
     """Flat indices in a padded box of flat indices in the grid."""
     index = np.unravel_index(voxels, grid.shape)
-    return np.asarray(
-        np.ravel_multi_index(tuple(i - c + PAD for i, c in zip(index, corner, strict=True)), shape)
-    )
+    return np.asarray(np.ravel_multi_index(tuple(i - c + PAD for i, c in zip(index, corner, strict=True)), shape))
 
 
-def prepare(
-    volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index | None = None
-) -> Site:
+def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index | None = None) -> Site:
     """The site of the voxels at flat indices ``order`` of a C-contiguous volume, with ``margin_mm`` around them.
 
     more : further voxels that the box must hold.

@@ -5,8 +5,6 @@ of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half 
 skirt of the vessel, what hangs together at a lower grey, is long, thin and nowhere bright, is such a branch.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree

@@ -6,8 +6,6 @@ millimetres are the same in every frame, so the frames together tell position an
 boundary condition, not a fit of the model: nothing beyond ``REACH_MM`` enters, and the report states it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -93,9 +91,7 @@ def vessel_wall(wall: Wall, lumen: Lumen, hull: str, stiffness_scale: float = 1.
     return VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=hull)
 
 
-def simulate(
-    insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]
-) -> Iterator[Solution]:
+def simulate(insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> Iterator[Solution]:
     """Yield the simulated wire at each depth (mm from the clamp to the tip) and roll, in the order given.
 
     A depth that cannot be reached is a status, not an exception; the last good state goes on to the next depth.

@@ -1,7 +1,5 @@
 """Settings of the energy minimisation and of what is simulated."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A manifest for a folder of scans: what can be seen is inferred, what cannot is assumed and said."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -62,8 +60,9 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
     """
     voxels = _wire_voxels(frame, reference)
     if len(voxels) < 5:
-        msg = "no wire is visible in the first frame, so the entry cannot be inferred; give --entry and --direction"
-        raise LoadError(msg)
+        raise LoadError(
+            "no wire is visible in the first frame, so the entry cannot be inferred; give --entry and --direction"
+        )
     edge = np.minimum(voxels, np.array(frame.shape) - 1 - voxels).min(axis=1)
     points = frame.to_mm(voxels)
     entry = points[np.argmin(edge)]
@@ -94,9 +93,7 @@ def infer_manifest(
         empty = load(read_header(reference, config), config=config) if reference else None
         seen, direction = infer_entry(first, empty)
         entry = seen if entry is None else entry
-        notes.append(
-            "entry_mm and entry_direction: the end of the wire nearest to the edge of the first frame"
-        )
+        notes.append("entry_mm and entry_direction: the end of the wire nearest to the edge of the first frame")
     radius = radius_mm or DEFAULT_RADIUS_MM
     notes.append(f"wire: radius {radius} mm, stiffness and tip curve of a common 0.014 inch wire")
     notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")

@@ -46,8 +46,7 @@ def _problem(*problems: str) -> PydanticCustomError:
 def _source(value: Any, info: ValidationInfo) -> Source:
     """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
     if not isinstance(value, str):
-        msg = "Input should be a valid string"
-        raise ValueError(msg)
+        raise ValueError("Input should be a valid string")
     name, _, dataset = value.partition("#")
     return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
 
@@ -139,11 +138,9 @@ class Case(Strict):
     @model_validator(mode="after")
     def _something_to_do(self) -> Case:
         if not self.frames and self.insertion_mm is None:
-            msg = "neither frames nor insertion_mm: give scans to compare with, or depths to simulate"
-            raise ValueError(msg)
+            raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
         if not self.frames and self.reference is None and self.lumen is None:
-            msg = "no frames, no reference and no lumen: there is no vessel to simulate in"
-            raise ValueError(msg)
+            raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self
 
     @model_validator(mode="after")
@@ -183,8 +180,7 @@ class ManifestTables(Strict):
     def _known_to_cases(cls, value: dict[str, Wire], info: ValidationInfo) -> dict[str, Wire]:
         for name, wire in value.items():
             if wire.name != name:
-                msg = f"{name}: unknown key 'name'; a wire has the name of its table"
-                raise ValueError(msg)
+                raise ValueError(f"{name}: unknown key 'name'; a wire has the name of its table")
         if info.context is not None:
             info.context["wires"] = value
         return value

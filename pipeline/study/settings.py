@@ -3,8 +3,6 @@
 Command line > config file > default; unknown or ill-typed ones are all listed.
 """
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Sequence
@@ -69,9 +67,7 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
     """``table.key=value`` as typed after --set; the value is TOML, a bare word is a string."""
     name, equals, raw = text.partition("=")
     if not equals or "." not in name:
-        raise SettingsError(
-            [f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"]
-        )
+        raise SettingsError([f"{source}: {text!r} is no setting; write table.key=value, as in solver.segment_mm=0.5"])
     try:
         value = tomllib.loads(f"value = {raw.strip()}")["value"]
     except tomllib.TOMLDecodeError:
@@ -88,9 +84,7 @@ def read_settings(path: Path) -> list[Setting]:
     found: list[Setting] = []
     for table, values in data.items():
         if not isinstance(values, dict):
-            raise SettingsError(
-                [f"{path}: {table!r} stands outside a table; write [solver] and the like above it"]
-            )
+            raise SettingsError([f"{path}: {table!r} stands outside a table; write [solver] and the like above it"])
         found += [Setting(f"{table}.{key}", value, path.name) for key, value in values.items()]
     return found
 

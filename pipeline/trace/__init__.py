@@ -1,7 +1,5 @@
 """trace: scan -> the real wire as one ordered sub-voxel curve from entry to tip."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

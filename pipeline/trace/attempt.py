@@ -1,7 +1,5 @@
 """One way of explaining a frame: a path, the tube fitted along it, and how well that explains the grey."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,9 +93,7 @@ def _data(image: Subtraction, start_plane: tuple[Array, Array] | None = None) ->
     return TubeData(image.grey, image.spacing, image.noise, start_plane)
 
 
-def _fitted(
-    image: Subtraction, points: Array, cut: bool, direction: Array, find_tip: bool = True
-) -> Tube | None:
+def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find_tip: bool = True) -> Tube | None:
     """The tube along a path; None where the path is so wrong that its equations have no solution.
 
     cut : wire goes on before the path's first point.
@@ -154,12 +150,7 @@ def _from_entry(path: Path, entry: EntryPose) -> Path:
 
 
 def cold(
-    image: Subtraction,
-    entry: EntryPose,
-    sigma_voxel: float,
-    seed_sigmas: float,
-    gap_mm: float,
-    bend: float = BEND,
+    image: Subtraction, entry: EntryPose, sigma_voxel: float, seed_sigmas: float, gap_mm: float, bend: float = BEND
 ) -> Attempt | None:
     """From the frame alone: crests, linked from the entry, ended at the tip, fitted."""
     crests = find_crests(image, sigma_voxel, seed_sigmas, bend)
@@ -181,9 +172,7 @@ def again(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt:
     return attempt if tube is None else replace(attempt, tube=tube)
 
 
-def warm(
-    image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: float, gap_mm: float
-) -> Attempt | None:
+def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: float, gap_mm: float) -> Attempt | None:
     """From the curve of the frame before: refit it, take its grey away, and follow what is left on from its tip.
 
     The only way through strands that lie in contact, whose crests have merged into one.

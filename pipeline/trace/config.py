@@ -1,7 +1,5 @@
 """Settings of the wire's centreline."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Literal
 

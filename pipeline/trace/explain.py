@@ -3,8 +3,6 @@
 This is one tracing back end; another one is a function with the arguments and the result of :func:`explained`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -120,9 +118,7 @@ def _best(image: Subtraction, found: list[Candidate], entry: EntryPose, config: 
     return found[int(np.argmin(costs))]
 
 
-def best_of(
-    image: Subtraction, entry: EntryPose, previous: Curve | None, config: TraceConfig
-) -> Candidate | None:
+def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config: TraceConfig) -> Candidate | None:
     """The curve of one frame: from the frame alone; where that leaves doubts also wider and from the frame before."""
     gap = config.longest_gap_mm
     found = _read_off(image, cold(image, entry, config.ridge_voxels, SEED_SIGMAS, gap), entry)

@@ -5,8 +5,6 @@ other and over gaps), because a tracklet ends where the image is ambiguous and i
 along its own line the wire ends is told by a step fitted to the profile of its crest.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,10 +99,7 @@ def hermite(p: Array, tp: Array, q: Array, tq: Array, step: float) -> Array:
     u = np.linspace(0, 1, n + 2)[1:-1, None]
     a, b = size * tp, size * tq
     return np.asarray(
-        (2 * u**3 - 3 * u**2 + 1) * p
-        + (u**3 - 2 * u**2 + u) * a
-        + (3 * u**2 - 2 * u**3) * q
-        + (u**3 - u**2) * b
+        (2 * u**3 - 3 * u**2 + 1) * p + (u**3 - 2 * u**2 + u) * a + (3 * u**2 - 2 * u**3) * q + (u**3 - u**2) * b
     )
 
 
@@ -151,9 +146,7 @@ def link(pieces: list[Tracklet], entry: Array, direction: Array, longest: float,
     while end in taken:
         end = taken[end] ^ 1
         after = towards(end)
-        gap = hermite(
-            piece.points[-1], piece.tangents[-1], after.points[0], after.tangents[0], BRIDGE_STEP_MM
-        )
+        gap = hermite(piece.points[-1], piece.tangents[-1], after.points[0], after.tangents[0], BRIDGE_STEP_MM)
         points += [gap, after.points]
         bridged += [np.ones(len(gap), bool), np.zeros(len(after.points), bool)]
         bridges += 1

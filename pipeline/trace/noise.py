@@ -1,7 +1,5 @@
 """How much noise a fit sees: correlated noise does not average out over the wire as white noise does."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree

@@ -3,8 +3,6 @@
 The grey is a reference scan's, or a model of the lumen's wall.
 """
 
-from __future__ import annotations
-
 import weakref
 from dataclasses import dataclass
 from typing import Any
@@ -127,11 +125,7 @@ def _on_box(reference: Volume, region: Region, axes: tuple[int, int, int]) -> tu
     """The reference, and where in it the region's box starts; interpolated onto the box if lattices differ."""
     grid = reorder(reference, axes)
     corner = integer_offset(grid, region.box)
-    if (
-        corner is not None
-        and np.all(corner >= 0)
-        and np.all(corner + region.box.shape <= np.array(grid.shape))
-    ):
+    if corner is not None and np.all(corner >= 0) and np.all(corner + region.box.shape <= np.array(grid.shape)):
         return contiguous(grid), corner
     return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
 

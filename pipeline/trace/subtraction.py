@@ -3,8 +3,6 @@
 Where no reference scan shows the background, the grey under the wire is taken from beside it (:func:`levelled`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -150,9 +148,7 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     counts = np.bincount(block, minlength=int(np.prod(shape))).reshape(shape).astype(float)
     sums = np.bincount(block, grey[clear], minlength=int(np.prod(shape))).reshape(shape)
     # voxel n lies at (n + 1/2) / BLOCK - 1/2 in blocks
-    level = ndimage.map_coordinates(
-        _smooth(sums, counts), (index + 0.5) / BLOCK - 0.5, order=1, mode="nearest"
-    )
+    level = ndimage.map_coordinates(_smooth(sums, counts), (index + 0.5) / BLOCK - 0.5, order=1, mode="nearest")
     # zeros, not a copy: memory is touched at the lumen alone
     out = sparse_zeros(image.grey.shape, np.float32)
     rest = grey - share * level

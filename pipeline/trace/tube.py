@@ -1,7 +1,5 @@
 """The wire fitted as a whole: a B-spline line source blurred by a Gaussian, against the raw voxels around it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -199,8 +197,9 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
 def _factors(normal: Array) -> tuple[Array, NDArray[np.int64]]:
     lower, first, good = factorise(normal)
     if not good:
-        msg = "the normal equations of the tube are singular: the path leads where there is nothing to fit"
-        raise np.linalg.LinAlgError(msg)
+        raise np.linalg.LinAlgError(
+            "the normal equations of the tube are singular: the path leads where there is nothing to fit"
+        )
     return lower, first
 
 
@@ -252,12 +251,7 @@ def fit_tube(data: TubeData, tube: Tube, iterations: int = 12, tolerance: float 
     factors = _factors(_damped(found.normal, tube, POLISHED))
     covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * data.noise**2
     return replace(
-        tube,
-        covariance=covariance,
-        residual_rms=rms,
-        iterations=done,
-        voxels=claim.voxels,
-        rest=found.residual,
+        tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=claim.voxels, rest=found.residual
     )
 
 

@@ -3,8 +3,6 @@
 And where the wire runs so nearly in the plane in which the scanner turned that its scan is least to be trusted.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,9 +100,7 @@ def _ends_there(image: Subtraction, points: Array) -> bool:
     return behind > 0.5 * usual and ahead < TIP_AHEAD * usual
 
 
-def judge(
-    image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float
-) -> Verdict:
+def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float) -> Verdict:
     """The verdict on a curve, points (n, 3) local."""
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
@@ -133,9 +129,7 @@ def judge(
          f"{double_mm:.1f} mm of line too bright for one strand", f"{MOST_DOUBLE_MM} mm at most",
          "give the curve of the frame before, which tells strands in contact apart"),
     )  # fmt: skip
-    first = next(
-        ((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, "")
-    )
+    first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 

@@ -1,7 +1,5 @@
 """3D Slicer markups curves (.mrk.json), LPS mm."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -50,8 +48,7 @@ def checked_points(points_mm: ArrayLike, path: Path) -> Array:
     """Points as a float64 array (n, 3); raises ValueError for another shape or a value that is not finite."""
     points = np.asarray(points_mm, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.all(np.isfinite(points)):
-        msg = f"{path}: got points of shape {points.shape}; give finite LPS coordinates (n, 3) in mm"
-        raise ValueError(msg)
+        raise ValueError(f"{path}: got points of shape {points.shape}; give finite LPS coordinates (n, 3) in mm")
     return points
 
 
@@ -71,8 +68,7 @@ def _control_point(name: str, number: int, point: Array) -> dict[str, Any]:
 def _measurement(name: str, values: ArrayLike, path: Path) -> dict[str, Any]:
     numbers = np.asarray(values, dtype=np.float64)
     if not np.all(np.isfinite(numbers)):
-        msg = f"{path}: measurement {name} has values that are not finite; leave it out"
-        raise ValueError(msg)
+        raise ValueError(f"{path}: measurement {name} has values that are not finite; leave it out")
     ending = name.rsplit("_", 1)[-1]
     return {
         "name": name,

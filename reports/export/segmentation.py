@@ -1,7 +1,5 @@
 """3D Slicer segmentations (.seg.nrrd): a label map with Slicer's metadata, through SimpleITK."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -27,8 +25,7 @@ def write_segmentation_nrrd(
     The name must end in .seg.nrrd, by which Slicer knows a segmentation.
     """
     if not path.name.endswith(".seg.nrrd"):
-        msg = f"{path}: a segmentation's name must end in .seg.nrrd; Slicer would open it as a grey volume"
-        raise ValueError(msg)
+        raise ValueError(f"{path}: a segmentation's name must end in .seg.nrrd; Slicer would open it as a grey volume")
     # SimpleITK's numpy view is z, y, x; transposing here is the only place in this package where the two meet
     image: Any = sitk.GetImageFromArray(np.ascontiguousarray(np.asarray(values, dtype=np.uint8).T))
     image.SetSpacing(np.asarray(spacing_mm, dtype=np.float64).tolist())

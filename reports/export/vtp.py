@@ -4,8 +4,6 @@ Written by hand, because the vtk wheel would cost 592 MB: inline base64, little-
 before each block. ASCII would be smaller code, but VTK's text reader stops at the first NaN.
 """
 
-from __future__ import annotations
-
 import base64
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
@@ -24,9 +22,7 @@ _TYPES = {"Float64": "<f8", "Int64": "<i8"}
 _LENGTH_BYTES = 8  # header_type UInt64
 
 
-def write_polyline_vtp(
-    path: Path, points_mm: ArrayLike, point_arrays: Mapping[str, ArrayLike] | None = None
-) -> None:
+def write_polyline_vtp(path: Path, points_mm: ArrayLike, point_arrays: Mapping[str, ArrayLike] | None = None) -> None:
     """Write one polyline through points (n, 3), LPS mm, with arrays (n,) or (n, 3) such as ``error_mm``."""
     points = checked_points(points_mm, path)
     offsets = np.array([len(points)] if len(points) else [], dtype=np.int64)
@@ -39,8 +35,7 @@ def write_surface_vtp(path: Path, vertices_mm: ArrayLike, triangles: ArrayLike) 
     faces = np.asarray(triangles, dtype=np.int64)
     inside = bool(np.all((faces >= 0) & (faces < len(vertices))))
     if faces.ndim != 2 or faces.shape[1] != 3 or not inside:
-        msg = f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices"
-        raise ValueError(msg)
+        raise ValueError(f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices")
     _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), {})
 
 
@@ -50,15 +45,8 @@ def read_surface_vtp(path: Path) -> tuple[Array, Index]:
     places = root.find("./PolyData/Piece/Points/DataArray")
     corners = root.find("./PolyData/Piece/Polys/DataArray[@Name='connectivity']")
     inline = all(a.get("format") == "binary" for a in root.iter("DataArray"))
-    if (
-        places is None
-        or corners is None
-        or not inline
-        or root.get("header_type") != "UInt64"
-        or root.get("compressor")
-    ):
-        msg = f"{path}: not an uncompressed inline .vtp; only the files that this package writes are read"
-        raise ValueError(msg)
+    if places is None or corners is None or not inline or root.get("header_type") != "UInt64" or root.get("compressor"):
+        raise ValueError(f"{path}: not an uncompressed inline .vtp; only the files that this package writes are read")
     vertices, triangles = (
         np.frombuffer(base64.b64decode((a.text or "").strip())[_LENGTH_BYTES:], _TYPES[str(a.get("type"))])
         for a in (places, corners)
@@ -79,8 +67,7 @@ def _write(
     for name, values in point_arrays.items():
         array, n = np.asarray(values, dtype=np.float64), len(points)
         if array.shape not in ((n,), (n, 3)):
-            msg = f"{path}: point array {name} has shape {array.shape}; give ({n},) or ({n}, 3)"
-            raise ValueError(msg)
+            raise ValueError(f"{path}: point array {name} has shape {array.shape}; give ({n},) or ({n}, 3)")
         _append(data, name, array, "Float64")
     _append(ET.SubElement(piece, "Points"), "Points", points, "Float64")
     block = ET.SubElement(piece, kind)

@@ -1,7 +1,5 @@
 """A figure from nothing to its files, without display or pyplot: made, its panels furnished, saved as PNG and CSV."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -147,7 +145,5 @@ def _palette() -> NDArray[np.uint8]:
     greys = np.repeat(np.linspace(0.0, 255.0, _GREYS)[:, None], 3, axis=1)
     backgrounds = np.linspace(0.0, 255.0, 5)
     colours = [255.0 * np.array(to_rgb(c)) for c in (ORANGE, SKY, GREEN, VERMILION, BLUE)]
-    mixed = [
-        share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)
-    ]
+    mixed = [share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)]
     return np.concatenate([greys, mixed]).round().astype(np.uint8)

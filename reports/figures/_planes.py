@@ -1,7 +1,5 @@
 """The three projection planes: which array axes a picture shows, in mm, and what is drawn in a panel of one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple

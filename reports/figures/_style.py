@@ -3,8 +3,6 @@
 Colours are those of Okabe and Ito (2008). Line styles and markers repeat what colour says, for grey printers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import cycle
 from typing import Any

@@ -1,7 +1,5 @@
 """Heat maps: a quantity along the wire (across) for every frame (up)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Run time against error, convergence with the segment length, and the outcomes of a stress study."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What changes while the wire goes in: errors, tip, skill, forces, and with truth the trace, against depth."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

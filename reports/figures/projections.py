@@ -1,7 +1,5 @@
 """Scan, lumen and wires seen along the array axes: a few frames large, every frame small, a case without scans."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Seconds by stage, for every frame and in all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes

@@ -3,8 +3,6 @@
 Symmetric matrices are six numbers (xx, yy, zz, xy, xz, yz), general ones nine, row by row.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from solver._kernels.flags import inlined
@@ -161,17 +159,7 @@ def store3(x: Any, n: int, v: Three) -> None:
 @inlined
 def load9(r: Any, n: int) -> Nine:
     """Matrix n of an array (m, 3, 3)."""
-    return (
-        r[n, 0, 0],
-        r[n, 0, 1],
-        r[n, 0, 2],
-        r[n, 1, 0],
-        r[n, 1, 1],
-        r[n, 1, 2],
-        r[n, 2, 0],
-        r[n, 2, 1],
-        r[n, 2, 2],
-    )
+    return (r[n, 0, 0], r[n, 0, 1], r[n, 0, 2], r[n, 1, 0], r[n, 1, 1], r[n, 1, 2], r[n, 2, 0], r[n, 2, 1], r[n, 2, 2])
 
 
 @inlined

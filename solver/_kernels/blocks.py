@@ -4,8 +4,6 @@ What acts on a node and on its segment: gradient and Hessian of wall, friction a
 joint's block Q_uu of the Hessian, that block's inverse, and the joint's gains.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ Everything but the first segment is fixed to the wire; the first takes up the re
 joint is the wire from the middle of the segment before it to the middle of the one after it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -10,8 +10,6 @@ segments move along without turning (eq. 9). Deviations from the printed eq. 10,
   moments left, never on a_i: at 40 segments a_i/λ < 1e-3 leaves the tip wrong by 16 % of the length.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -140,9 +138,7 @@ def settled(problem: Problem, slot: int, k: int, tolerance: float, report: Any) 
     # the decrement is quadratic in the moments
     share = max(tol.MOMENT, math.sqrt(tolerance))
     nothing = tol.CLOSED_FORM_IDLE_ANGLE * stiffest(problem.chain, k)
-    return bool(
-        report.moment <= max(share * largest_moment(problem.chain, problem.state.u[slot], k), nothing)
-    )
+    return bool(report.moment <= max(share * largest_moment(problem.chain, problem.state.u[slot], k), nothing))
 
 
 @cached

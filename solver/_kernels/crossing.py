@@ -1,7 +1,5 @@
 """Whether a way through the grid passes through a wall: what makes tunnelling impossible."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 Units: mm, N, rad unless something else is said. k is the number of segments, p the number of look-up points.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,10 +72,7 @@ joint whose block of the Hessian is not positive, its direction of negative curv
 """
 
 DESCENT = record(
-    *(
-        (name, np.int64)
-        for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")
-    ),
+    *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
     *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
 )
 """What one iteration of a relaxation hands to the next.

@@ -3,8 +3,6 @@
 U = Σ ½ c_j (u_0² + u_1²) + ½ t_j u_2²  +  Σ wall(w_p, φ(x_p) + ρ)  -  Σ F_n · x_n  +  friction
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from solver import _tolerances as tol

@@ -4,8 +4,6 @@ Coefficients carry one ghost layer on each side, c[-1] = 2 c[0] - c[1], which ma
 vanish on the faces; the linear continuation outside is therefore C² as well, axis by axis.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

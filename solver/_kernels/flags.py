@@ -4,8 +4,6 @@ Machine code that Python can call is made for entry points alone. Unpacking a ke
 for every kernel, it would take as long again as compiling the kernels themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NoReturn, TypeVar, cast
 

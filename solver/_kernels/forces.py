@@ -1,7 +1,5 @@
 """Forces of a wire at rest, derivatives of the total energy; and whether the moments left are as good as none."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

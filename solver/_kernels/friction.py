@@ -3,8 +3,6 @@
 Load and direction of a contact are those of the last relaxation; ``minimise`` repeats until they no longer change.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ One compiled loop, because a step costs a few microseconds per joint. All that i
 handle: handing forty arrays to a kernel costs 11 µs, a handle 0.6.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 
@@ -134,10 +132,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
     walled = laid == 0 and outcome == data.CONVERGED and problem.stiffness > 0.0
-    if (
-        walled
-        and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin
-    ):
+    if walled and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin:
         outcome = data.LEFT_GRID
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
@@ -251,9 +246,7 @@ def lay_along(
         source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
     elif introducer.translate and ahead != 0.0:
         source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
-    follow(
-        state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k
-    )
+    follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
     if problem.friction.coefficient > 0.0:
         anchor_friction_behind(problem, state.x[data.LAST_GOOD], was, k, ahead)
 

@@ -3,23 +3,12 @@
 A method proposes, the total energy decides, and a state that is no minimum is never called one.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
-from solver._kernels.data import (
-    CONVERGED,
-    FOLDED,
-    FRICTION,
-    MAX_ITERATIONS,
-    NON_FINITE,
-    UNFINISHED,
-    Limits,
-    Problem,
-)
+from solver._kernels.data import CONVERGED, FOLDED, FRICTION, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of, total_energy
 from solver._kernels.flags import merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
@@ -67,9 +56,7 @@ def begin(now: Any, slot: int, energy: float) -> None:
 
 
 @merged
-def relax_with_friction(
-    problem: Problem, slot: int, k: int, limits: Limits, report: Any
-) -> tuple[int, int, float]:
+def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -> tuple[int, int, float]:
     """Relax the state in a slot, whose energy is known, in place; return the outcome, iterations and energy, N mm.
 
     With friction the contact loads are taken from the last relaxation until they settle.

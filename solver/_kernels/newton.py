@@ -10,8 +10,6 @@ with f = v_p; the last term is tension and compression: buckling lives there. Cr
     Q_u = Jᵀ g + c u,   Q_uu = Jᵀ H J + c I + g·∂J/∂u,   Q_ur = Jᵀ (H + ½ [g]x),   Q_up = Jᵀ Cᵀ.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -60,9 +58,7 @@ Value = tuple[Six, Nine, Six, Three, Three]
 
 
 @inlined
-def add_node(
-    value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float
-) -> Value:
+def add_node(value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float) -> Value:
     """Add what acts on a node and its segment, see ``blocks``, and Levenberg's term ``held`` on its position."""
     p, c, h, f, g = value
     p = add6(p, hessian[0])

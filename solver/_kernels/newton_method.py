@@ -7,8 +7,6 @@ the wire is led out of its saddle. now is the record ``data.DESCENT``: the curre
 energy; a trial is in the other slot.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -6,8 +6,6 @@ V_rr[:, 3] = ½ (g_1, -g_0, 0): the same recursion as ``newton.sweep`` with 0.6 
 row, V_rr (h) is (xx, yy, xy), V_r (g) has two components.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -48,9 +46,7 @@ Turn = tuple[Six, Nine]
 
 
 @inlined
-def add_node(
-    value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float
-) -> Value:
+def add_node(value: Value, gradient: tuple[Three, Three], hessian: tuple[Six, Nine, Six], held: float) -> Value:
     """``newton.add_node`` without the roll."""
     p, c, h, f, g = value
     (df, dg), (dp, dc, dh) = gradient, hessian

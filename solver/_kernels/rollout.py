@@ -1,7 +1,5 @@
 """The chain laid out from its controls: as they are, or after a fraction of Newton's step with feedback."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ With q = |u|², s = sin θ/θ, a = (1 - cos θ)/θ², b = (θ - sin θ)/θ³:
     exp(û) = I + s û + a û²,    J(u) = I - a û + b û²,    exp(û + v̂) = exp(û) exp(Jv + ½ (∂J v) v + ...).
 """
 
-from __future__ import annotations
-
 import math
 
 from solver._kernels.algebra import Nine, Six, Three, cross, mix
@@ -34,9 +32,7 @@ def jacobian_terms(q: float, s: float, a: float) -> Three:
     """Return b = (θ - sin θ)/θ³, a'/θ and b'/θ of q = θ²."""
     if q < SERIES_LIMIT:
         b = (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156 * (1 - q / 210)))))) / 6
-        da = (
-            -(1 - q / 15 * (1 - q * 3 / 112 * (1 - q * 2 / 135 * (1 - q * 5 / 528 * (1 - q * 3 / 455))))) / 12
-        )
+        da = -(1 - q / 15 * (1 - q * 3 / 112 * (1 - q * 2 / 135 * (1 - q * 5 / 528 * (1 - q * 3 / 455))))) / 12
         db = -(1 - q / 21 * (1 - q / 48 * (1 - q * 2 / 165 * (1 - q * 5 / 624 * (1 - q / 175))))) / 60
         return b, da, db
     b = (1 - s) / q

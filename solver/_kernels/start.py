@@ -4,8 +4,6 @@ A wire pushed on goes straight ahead of its tip into the wall and has to be bent
 relaxing the last step changed will change again, counted from the tip.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

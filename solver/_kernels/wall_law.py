@@ -5,8 +5,6 @@ the length of wire in mm that a look-up point stands for, and d in mm. At d = 0 
 here is asked about d < 0.
 """
 
-from __future__ import annotations
-
 from solver._kernels.flags import inlined
 
 

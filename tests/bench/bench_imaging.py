@@ -12,25 +12,14 @@ from pathlib import Path
 
 from tests.bench.imaging import connect, real, speed, topology, tracing, wall
 
-PARTS = {
-    "connect": connect,
-    "wall": wall,
-    "tracing": tracing,
-    "topology": topology,
-    "speed": speed,
-    "real": real,
-}
+PARTS = {"connect": connect, "wall": wall, "tracing": tracing, "topology": topology, "speed": speed, "real": real}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help="smaller volumes and fewer seeds, about two minutes"
-    )
+    parser.add_argument("--quick", action="store_true", help="smaller volumes and fewer seeds, about two minutes")
     parser.add_argument("--only", choices=PARTS, action="append", help="one table alone; may be repeated")
-    parser.add_argument(
-        "--picture", type=Path, help="where the picture of the real aneurysm tree goes (.png)"
-    )
+    parser.add_argument("--picture", type=Path, help="where the picture of the real aneurysm tree goes (.png)")
     options = parser.parse_args()
     for name in options.only or PARTS:
         start = time.perf_counter()

@@ -46,17 +46,7 @@ def test_all_scenes_end_as_they_may(tmp_path: Path) -> None:
 
 
 # called converged with a moment left (closed form, and Newton on a wall of 7e5 N/mm²), or without an end
-ONCE_WRONG = [
-    (200, 181),
-    (200, 199),
-    (200, 277),
-    (200, 390),
-    (100, 149),
-    (100, 474),
-    (100, 887),
-    (100, 86),
-    (100, 124),
-]
+ONCE_WRONG = [(200, 181), (200, 199), (200, 277), (200, 390), (100, 149), (100, 474), (100, 887), (100, 86), (100, 124)]
 
 
 @pytest.mark.parametrize(("seed", "index"), ONCE_WRONG)
@@ -177,9 +167,7 @@ def test_crash_and_hang_cost_themselves_alone(monkeypatch: pytest.MonkeyPatch) -
     assert "KeyError: 'no such scene'" in done[6].detail
 
 
-def test_the_table_counts_every_scene_at_each_of_its_axes(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_table_counts_every_scene_at_each_of_its_axes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(
         "pipeline.benchmark.stress.run.run_isolated",
         lambda *_: [
@@ -195,9 +183,7 @@ def test_the_table_counts_every_scene_at_each_of_its_axes(
     assert len(found) == 5
 
 
-def test_a_study_that_was_broken_off_goes_on_where_it_stopped(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_study_that_was_broken_off_goes_on_where_it_stopped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     ran: list[int] = []
     stop = [2]
 

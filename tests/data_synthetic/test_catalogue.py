@@ -146,9 +146,7 @@ def test_the_page_of_the_catalogue_is_up_to_date() -> None:
             assert len(set(picture.convert("L").tobytes())) > 20, "not a blank picture"
 
 
-@pytest.mark.parametrize(
-    "name", ["helix", "two-wires", "moved-phantom", "anisotropic", "oblique", "stenosis"]
-)
+@pytest.mark.parametrize("name", ["helix", "two-wires", "moved-phantom", "anisotropic", "oblique", "stenosis"])
 def test_scene_builds_small_with_a_sound_truth(name: str) -> None:
     study = catalogue.build(name, **SMALL)
     assert study.quality["largest_residual_N"] < 1e-7

@@ -34,9 +34,7 @@ def test_an_edit_behind_a_caller_is_run(tmp_path: Path) -> None:
     (package / "__init__.py").touch()
     shutil.copy(_compile.__file__, package)
     kernel = "from data_synthetic._compile import on_disk\n{0}\n@on_disk()\ndef {1}():\n    return {2}\n"
-    (package / "caller.py").write_text(
-        kernel.format("from data_synthetic.called import called", "caller", "called()")
-    )
+    (package / "caller.py").write_text(kernel.format("from data_synthetic.called import called", "caller", "called()"))
     said = []
     for number in (2, 2, 3):
         (package / "called.py").write_text(kernel.format("", "called", number))

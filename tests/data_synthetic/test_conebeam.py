@@ -76,15 +76,10 @@ def test_a_moved_phantom_is_seen_where_it_lies(grid: ScanGrid, plain: np.ndarray
     moved = ConeBeamScanner.of(Phantom(VESSEL), replace(grid, origin_mm=grid.origin_mm - shift), ARC)
     there = moved.scan([], (0,)).astype(float)[:, :, 18:30].mean(axis=2)
     here = plain[:, :, 18:30].mean(axis=2)
-    assert (
-        np.abs(there[14:36, 14:34] - here[12:34, 14:34]).mean()
-        < 0.3 * np.abs(there - here)[14:36, 14:34].mean()
-    )
+    assert np.abs(there[14:36, 14:34] - here[12:34, 14:34]).mean() < 0.3 * np.abs(there - here)[14:36, 14:34].mean()
 
 
-def test_only_the_filled_box_is_projected_and_nothing_is_lost(
-    scanner: ConeBeamScanner, grid: ScanGrid
-) -> None:
+def test_only_the_filled_box_is_projected_and_nothing_is_lost(scanner: ConeBeamScanner, grid: ScanGrid) -> None:
     share = np.zeros(grid.shape, dtype=np.float32)
     share[9:14, 30:33, 20:41] = 1.0
     whole = scanner.arm.line_integrals(share, grid.spacing_mm, np.zeros(3))

@@ -40,9 +40,7 @@ def test_nothing_is_left_of_the_earlier_study(
     assert list(used) == list(fresh)
     if after == "mha":  # the other two hold the time at which they were written
         assert used == fresh
-    assert all(any(p.iterdir()) for p in (tmp_path / "used").rglob("*") if p.is_dir()), (
-        "no empty folder is left"
-    )
+    assert all(any(p.iterdir()) for p in (tmp_path / "used").rglob("*") if p.is_dir()), "no empty folder is left"
 
 
 def test_what_is_removed_is_what_was_written(longer: Study, tmp_path: Path) -> None:
@@ -106,9 +104,7 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     assert in_the_way(tmp_path / "study", "mha", 1) == [f"{tmp_path / 'study'}: is a file; give a folder"]
 
 
-def test_the_manifest_names_as_many_frames_as_there_are(
-    longer: Study, shorter: Study, tmp_path: Path
-) -> None:
+def test_the_manifest_names_as_many_frames_as_there_are(longer: Study, shorter: Study, tmp_path: Path) -> None:
     for study in (longer, shorter, replace(longer, name="again")):
         case = tomllib.loads(write_study(study, tmp_path).read_text(encoding="utf-8"))["case"][0]
         assert len(list(tmp_path.glob(case["frames"]))) == len(study.truth)

@@ -96,9 +96,7 @@ def test_iso_wall_of_a_ball_is_its_distance() -> None:
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     for radius in (3.5, 4.0, 4.6):
         value, slope = wall.distance_and_gradient([1.1, -2.1, 3.05] + radius * direction)
-        np.testing.assert_allclose(
-            value, radius - 4.0, atol=0.06
-        )  # a tenth of a voxel: what a threshold is worth
+        np.testing.assert_allclose(value, radius - 4.0, atol=0.06)  # a tenth of a voxel: what a threshold is worth
         assert np.median(np.sum(slope * direction, axis=1)) == pytest.approx(1.0, abs=0.02)
 
 
@@ -109,9 +107,7 @@ def test_iso_wall_gradient_is_its_derivative() -> None:
     slope = wall.distance_and_gradient(points)[1]
     for a in range(3):
         step = 1e-5 * np.eye(3)[a]
-        change = (
-            wall.distance_and_gradient(points + step)[0] - wall.distance_and_gradient(points - step)[0]
-        ) / 2e-5
+        change = (wall.distance_and_gradient(points + step)[0] - wall.distance_and_gradient(points - step)[0]) / 2e-5
         np.testing.assert_allclose(slope[:, a], change, atol=1e-6)
 
 
@@ -124,9 +120,7 @@ def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
     added = study.frame(1).astype(float) - study.reference
     index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
     assert np.mean(added[tuple(index.T)]) > 5 * added[:5].std()
-    assert np.all(
-        study.reference[tuple(index.T)] > 250
-    )  # vessel is at 1000, its wall at 500, less where pressed
+    assert np.all(study.reference[tuple(index.T)] > 250)  # vessel is at 1000, its wall at 500, less where pressed
 
 
 @pytest.mark.slow

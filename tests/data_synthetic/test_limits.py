@@ -62,8 +62,7 @@ def test_natural_sizes_and_those_of_the_golden_tables_are_allowed(name: str, see
 
 
 @pytest.mark.parametrize(
-    ("name", "size"),
-    [("bend", 48), ("bend", 96), ("oblique", 64), ("short-wire", 72), ("circle-of-willis", 256)],
+    ("name", "size"), [("bend", 48), ("bend", 96), ("oblique", 64), ("short-wire", 72), ("circle-of-willis", 256)]
 )
 def test_sizes_in_use_are_allowed(name: str, size: int) -> None:
     """Of the warm-up, the tests, the Makefile and README."""

@@ -26,9 +26,7 @@ TILT = np.radians(20.0)
 X, Y, Z = np.eye(3)
 
 
-def elastica_rod(
-    ea: Any, direction: Array, normal: Array, tube: Any = None, load: Array | None = None
-) -> Array:
+def elastica_rod(ea: Any, direction: Array, normal: Array, tube: Any = None, load: Array | None = None) -> Array:
     """Nodes (n + 1, 3) of PyElastica's rod at rest. Mass and time are arbitrary: only the end counts."""
     step = LENGTH / (ELEMENTS - 0.5)
     modulus = STIFFNESS / (np.pi * RADIUS**4 / 4)
@@ -43,9 +41,7 @@ def elastica_rod(
 
     simulator = Simulator()
     simulator.append(rod)
-    simulator.constrain(rod).using(
-        ea.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,)
-    )
+    simulator.constrain(rod).using(ea.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,))
     if load is not None:
         simulator.add_forcing_to(rod).using(ea.EndpointForces, np.zeros(3), load, ramp_up_time=10.0)
     if tube is not None:

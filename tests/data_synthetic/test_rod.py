@@ -34,8 +34,7 @@ def straight_shape(rod: Rod) -> object:
 
 
 @pytest.mark.parametrize(
-    ("alpha", "x", "y"),
-    [(1.0, 0.94356676, 0.30172077), (5.0, 0.61237164, 0.71379152), (10.0, 0.44500440, 0.81060902)],
+    ("alpha", "x", "y"), [(1.0, 0.94356676, 0.30172077), (5.0, 0.61237164, 0.71379152), (10.0, 0.44500440, 0.81060902)]
 )
 def test_elastica_under_a_dead_tip_load(alpha: float, x: float, y: float) -> None:
     tip = cantilever(200, load_N=alpha * STIFFNESS / LENGTH**2).shape.points[-1] / LENGTH
@@ -138,8 +137,6 @@ def test_rigid_motion_moves_the_truth_along(bend: Anatomy) -> None:
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     here = next(iter(replay(insertion(bend, 0.4), [25.0], 30.0)))
-    moved = Anatomy(
-        tuple(replace(t, points_mm=t.points_mm @ turn.T, tangents=t.tangents @ turn.T) for t in bend.tubes)
-    )
+    moved = Anatomy(tuple(replace(t, points_mm=t.points_mm @ turn.T, tangents=t.tangents @ turn.T) for t in bend.tubes))
     there = next(iter(replay(insertion(moved, 0.4, material_axis=turn @ X), [25.0], 30.0)))
     np.testing.assert_allclose(here.points_mm @ turn.T, there.points_mm, atol=1e-6)

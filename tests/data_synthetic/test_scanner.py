@@ -56,10 +56,7 @@ def test_painted_wire_has_its_centre_on_its_curve(grid: ScanGrid, vessel: Anatom
     added = scanner.scan([(LINE, 0.18)], (0,)).astype(float) - scanner.scan([], (0,))
     k = 30
     weights = added[:, :, k]
-    place = (
-        np.array([(weights.sum(axis=1) @ np.arange(48)), (weights.sum(axis=0) @ np.arange(48))])
-        / weights.sum()
-    )
+    place = np.array([(weights.sum(axis=1) @ np.arange(48)), (weights.sum(axis=0) @ np.arange(48))]) / weights.sum()
     np.testing.assert_allclose(grid.to_mm(np.array([*place, k]))[:2], LINE[0, :2], atol=1e-3)
     # a disc of 0.6 voxel radius blurred by 0.8 voxel and integrated over a voxel (variance 1/12 more), off centre
     peak = 5000 * (1 - np.exp(-0.5 * 0.6**2 / (0.8**2 + 1 / 12)))
@@ -67,9 +64,7 @@ def test_painted_wire_has_its_centre_on_its_curve(grid: ScanGrid, vessel: Anatom
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.8])
-def test_noise_has_the_sd_asked_for_and_its_correlation(
-    grid: ScanGrid, vessel: Anatomy, correlation: float
-) -> None:
+def test_noise_has_the_sd_asked_for_and_its_correlation(grid: ScanGrid, vessel: Anatomy, correlation: float) -> None:
     greys = Greys(noise=100.0, drift=0.0, correlation_voxels=correlation)
     scanner = PsfScanner.of(Phantom(vessel, greys=greys), grid)
     noise = scanner.scan([], (1,)) - scanner.blurred

@@ -61,7 +61,5 @@ def minimum(k: int, components: int, function: Callable[[Array], float], start: 
         return np.column_stack([flat.reshape(k, components), np.zeros((k, 3 - components))])
 
     best = minimize(lambda v: function(padded(v)), start[:, :components].ravel(), method="BFGS", tol=1e-10)
-    best = minimize(
-        lambda v: function(padded(v)), best.x, method="Nelder-Mead" if k == 1 else "BFGS", tol=1e-12
-    )
+    best = minimize(lambda v: function(padded(v)), best.x, method="Nelder-Mead" if k == 1 else "BFGS", tol=1e-12)
     return padded(best.x), float(best.fun)

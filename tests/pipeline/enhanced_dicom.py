@@ -58,8 +58,6 @@ def enhanced(values, spacing, positions, implicit=False, delimited=False):
     shared += w.sequence(0x28, 0x9110, w.element(0x18, 0x50, "DS", str(spacing[2])) + pixel)
     data += w.sequence(0x5200, 0x9229, shared)
     places = ["\\".join(map(str, p)) for p in positions]
-    data += w.sequence(
-        0x5200, 0x9230, *[w.sequence(0x20, 0x9113, w.element(0x20, 0x32, "DS", p)) for p in places]
-    )
+    data += w.sequence(0x5200, 0x9230, *[w.sequence(0x20, 0x9113, w.element(0x20, 0x32, "DS", p)) for p in places])
     voxels = np.ascontiguousarray(values.astype("<i2").T).tobytes()
     return b"\0" * 128 + b"DICM" + meta + data + w.element(0x7FE0, 0x10, "OW", voxels)

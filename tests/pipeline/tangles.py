@@ -127,13 +127,7 @@ def judge(curve, wire: Tangle) -> Outcome:
     tip = float(np.linalg.norm(curve.points_mm[-1] - true[-1]) / VOXEL)
     flagged = curve.status.name != "OK"
     return Outcome(
-        wire.kind,
-        float(np.mean(errors)),
-        float(np.max(errors)),
-        tip,
-        float(seen.mean()),
-        curve.status.name,
-        flagged,
+        wire.kind, float(np.mean(errors)), float(np.max(errors)), tip, float(seen.mean()), curve.status.name, flagged
     )
 
 
@@ -158,13 +152,7 @@ def run(seed, cnr=8.0, kind=None, previous=None, wire=None, expected=True, corre
 
         previous = Curve(previous, np.full(len(previous), 0.03))
     curve = trace(
-        volume,
-        lumen,
-        entry,
-        direction,
-        reference=still,
-        previous=previous,
-        expected_mm=depth if expected else None,
+        volume, lumen, entry, direction, reference=still, previous=previous, expected_mm=depth if expected else None
     )
     rest = Tangle(wire.kind, wire.points[20:], ())
     return curve, judge(curve, rest)

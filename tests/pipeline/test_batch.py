@@ -60,9 +60,7 @@ class Cluster(Executor):
         return future
 
 
-def test_a_worker_of_a_cluster_that_dies_costs_its_job_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_of_a_cluster_that_dies_costs_its_job_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     @contextmanager
     def cluster(address: str) -> Iterator[Executor]:
         assert address == "tcp://scheduler:8786"

@@ -32,9 +32,7 @@ def test_bend_scene_is_a_distance() -> None:
     assert wall is not None
     turn, lumen = scenes.BEND_TURN_MM, scenes.BEND_LUMEN_MM
     angle = np.linspace(0.05, 1.3, 20)
-    centre = np.column_stack(
-        [turn * (1 - np.cos(angle)), 0 * angle, scenes.BEND_INLET_MM + turn * np.sin(angle)]
-    )
+    centre = np.column_stack([turn * (1 - np.cos(angle)), 0 * angle, scenes.BEND_INLET_MM + turn * np.sin(angle)])
     outward = np.column_stack([-np.cos(angle), 0 * angle, np.sin(angle)])
     for offset in (1.0, 1.9, 2.3):
         assert wall.look_up(centre + offset * outward)[0] == pytest.approx(offset - lumen, abs=2e-3)
@@ -44,8 +42,7 @@ def test_far_from_the_wall_the_sampled_distance_still_leads_back() -> None:
     low, high = (-6.0, -6.0, -6.0), (6.0, 6.0, 6.0)
     grid = scenes.sampled(lambda p: np.linalg.norm(p, axis=1) - 2.0, (low, high), 0.4)
     x, y, z = np.meshgrid(
-        *(np.asarray(grid.to_mm([[i] * 3 for i in range(n)]))[:, a] for a, n in enumerate(grid.shape)),
-        indexing="ij",
+        *(np.asarray(grid.to_mm([[i] * 3 for i in range(n)]))[:, a] for a, n in enumerate(grid.shape)), indexing="ij"
     )
     exact = np.sqrt(x**2 + y**2 + z**2) - 2.0
     near = exact < 1.5
@@ -73,9 +70,7 @@ def test_cantilever_reference_is_the_elastica() -> None:
 
 
 def test_second_order_is_seen_by_the_study() -> None:
-    rows = pd.DataFrame(
-        costs([scenes.cantilever()], [SolverSetting(10.0), SolverSetting(5.0)], repeats=1, fine_mm=1.0)
-    )
+    rows = pd.DataFrame(costs([scenes.cantilever()], [SolverSetting(10.0), SolverSetting(5.0)], repeats=1, fine_mm=1.0))
     assert (rows["status"] == "converged").all()
     assert np.log2(rows["tip_error_mm"][0] / rows["tip_error_mm"][1]) == pytest.approx(2.0, abs=0.05)
     assert (rows["ms_per_mm"] > 0).all()
@@ -145,9 +140,7 @@ def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.Capture
     assert any("for 0.1 mm use newton, segment 5" in line for line in lines)
     assert any("for 0.01 mm" in line or "reaches 0.01" in line for line in lines)
     assert "cores" in page.machine()
-    missing = Namespace(
-        manifest=tmp_path / "none.toml", stress=False, peers=False, quick=True, seed=0, out=tmp_path
-    )
+    missing = Namespace(manifest=tmp_path / "none.toml", stress=False, peers=False, quick=True, seed=0, out=tmp_path)
     assert command.main(missing) == 2
     assert "none.toml" in capsys.readouterr().err
 
@@ -201,14 +194,7 @@ def test_peers_are_compared_within_one_run() -> None:
                 "ms_per_step": 0.1,
                 "ms_last_step": 0.2,
             },
-            {
-                **base,
-                "method": "Other",
-                "scene": "bend",
-                "joints": 60,
-                "ms_per_step": 10.0,
-                "ms_last_step": 40.0,
-            },
+            {**base, "method": "Other", "scene": "bend", "joints": 60, "ms_per_step": 10.0, "ms_last_step": 40.0},
         ]
     )
     text = " ".join(sentences(rows))

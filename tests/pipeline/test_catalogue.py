@@ -17,9 +17,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[Outcome]:
     return run_all(tmp_path_factory.mktemp("catalogue"))
 
 
-def test_every_frame_ends_in_its_expected_status(
-    outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_frame_ends_in_its_expected_status(outcomes: list[Outcome], capsys: pytest.CaptureFixture[str]) -> None:
     with capsys.disabled():
         print("\n" + coverage(outcomes))
         print(times(outcomes))

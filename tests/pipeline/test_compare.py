@@ -57,9 +57,7 @@ def test_errors_do_not_change_under_rigid_motion(seed: int) -> None:
     np.testing.assert_allclose(before, after, atol=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("length", "step", "count"), [(10.0, 0.5, 21), (10.2, 0.5, 22), (0.3, 0.5, 2), (0.0, 0.5, 1)]
-)
+@pytest.mark.parametrize(("length", "step", "count"), [(10.0, 0.5, 21), (10.2, 0.5, 22), (0.3, 0.5, 2), (0.0, 0.5, 1)])
 def test_samples_hold_both_ends(length: float, step: float, count: int) -> None:
     arc = samples(length, step)
     assert len(arc) == count
@@ -97,16 +95,7 @@ def line(length: float, offset: float = 0.0, step: float = 1.0) -> np.ndarray:
 
 def test_parallel_lines_are_as_far_apart_as_they_are() -> None:
     result = compare(simulated(line(20.0)), traced(line(20.0, 0.3)), open_space())
-    for name in (
-        "rms_mm",
-        "mean_mm",
-        "p95_mm",
-        "max_mm",
-        "back_rms_mm",
-        "hausdorff_mm",
-        "arc_rms_mm",
-        "tip_mm",
-    ):
+    for name in ("rms_mm", "mean_mm", "p95_mm", "max_mm", "back_rms_mm", "hausdorff_mm", "arc_rms_mm", "tip_mm"):
         assert result[name] == pytest.approx(0.3, abs=1e-12), name
     assert result["tip_angle_deg"] == 0.0
     assert result["branch_ok"]

@@ -66,9 +66,7 @@ def test_tube_gradient_is_that_of_its_cost():
             moved[k, axis] += sign * h
             ends.append(_equations(grey, spacing, samples, moved, tint, 0.3)[0])
         assert right[3 * k + axis] == pytest.approx(-0.5 * (ends[0] - ends[1]) / (2 * h), rel=2e-3, abs=1.0)
-    ends = [
-        _equations(grey, spacing, samples, controls, tint + np.array([d, 0]), 0.3)[0] for d in (1e-3, -1e-3)
-    ]
+    ends = [_equations(grey, spacing, samples, controls, tint + np.array([d, 0]), 0.3)[0] for d in (1e-3, -1e-3)]
     assert right[21] == pytest.approx(-0.5 * (ends[0] - ends[1]) / 2e-3, rel=1e-3, abs=1e-2)
 
 

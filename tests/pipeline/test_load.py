@@ -249,9 +249,7 @@ def test_nan_voxels_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("change", "accepted"), [(1e-8, True), (0.05, True), (0.3, False)])
-def test_geometry_is_compared_in_voxels_at_the_far_corner(
-    tmp_path: Path, change: float, accepted: bool
-) -> None:
+def test_geometry_is_compared_in_voxels_at_the_far_corner(tmp_path: Path, change: float, accepted: bool) -> None:
     first, second = image_of(numbered()), image_of(numbered())
     second.SetOrigin((ORIGIN[0] + change, *ORIGIN[1:]))
     for name, image in (("a", first), ("b", second)):

@@ -56,10 +56,7 @@ def surface():
 
 def test_centreline_with_radius(tmp_path):
     rows = ["# a comment", f"1 0 {START[0]} {START[1]} {START[2]} {RADIUS} -1"]
-    rows += [
-        f"{n + 2} 0 {START[0] + LENGTH * (n + 1) / 3} {START[1]} {START[2]} {RADIUS} {n + 1}"
-        for n in range(3)
-    ]
+    rows += [f"{n + 2} 0 {START[0] + LENGTH * (n + 1) / 3} {START[1]} {START[2]} {RADIUS} {n + 1}" for n in range(3)]
     (tmp_path / "tree.swc").write_text("\n".join(rows))
     assert np.abs(errors(lumen_in(tmp_path / "tree.swc"))).max() < 1e-5
     points = [{"position": list((START + np.array([LENGTH * t, 0, 0])) * [-1, -1, 1])} for t in (0, 0.5, 1)]

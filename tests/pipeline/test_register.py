@@ -52,9 +52,7 @@ def scanned(study: Study, motion: Motion, wire: bool = True, seed: int = 0) -> V
 def a_motion(centre: np.ndarray, voxels: float, degrees: float, seed: int) -> Motion:
     shift, turn = np.random.default_rng(seed).normal(size=(2, 3))
     return Motion.about(
-        centre,
-        np.radians(degrees) * turn / np.linalg.norm(turn),
-        voxels * VOXEL * shift / np.linalg.norm(shift),
+        centre, np.radians(degrees) * turn / np.linalg.norm(turn), voxels * VOXEL * shift / np.linalg.norm(shift)
     )
 
 

@@ -28,20 +28,7 @@ SIZE, FRAMES = 64, 4
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study")
     assert (
-        main(
-            [
-                "synth",
-                "bifurcation",
-                "-o",
-                str(folder),
-                "--size",
-                str(SIZE),
-                "--frames",
-                str(FRAMES),
-                "--seed",
-                "7",
-            ]
-        )
+        main(["synth", "bifurcation", "-o", str(folder), "--size", str(SIZE), "--frames", str(FRAMES), "--seed", "7"])
         == 0
     )
     return folder
@@ -128,9 +115,7 @@ def test_the_same_command_again_keeps_what_is_finished(
     assert (out / "cases" / "bifurcation" / "frames.h5").stat().st_mtime_ns == before
 
 
-def test_a_case_that_was_cut_off_is_finished_by_the_same_command(
-    finished: Path, study: Path, tmp_path: Path
-) -> None:
+def test_a_case_that_was_cut_off_is_finished_by_the_same_command(finished: Path, study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     (out / "cases" / "bifurcation" / "result.json").unlink()
@@ -148,9 +133,7 @@ def test_another_manifest_into_the_same_folder_is_refused(
     out, other = tmp_path / "out", tmp_path / "study"
     shutil.copytree(finished, out)
     shutil.copytree(study, other)
-    (other / "manifest.toml").write_text(
-        (study / "manifest.toml").read_text(encoding="utf-8") + "\n# changed\n"
-    )
+    (other / "manifest.toml").write_text((study / "manifest.toml").read_text(encoding="utf-8") + "\n# changed\n")
     assert run(other, out) == 2
     assert "--resume" in capsys.readouterr().err
 
@@ -163,10 +146,7 @@ def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.Ca
 
 def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert (
-        run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", str(tmp_path / "junit.xml"))
-        == 0
-    )
+    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", str(tmp_path / "junit.xml")) == 0
     table = pd.read_csv(out / "sweep.csv")
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
@@ -245,10 +225,7 @@ def test_every_pooled_number_is_of_the_frames_that_are_ok(
     info = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert info["overall"]["rms_mm"] == pytest.approx(rms, rel=1e-6)
     assert pd.read_csv(out / "summary.csv")["rms_mm"][0] == pytest.approx(rms, rel=1e-6)
-    assert (
-        f"median point error {good.median():.3f} mm (p95 {good.quantile(0.95):.3f})"
-        in capsys.readouterr().out
-    )
+    assert f"median point error {good.median():.3f} mm (p95 {good.quantile(0.95):.3f})" in capsys.readouterr().out
 
 
 def test_predictors_are_told_of_trusted_traces_alone(study: Path, tmp_path: Path) -> None:
@@ -324,9 +301,7 @@ def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> 
     assert "cut short" in failures["message"][0] or "cannot be read" in failures["message"][0]
 
 
-def test_an_unexpected_error_costs_one_case(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unexpected_error_costs_one_case(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     both = two_cases(study, tmp_path / "study")
 
     def burst(job: object) -> None:
@@ -367,9 +342,7 @@ def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Pa
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), "--until", "segment"]) == 0
     text = (tmp_path / "out" / "manifest.inferred.toml").read_text(encoding="utf-8")
     found = [json.loads(line.split("=")[1]) for line in text.splitlines() if line.startswith("entry_")]
-    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))[
-        "entry"
-    ]
+    case = json.loads((finished / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))["entry"]
     # a guess from voxels of 0.75 mm: two of them, and the angle of one over the 5 mm that give the direction
     assert np.linalg.norm(np.subtract(found[0], case["entry_mm"])) < 1.5
     assert np.degrees(np.arccos(np.dot(found[1], case["entry_direction"]))) < 8.0
@@ -394,9 +367,7 @@ def test_a_wrong_command_line_runs_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_check_lists_problems_of_the_scans(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_check_lists_problems_of_the_scans(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study / "manifest.toml")]) == 0
     folder = tmp_path / "study"
     shutil.copytree(study, folder)
@@ -406,9 +377,7 @@ def test_check_lists_problems_of_the_scans(
     assert main(["check", str(folder / "manifest.toml")]) == 2
     assert "geometry differs" in capsys.readouterr().err
     text = (
-        (study / "manifest.toml")
-        .read_text(encoding="utf-8")
-        .replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
+        (study / "manifest.toml").read_text(encoding="utf-8").replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
     )
     (folder / "manifest.toml").write_text(text)
     shutil.copy(study / "reference.mha", folder / "reference.mha")

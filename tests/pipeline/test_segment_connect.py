@@ -44,11 +44,7 @@ def noisy(seed, shape=(9, 10, 11)):
 
 
 @settings(max_examples=25, deadline=None)
-@given(
-    seed=st.integers(0, 10_000),
-    adjacency=st.sampled_from([6, 26]),
-    threshold=st.sampled_from([0.02, 0.3, 0.6]),
-)
+@given(seed=st.integers(0, 10_000), adjacency=st.sampled_from([6, 26]), threshold=st.sampled_from([0.02, 0.3, 0.6]))
 def test_strengths_equal_naive_dijkstra_on_every_voxel(seed, adjacency, threshold):
     values = noisy(seed)
     tables = estimate_affinity(LEVELS, 150.0, 300.0, scale=0)
@@ -92,9 +88,7 @@ def test_smoothing_tile_by_tile_is_smoothing_everything_first(scale, shape):
 def test_only_tiles_that_the_object_touches_are_read():
     values = np.zeros((64, 64, 64), np.int16)
     values[29:35, 29:35, :] = 800
-    order, read = connect(
-        Grid(values), np.array([[31, 31, 5]]), estimate_affinity(LEVELS), 0.5, neighbours(6)
-    )
+    order, read = connect(Grid(values), np.array([[31, 31, 5]]), estimate_affinity(LEVELS), 0.5, neighbours(6))
     assert len(order) == 4 * 4 * 64
     assert read == 4 * 8 * 8**3  # a bar about the corner of four columns of eight tiles of 8^3
 
@@ -139,10 +133,7 @@ def test_relative_connectedness_cuts_bone_off_where_it_touches():
     assert core[alone].sum() > 0.9 * core.sum()
     assert core[both].sum() < 0.1 * core.sum()
     assert (
-        np.isin(
-            np.flatnonzero(ndimage.binary_erosion(vessel & (np.abs(x - 20) > 9)).reshape(-1)), both
-        ).mean()
-        > 0.98
+        np.isin(np.flatnonzero(ndimage.binary_erosion(vessel & (np.abs(x - 20) > 9)).reshape(-1)), both).mean() > 0.98
     )
 
 

@@ -38,10 +38,7 @@ def wall_along(lumen):
     inside = map_coordinates(lumen.distance.values, index.T, order=1) < 0
     sides = [s * w for w in (u, v) for s in (1, -1)]
     away = np.array(
-        [
-            map_coordinates(lumen.distance.values, lumen.distance.to_index(place + 0.9 * w).T, order=1)
-            for w in sides
-        ]
+        [map_coordinates(lumen.distance.values, lumen.distance.to_index(place + 0.9 * w).T, order=1) for w in sides]
     )
     return 0.9 - away.mean(), inside.mean()
 

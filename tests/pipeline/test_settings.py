@@ -31,9 +31,7 @@ def test_the_command_line_wins_over_a_file_and_says_so(tmp_path: Path) -> None:
 
 
 def test_resolved_settings_read_back(tmp_path: Path) -> None:
-    resolved = resolve(
-        [parse_assignment("solver.segment_mm=0.25"), parse_assignment("solver.hull=samples:8")]
-    )
+    resolved = resolve([parse_assignment("solver.segment_mm=0.25"), parse_assignment("solver.hull=samples:8")])
     path = tmp_path / "config.resolved.toml"
     path.write_text(to_toml(resolved))
     assert resolve(read_settings(path)).config == resolved.config
@@ -56,9 +54,7 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
 def test_a_wrong_setting_is_explained(text: str, expected: str) -> None:
     with pytest.raises(SettingsError) as caught:
         resolve([parse_assignment(text)])
-    assert expected in str(caught.value) or expected.replace("no setting", "is no setting") in str(
-        caught.value
-    )
+    assert expected in str(caught.value) or expected.replace("no setting", "is no setting") in str(caught.value)
 
 
 def test_all_wrong_settings_come_at_once() -> None:
@@ -107,9 +103,7 @@ def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.mask.values, lumen.mask.values)
     assert (back.wall_level, back.warnings, dict(back.counters)) == (550.0, ("thin",), {"visited": 7})
     assert digest(back) == digest(lumen)
-    curve = Curve(
-        np.eye(3), np.ones(3), 0.1, np.array([True, False, True]), FrameStatus.LENGTH_MISMATCH, "why"
-    )
+    curve = Curve(np.eye(3), np.ones(3), 0.1, np.array([True, False, True]), FrameStatus.LENGTH_MISMATCH, "why")
     store.put("trace", "cd" * 32, curve)
     again = store.get("trace", "cd" * 32)
     assert isinstance(again, Curve)

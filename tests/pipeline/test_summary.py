@@ -31,15 +31,7 @@ def test_points_are_pooled_not_averaged() -> None:
 
 def test_a_run_merged_with_itself_changes_nothing_but_the_intervals() -> None:
     once, twice = pooled(frames(1), 0), pooled(frames(1) + frames(1), 0)
-    for name in (
-        "rms_mm",
-        "mean_mm",
-        "max_mm",
-        "tip_median_mm",
-        "skill",
-        "arc_rms_mm",
-        "null_centreline_rms_mm",
-    ):
+    for name in ("rms_mm", "mean_mm", "max_mm", "tip_median_mm", "skill", "arc_rms_mm", "null_centreline_rms_mm"):
         assert once[name] == pytest.approx(twice[name]), name
 
 
@@ -76,9 +68,7 @@ def test_the_interval_covers_the_true_value_about_as_often_as_it_says() -> None:
         squares = draw.chisquare(4, size=12)
         rows = np.column_stack([np.full(12, 4.0), squares])
         units = [np.array([i]) for i in range(12)]
-        (low, high), *_ = intervals(
-            rows, units, (lambda r: float(np.sqrt(r[:, 1].sum() / r[:, 0].sum())),), 300
-        )
+        (low, high), *_ = intervals(rows, units, (lambda r: float(np.sqrt(r[:, 1].sum() / r[:, 0].sum())),), 300)
         covered += low <= 1.0 <= high
     assert 170 <= covered <= 198
 

@@ -20,9 +20,7 @@ from pipeline.cli import main
         (["--anatomy", "nothing.swc", "--scanner", "conebeam"], "only the catalogue's scenes"),
     ],
 )
-def test_wrong_words(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: str
-) -> None:
+def test_wrong_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: str) -> None:
     assert main(["synth", *words, "-o", str(tmp_path / "out")]) == 2
     assert expected in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -44,11 +42,7 @@ def test_wrong_words(
     ],
 )
 def test_wrong_numbers_are_refused_before_any_truth_is_computed(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    words: list[str],
-    expected: str,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, words: list[str], expected: str
 ) -> None:
     monkeypatch.setattr("data_synthetic.catalogue.build", lambda *_args, **_numbers: pytest.fail("built"))
     assert main(["synth", *words, "-o", str(tmp_path / "out")]) == 2
@@ -58,9 +52,7 @@ def test_wrong_numbers_are_refused_before_any_truth_is_computed(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_study_written_over_an_earlier_one_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_study_written_over_an_earlier_one_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["synth", "short-wire", "-o", str(tmp_path / "study"), "--size", "54"]
     for frames in ("3", "2"):
         assert main([*words, "--frames", frames]) == 0
@@ -94,16 +86,7 @@ def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
     """A straight tube as SWC, radius 2 mm, 60 mm long."""
     rows = [f"{i + 1} 3 0 0 {i} 2.0 {i if i else -1}" for i in range(61)]
     (tmp_path / "tube.swc").write_text("\n".join(rows))
-    words = [
-        "--anatomy",
-        str(tmp_path / "tube.swc"),
-        "-o",
-        str(tmp_path / "study"),
-        "--frames",
-        "2",
-        "--size",
-        "64",
-    ]
+    words = ["--anatomy", str(tmp_path / "tube.swc"), "-o", str(tmp_path / "study"), "--frames", "2", "--size", "64"]
     assert main(["synth", *words]) == 0
     assert main(["check", str(tmp_path / "study" / "manifest.toml")]) == 0
 
@@ -111,20 +94,6 @@ def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["nrrd", "nii.gz", "dicom", "h5"])
 def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str) -> None:
     """An oblique scan, so that a swapped axis or a lost direction would put the entry outside the vessel."""
-    words = [
-        "synth",
-        "oblique",
-        "-o",
-        str(tmp_path / "study"),
-        "--frames",
-        "2",
-        "--size",
-        "64",
-        "--format",
-        kind,
-    ]
+    words = ["synth", "oblique", "-o", str(tmp_path / "study"), "--frames", "2", "--size", "64", "--format", kind]
     assert main(words) == 0
-    assert (
-        main(["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"])
-        == 0
-    )
+    assert main(["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"]) == 0

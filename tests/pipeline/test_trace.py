@@ -201,9 +201,7 @@ def test_a_crop_of_the_frame_and_a_lumen_on_another_lattice_do():
     _, _, _, wire, entry, direction = vessel()
     a, b = (2, 1, 0), tuple(n - 2 for n in frame.shape)
     crop, still = (v.crop(a, b) for v in (frame, reference))
-    coarse = Grid(
-        lumen.distance.values[::2, ::2, ::2], lumen.distance.spacing_mm * 2, lumen.distance.origin_mm
-    )
+    coarse = Grid(lumen.distance.values[::2, ::2, ::2], lumen.distance.spacing_mm * 2, lumen.distance.origin_mm)
     other = Lumen(coarse, coarse.with_values((coarse.values < 0).astype(np.uint8)))
     curve = trace(Volume(crop.values, crop.spacing_mm, crop.origin_mm), other, entry, direction,
                   reference=Volume(still.values, still.spacing_mm, still.origin_mm))  # fmt: skip
@@ -267,9 +265,7 @@ def test_a_straight_wire_in_thick_slices():
     spread, axes = np.linalg.svd(curve.points_mm - curve.points_mm.mean(axis=0), full_matrices=False)[1:]
     t = axes[0]
     assert spread[1] < 0.011 * np.sqrt(len(curve.points_mm))  # 0.015 mm with a knot for every slice
-    assert (
-        abs(np.degrees(np.arcsin(abs(t[2]))) - np.degrees(np.arcsin(np.sin(angle) / np.hypot(1, 0.05)))) < 1.0
-    )
+    assert abs(np.degrees(np.arcsin(abs(t[2]))) - np.degrees(np.arcsin(np.sin(angle) / np.hypot(1, 0.05)))) < 1.0
     assert np.median(off) < 0.2
 
 
@@ -281,8 +277,7 @@ def test_another_wire_in_the_lumen_is_not_passed_over_in_silence():
     for wire in (one, two):
         phantoms.add_wire(clean, wire, 0.2, 4000.0, VOXEL, origin)
     frame, reference = (
-        Volume(phantoms.scan(v, 0.8, PEAK / 8, n), [VOXEL] * 3)
-        for n, v in enumerate((clean, np.full(shape, 1000.0)))
+        Volume(phantoms.scan(v, 0.8, PEAK / 8, n), [VOXEL] * 3) for n, v in enumerate((clean, np.full(shape, 1000.0)))
     )
     lumen = tangles.tank(np.array([[3.0, 3, 3], [18, 18, 18]]))[2]
     curve = trace(frame, lumen, one[40], [0, 0, 1], reference=reference)
@@ -340,9 +335,7 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
     assert inside.status is FrameStatus.OK
     x = lumen.distance.origin_mm[0] + VOXEL * np.arange(lumen.distance.shape[0])
     depth = np.maximum(lumen.distance.values, (x - 1.0)[:, None, None]).astype(np.float32)
-    narrow = Lumen(
-        lumen.distance.with_values(depth), lumen.distance.with_values((depth < 0).astype(np.uint8))
-    )
+    narrow = Lumen(lumen.distance.with_values(depth), lumen.distance.with_values((depth < 0).astype(np.uint8)))
     outside = trace(frame, narrow, wire[0], wire[1] - wire[0], reference=reference)
     assert outside.status is FrameStatus.TRACE_LEFT_LUMEN
     assert outside.flagged.any()

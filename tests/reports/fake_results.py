@@ -59,9 +59,7 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
         rows = _errors(case)
         folder = out / "cases" / case.name
         statistics = _statistics(case, rows)
-        summaries.append(
-            {"case": case.name, "group": "g1", "role": case.role, "status": _status(case), **statistics}
-        )
+        summaries.append({"case": case.name, "group": "g1", "role": case.role, "status": _status(case), **statistics})
         failures += [_failure(case, frame) for frame in case.failed]
         _write_case(folder, case, rows, statistics)
     tables.write(out / "summary.csv", SUMMARY, summaries)
@@ -69,12 +67,7 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
     if sweep:
         tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
     overall = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31, "cases": 2, "groups": 1}
-    run = {
-        "cases": [c.name for c in cases],
-        "config": _config(),
-        "provenance": _provenance(),
-        "overall": overall,
-    }
+    run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance(), "overall": overall}
     (out / "run.json").write_text(json.dumps(run, indent=1))
     return out
 
@@ -210,13 +203,8 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "wire": {"name": "micro014", "radius_mm": 0.18, "bending_stiffness_N_mm2": [[0, 0.5], [30, 5.0]]},
         "wall": {"stiffness_N_mm2": 2.0, "friction": 0.0},
         "geometry": {"shape": list(SHAPE), "spacing_mm": SPACING.tolist(), "origin_mm": ORIGIN.tolist()},
-        "inputs": [
-            {"path": f"frames/{i:03d}.mha", "sha256": f"{i:02x}" * 32, "bytes": 33554432} for i in range(30)
-        ],
-        "counters": {
-            "segment": {"voxels_visited": 81234, "voxels_total": 16777216},
-            "simulate": {"skipped": 1200},
-        },
+        "inputs": [{"path": f"frames/{i:03d}.mha", "sha256": f"{i:02x}" * 32, "bytes": 33554432} for i in range(30)],
+        "counters": {"segment": {"voxels_visited": 81234, "voxels_total": 16777216}, "simulate": {"skipped": 1200}},
         "config": _config(),
         "provenance": _provenance(),
     }

@@ -21,9 +21,7 @@ def fake_bench(folder: Path) -> tuple[Path, Path]:
     rows: list[dict[str, object]] = []
     for scene, scale in (("bend", 1.0), ("siphon", 3.0), ("circle-of-willis", 5.0)):
         for method, cost, order in (("newton", 0.05, 2), ("closed_form", 3.0, 2), ("exudyn", 9.0, 1.5)):
-            rows += [
-                _bench_row(scene, scale, method, cost, order, s, rng) for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
-            ]
+            rows += [_bench_row(scene, scale, method, cost, order, s, rng) for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1)]
     rows.append({"scene": "bend", "method": "mujoco", "segment_mm": 0.2})  # did not finish: no numbers
     outcomes = [
         {"axis": axis, "outcome": o, "count": n}
@@ -61,9 +59,7 @@ def test_the_front_is_what_no_other_point_beats(points: list[tuple[int, int]]) -
             error[j] <= error[i] and cost[j] <= cost[i] and (error[j], cost[j]) != (error[i], cost[i])
             for j in range(len(points))
         )
-        twin = any(
-            (error[j], cost[j]) == (error[i], cost[i]) and front[j] for j in range(len(points)) if j != i
-        )
+        twin = any((error[j], cost[j]) == (error[i], cost[i]) and front[j] for j in range(len(points)) if j != i)
         assert front[i] == (not beaten and not twin)
 
 
@@ -101,13 +97,7 @@ def test_a_long_segment_that_is_right_by_luck_is_not_recommended() -> None:
 def test_the_page_has_everything_and_keeps_extra_columns(tmp_path: Path) -> None:
     page = bench.render_bench(*_swap(fake_bench(tmp_path), tmp_path), note="one core of <some> machine")
     text = page.read_text(encoding="utf-8")
-    for part in (
-        'id="pareto"',
-        'id="convergence"',
-        'id="stress_outcomes"',
-        'id="recommended"',
-        'id="stress"',
-    ):
+    for part in ('id="pareto"', 'id="convergence"', 'id="stress_outcomes"', 'id="recommended"', 'id="stress"'):
         assert part in text
     assert "one core of &lt;some&gt; machine" in text
     assert "cells_<wbr>skipped" in text
@@ -130,13 +120,7 @@ def test_nothing_to_show_is_no_figure(draw: object, tmp_path: Path) -> None:
 
 def test_a_stress_study_alone_shows_how_well_its_scenes_ended(tmp_path: Path) -> None:
     pd.DataFrame(columns=["scene", "method"]).to_csv(tmp_path / "b.csv", index=False)
-    row = {
-        "outcome": "converged",
-        "count": 3,
-        "iterations_max": 71,
-        "worst_residual": 2.5e-5,
-        "slowest": 1099,
-    }
+    row = {"outcome": "converged", "count": 3, "iterations_max": 71, "worst_residual": 2.5e-5, "slowest": 1099}
     pd.DataFrame([{"axis": a, **row} for a in ("all", "roll")]).to_csv(tmp_path / "s.csv", index=False)
     text = bench.render_bench(tmp_path / "b.csv", tmp_path / "out", tmp_path / "s.csv").read_text("utf-8")
     assert "Over all scenes, by outcome" in text

@@ -42,11 +42,7 @@ def test_intervals_need_both_ends() -> None:
 
 def test_trees_become_rows_and_empty_leaves_go() -> None:
     tree = {"a": {"b": 1.0, "c": None, "d": [0.16557399795383654, 2]}, "argv": ["wireval", "run"], "e": ""}
-    assert list(_content.flatten(tree)) == [
-        ("a.b", "1"),
-        ("a.d", "[0.165573998, 2]"),
-        ("argv", "wireval run"),
-    ]
+    assert list(_content.flatten(tree)) == [("a.b", "1"), ("a.d", "[0.165573998, 2]"), ("argv", "wireval run")]
 
 
 def test_a_level_is_one_text_beside_plain_counts() -> None:

@@ -98,9 +98,7 @@ def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> 
     assert tip["worst"] == pytest.approx(1.0)
     assert tip["regressions"] == 1
     (path).unlink()
-    assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, (
-        "every frame of the case is missing"
-    )
+    assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, "every frame of the case is missing"
 
 
 def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
@@ -109,8 +107,7 @@ def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"),
-    [("rmse_mm = 1", "did you mean"), ("rms_mm = -1", "from 0 up"), ("rms_mm = 'x'", "from 0 up")],
+    ("text", "hint"), [("rmse_mm = 1", "did you mean"), ("rms_mm = -1", "from 0 up"), ("rms_mm = 'x'", "from 0 up")]
 )
 def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> None:
     path = tmp_path / "t.toml"

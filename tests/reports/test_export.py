@@ -92,9 +92,7 @@ def test_surfaces_read_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.points_mm, vertices)
     np.testing.assert_array_equal(back.triangles, triangles)
     assert back.lines == ()
-    for found, written in zip(
-        export.read_surface_vtp(tmp_path / "s.vtp"), (vertices, triangles), strict=True
-    ):
+    for found, written in zip(export.read_surface_vtp(tmp_path / "s.vtp"), (vertices, triangles), strict=True):
         np.testing.assert_array_equal(found, written)
     with pytest.raises(ValueError, match="indices"):
         export.write_surface_vtp(tmp_path / "t.vtp", vertices, triangles + 1)

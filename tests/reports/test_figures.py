@@ -59,9 +59,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
     absent = {"failed_projections", "simulated_wires"} | ({"every_frame"} if count == 1 else set())
     assert set(CASE_FIGURES) - set(drawn) == absent
-    run = RunFiles(
-        {"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP)
-    )
+    run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None
 
 
@@ -168,9 +166,7 @@ def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> 
 
 def test_frames_file_reads_back(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    scan = ScanCrop(
-        np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)}
-    )
+    scan = ScanCrop(np.array([0.3, 0.4, 0.5]), rng.normal(size=3), TURN, (4, 5, 6), {1: np.eye(4, 6, dtype=np.uint8)})
     curve, picture = rng.normal(size=(7, 3)), rng.integers(0, 255, (5, 6), dtype=np.uint8)
     frames = (FrameArrays(n, traced_mm=curve + n, contact_force_N=curve, mips={0: picture}) for n in (11, 2))
     write_frames(tmp_path / "frames.h5", scan, frames)
@@ -178,9 +174,7 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
     assert back is not None
     assert (back.shape, list(back.lumen_mips)) == ((4, 5, 6), [1])
     np.testing.assert_array_equal(back.direction, TURN)
-    np.testing.assert_allclose(
-        back.to_index(scan.origin_mm + TURN @ (scan.spacing_mm * [1, 2, 3])), [1, 2, 3]
-    )
+    np.testing.assert_allclose(back.to_index(scan.origin_mm + TURN @ (scan.spacing_mm * [1, 2, 3])), [1, 2, 3])
     assert frame_numbers(tmp_path / "frames.h5") == (2, 11)
     frame = read_frame(tmp_path / "frames.h5", 11)
     np.testing.assert_array_equal(frame.traced_mm, curve + 11)
@@ -191,16 +185,8 @@ def test_frames_file_reads_back(tmp_path: Path) -> None:
 def test_colours_are_told_apart_by_dichromats() -> None:
     """Machado et al. (2009), severity 1: neighbours in a legend stay apart for protan and deutan readers."""
     matrices = (
-        np.array(
-            [
-                [0.152286, 1.052583, -0.204868],
-                [0.114503, 0.786281, 0.099216],
-                [-0.003882, -0.048116, 1.051998],
-            ]
-        ),
-        np.array(
-            [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
-        ),
+        np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]),
+        np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]),
     )
     stages = [np.array(to_rgba(c)[:3]) for c in STAGE_COLOURS.values()]
     for matrix in (np.eye(3), *matrices):
@@ -215,9 +201,7 @@ def _linear(colour: np.ndarray) -> np.ndarray:
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
 
 
-@pytest.mark.parametrize(
-    ("values", "scale"), [([0.1, 0.2], "linear"), ([0.01, 3.0], "log"), ([0.0, np.nan], "linear")]
-)
+@pytest.mark.parametrize(("values", "scale"), [([0.1, 0.2], "linear"), ([0.01, 3.0], "log"), ([0.0, np.nan], "linear")])
 def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float], scale: str) -> None:
     axes = Figure().subplots()
     positive_axis(axes, [values])

@@ -85,14 +85,7 @@ def test_every_link_leads_somewhere(run: Path) -> None:
 def test_each_kind_of_case_has_its_sections(run: Path) -> None:
     ids = {f.name: set(_Links(f / "report.html").ids) for f in find_cases(run)}
     always = {"forces_by_depth", "contact_along_wire", "run_time", "frames", "settings", "provenance", "cite"}
-    compared = {
-        "error_by_depth",
-        "projections",
-        "every_frame",
-        "error_along_wire",
-        "tip_by_depth",
-        "skill_by_depth",
-    }
+    compared = {"error_by_depth", "projections", "every_frame", "error_along_wire", "tip_by_depth", "skill_by_depth"}
     assert all(always <= found for found in ids.values())
     assert all(compared <= found for name, found in ids.items() if name != "aneurysm")
     assert not compared & ids["aneurysm"]
@@ -198,23 +191,13 @@ def test_counters_are_sums_and_levels(tmp_path: Path) -> None:
     text = render_case(folder).read_text(encoding="utf-8")
     work = text[text.index('<h2 id="work">') : text.index('<h2 id="settings">')]
     cells = re.findall(r"<td[^>]*>(.*?)</td>", work)
-    assert cells == [
-        "<code>trace.voxels_read</code>",
-        "63610",
-        "<code>trace.cnr</code>",
-        "8.87 (6.17 to 9.73)",
-    ]
+    assert cells == ["<code>trace.voxels_read</code>", "63610", "<code>trace.cnr</code>", "8.87 (6.17 to 9.73)"]
 
 
 def test_a_case_that_failed_as_a_whole_says_why(tmp_path: Path) -> None:
     folder = tmp_path / "out" / "cases" / "c"
     folder.mkdir(parents=True)
-    result = {
-        "case": "c",
-        "status": "segment_failed",
-        "sentence": "no lumen",
-        "message": "segment: seed 0 < 1",
-    }
+    result = {"case": "c", "status": "segment_failed", "sentence": "no lumen", "message": "segment: seed 0 < 1"}
     (folder / "result.json").write_text(json.dumps(result))
     text = render_case(folder).read_text(encoding="utf-8")
     assert "segment: seed 0 &lt; 1" in text
@@ -227,9 +210,7 @@ def test_a_run_without_cases_is_no_success(tmp_path: Path) -> None:
     assert 'class="status bad"' in text
 
 
-@pytest.mark.parametrize(
-    ("name", "content"), [("result.json", b"{"), ("result.json", b"[]"), ("frames.h5", b"x" * 99)]
-)
+@pytest.mark.parametrize(("name", "content"), [("result.json", b"{"), ("result.json", b"[]"), ("frames.h5", b"x" * 99)])
 def test_a_damaged_file_is_named(tmp_path: Path, name: str, content: bytes) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=re.escape(name)):

@@ -18,10 +18,7 @@ def _sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3) * 10
     corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     triangles = np.concatenate(
-        [
-            np.column_stack([corner, corner + 1, corner + n]),
-            np.column_stack([corner + 1, corner + n + 1, corner + n]),
-        ]
+        [np.column_stack([corner, corner + 1, corner + n]), np.column_stack([corner + 1, corner + n + 1, corner + n])]
     )
     return points, triangles
 

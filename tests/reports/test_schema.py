@@ -45,12 +45,7 @@ def _legend(drawing: Drawing | None) -> dict[str, str]:
 def test_a_metric_from_outside_is_one_registration(tmp_path: Path) -> None:
     shown = {"frames": "", "error_by_depth": "area between the wires"}
     area = Column(
-        "area_mm",
-        "mm",
-        "area between the wires over their length",
-        better="low",
-        pooled="median",
-        shown=shown,
+        "area_mm", "mm", "area between the wires over their length", better="low", pooled="median", shown=shown
     )
     ERRORS.add(area)
     assert ERRORS.names.index("area_mm") == ERRORS.names.index("load_s") - 1, "before the timings"
@@ -70,8 +65,7 @@ def test_a_metric_from_outside_is_one_registration(tmp_path: Path) -> None:
     assert list(colours.values()).count(colours["area between the wires"]) == 1, "a colour of its own"
     assert (drawing.table["area_mm"] == 0.125).all()
     worse = diff.diff_tables(
-        *({"c": pd.DataFrame({"frame": [0], "status": ["ok"], "area_mm": [v]})} for v in (0.1, 0.2)),
-        {"area_mm": 0.05},
+        *({"c": pd.DataFrame({"frame": [0], "status": ["ok"], "area_mm": [v]})} for v in (0.1, 0.2)), {"area_mm": 0.05}
     )
     assert worse.regressions["column"].tolist() == ["area_mm"]
 
@@ -108,8 +102,7 @@ def test_a_column_goes_where_it_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
-    [{"pooled": "sum of squares"}, {"shown": {"frame": ""}}, {"kind": "int"}, {"better": "lower"}],
+    "change", [{"pooled": "sum of squares"}, {"shown": {"frame": ""}}, {"kind": "int"}, {"better": "lower"}]
 )
 def test_what_would_be_ignored_in_silence_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"column x_mm: got .* known are"):

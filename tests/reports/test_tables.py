@@ -111,10 +111,7 @@ def test_a_wrong_field_names_its_file(tmp_path: Path) -> None:
 
 
 @settings(max_examples=30, deadline=None)
-@given(
-    error=st.lists(st.floats(0, 1e6), min_size=1, max_size=20),
-    force=st.floats(-1e3, 1e3) | st.just(math.nan),
-)
+@given(error=st.lists(st.floats(0, 1e6), min_size=1, max_size=20), force=st.floats(-1e3, 1e3) | st.just(math.nan))
 def test_points_read_back(tmp_path_factory: pytest.TempPathFactory, error: list[float], force: float) -> None:
     path = tmp_path_factory.mktemp("points") / "points.csv.gz"
     frame = np.arange(len(error)) // 3

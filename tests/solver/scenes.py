@@ -46,15 +46,11 @@ def fork_distance(points: ArrayLike, lumen: float = 1.5, angle: float = 0.45, fo
     branch = []
     for side in (-1.0, 1.0):
         along = np.maximum(side * x * np.sin(angle) + z * np.cos(angle), 0.0)
-        branch.append(
-            np.sqrt((x - side * along * np.sin(angle)) ** 2 + y**2 + (z - along * np.cos(angle)) ** 2)
-        )
+        branch.append(np.sqrt((x - side * along * np.sin(angle)) ** 2 + y**2 + (z - along * np.cos(angle)) ** 2))
     return np.minimum(trunk, np.minimum(*branch)) - lumen
 
 
-def sampled(
-    distance: Distance, spacing: float, low: ArrayLike, high: ArrayLike, dtype: str = "float64"
-) -> Grid:
+def sampled(distance: Distance, spacing: float, low: ArrayLike, high: ArrayLike, dtype: str = "float64") -> Grid:
     """A grid of distances over a box."""
     axes = [np.arange(a, b + spacing / 2, spacing) for a, b in zip(low, high, strict=True)]  # type: ignore[call-overload]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)

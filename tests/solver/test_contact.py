@@ -86,11 +86,7 @@ def test_winkler_foundation() -> None:
     errors = []
     for n in (20, 40):
         wire = GuideWire(16.0 / n, 0.0, STIFFNESS)
-        common = {
-            "depth_mm": 16.0,
-            "entry_mm": (-14.0, 0.0, height + 0.5),
-            "entry_direction": (1.0, 0.0, 0.0),
-        }
+        common = {"depth_mm": 16.0, "entry_mm": (-14.0, 0.0, height + 0.5), "entry_direction": (1.0, 0.0, 0.0)}
         k, _ = wire.segments_at(16.0)
         share = np.full(k + 1, wire.segment_mm)
         share[[0, -1]] *= 0.5
@@ -112,9 +108,7 @@ def test_compressed_wire_winds_into_a_helix() -> None:
     force, clearance, segment = 0.05, 1.0, 1.5
     pitch = helix_pitch(STIFFNESS, force)
     length = 4.0 * pitch
-    grid = sampled(
-        lambda p: np.hypot(p[..., 0], p[..., 1]) - clearance, 0.25, (-3, -3, -4), (3, 3, length + 4)
-    )
+    grid = sampled(lambda p: np.hypot(p[..., 0], p[..., 1]) - clearance, 0.25, (-3, -3, -4), (3, 3, length + 4))
     wall = VesselWall(grid, 20.0)
     s = np.linspace(0, length, 800)
     ramp = np.minimum(s / (0.5 * pitch), 1.0) * clearance

@@ -13,16 +13,7 @@ from numpy.typing import NDArray
 from solver import Grid, GuideWire, Status, VesselWall
 from solver.relax import Settings, base_frame
 from solver.workspace import Workspace
-from tests.solver.entry_points import (
-    aim,
-    costate,
-    gradients,
-    jacobian_terms,
-    place,
-    sine_terms,
-    sweep,
-    total_energy,
-)
+from tests.solver.entry_points import aim, costate, gradients, jacobian_terms, place, sine_terms, sweep, total_energy
 from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
 
 Array = NDArray[np.float64]
@@ -153,9 +144,7 @@ def test_newton_decrement_is_that_of_the_dense_hessian(name: str) -> None:
     gradient, hessian = dense(lambda w: energy_of(b, padded(w)), v)
     energy_of(b, padded(v))
     assert sweep(b.problem, 0, b.k, 0.0, b.report[0])
-    assert b.report[0].decrement == pytest.approx(
-        0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3
-    )
+    assert b.report[0].decrement == pytest.approx(0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3)
 
 
 def dense(function: object, v: Array, step: float = 1e-4) -> tuple[Array, Array]:

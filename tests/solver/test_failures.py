@@ -15,9 +15,7 @@ WIRE = GuideWire(1.0, 0.18, 10.0)
 def test_grid_must_be_finite(bad: float) -> None:
     values = np.zeros((4, 5, 6))
     values[1, 2, 3] = bad
-    with pytest.raises(
-        ValueError, match=r"wall: grid values: got .*\[1, 2, 3\].*; allowed: .*; fill or crop"
-    ):
+    with pytest.raises(ValueError, match=r"wall: grid values: got .*\[1, 2, 3\].*; allowed: .*; fill or crop"):
         VesselWall(Grid(values), 1.0)
 
 

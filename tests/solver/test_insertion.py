@@ -20,9 +20,7 @@ def test_number_of_sub_steps_does_not_change_the_minimum(stiffness: float) -> No
         insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], step_mm=1 / per_mm)
         solution = last(insertion, np.arange(1.0, 61.0))
         energies.append(solution.energy_N_mm)
-        turn = np.einsum(
-            "na,na->n", *(np.diff(solution.joints_mm, axis=0)[s] for s in (slice(1, None), slice(-1)))
-        )
+        turn = np.einsum("na,na->n", *(np.diff(solution.joints_mm, axis=0)[s] for s in (slice(1, None), slice(-1))))
         assert turn.min() > 0.9, "no fold"
     assert np.ptp(energies) < 1e-6 * energies[0]
 
@@ -30,10 +28,7 @@ def test_number_of_sub_steps_does_not_change_the_minimum(stiffness: float) -> No
 def test_slide_and_translate_reach_the_same_minimum() -> None:
     wall = VesselWall(bend_grid(), 1.0)
     shapes = [
-        last(
-            Insertion(GuideWire(1.0, 0.18, 10.0), wall, [0, 0, 0], [0, 0, 1], initial=way),
-            np.arange(1.0, 56.0),
-        )
+        last(Insertion(GuideWire(1.0, 0.18, 10.0), wall, [0, 0, 0], [0, 0, 1], initial=way), np.arange(1.0, 56.0))
         for way in ("slide", "translate")
     ]
     np.testing.assert_allclose(shapes[0].joints_mm, shapes[1].joints_mm, atol=1e-5)
@@ -106,9 +101,7 @@ def test_dead_end_keeps_the_last_good_state() -> None:
     assert steps.sum() == pytest.approx(after.depth_mm)
 
 
-@pytest.mark.parametrize(
-    ("bore", "stiffness", "segment"), [(0.3, 1.0, 1.0), (0.5, 1.0, 2.0), (0.4, 100.0, 2.0)]
-)
+@pytest.mark.parametrize(("bore", "stiffness", "segment"), [(0.3, 1.0, 1.0), (0.5, 1.0, 2.0), (0.4, 100.0, 2.0)])
 def test_wire_in_a_long_sheath_comes_to_rest(bore: float, stiffness: float, segment: float) -> None:
     """Pushed through 400 mm of sheath the wire buckles in it, by less than a tenth of a millimetre.
 

@@ -14,9 +14,7 @@ RADIUS, WALL = 0.3, 2.0
 CURVED = [[0, 0.06], [6, 0.06], [6, 0.01]]
 
 
-def oracle_minimum(
-    wire: GuideWire, depth: float, load: Array, tilt: float, height: float
-) -> tuple[Array, float]:
+def oracle_minimum(wire: GuideWire, depth: float, load: Array, tilt: float, height: float) -> tuple[Array, float]:
     """Joints and energy of the oracle's minimum from the rest shape, in a plane wall."""
     k, first = wire.segments_at(depth)
     length = np.full(k, wire.segment_mm)

@@ -14,9 +14,7 @@ from solver import GuideWire, Insertion, VesselWall
 from tests.solver.scenes import Array, bend_distance, sampled
 
 ROOT = Path(__file__).resolve().parents[2]
-CHILD = (
-    "import json; from tests.solver import test_plain_python as t; print(json.dumps(t.inserted().tolist()))"
-)
+CHILD = "import json; from tests.solver import test_plain_python as t; print(json.dumps(t.inserted().tolist()))"
 
 
 def inserted() -> Array:

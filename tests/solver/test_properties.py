@@ -9,14 +9,10 @@ from hypothesis import strategies as st
 from solver import Grid, GuideWire, Insertion, Solution, Status, VesselWall
 from tests.solver.scenes import Array, fork_grid
 
-CASES = settings(
-    max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
+CASES = settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 
 wires = st.builds(
-    lambda segment, tip, body, rest: GuideWire(
-        segment, 0.18, [[0, tip], [25, body]], [[0, rest], [8, rest], [8, 0]]
-    ),
+    lambda segment, tip, body, rest: GuideWire(segment, 0.18, [[0, tip], [25, body]], [[0, rest], [8, rest], [8, 0]]),
     st.sampled_from([0.7, 1.0, 2.0]),
     st.floats(0.2, 5.0),
     st.floats(1.0, 40.0),
@@ -27,9 +23,7 @@ rolls = st.floats(-180.0, 180.0)
 DEPTHS = np.arange(2.0, 33.0, 2.0)
 
 
-def inserted(
-    wire: GuideWire, grid: Grid, stiffness: float, frame: Array, origin: Array, roll: float
-) -> list[Solution]:
+def inserted(wire: GuideWire, grid: Grid, stiffness: float, frame: Array, origin: Array, roll: float) -> list[Solution]:
     insertion = Insertion(
         wire, VesselWall(grid, stiffness), origin, frame[:, 2], material_axis=frame[:, 0], tolerance=1e-12
     )

@@ -58,9 +58,7 @@ def test_closed_form_far_from_the_origin_does_as_at_the_origin() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_the_work_of_a_depth_is_limited(
-    method: str, friction: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_work_of_a_depth_is_limited(method: str, friction: float, monkeypatch: pytest.MonkeyPatch) -> None:
     wire = GuideWire(1.0, 0.18, STIFFNESS)
     wall = VesselWall(tube_grid(), 100.0, friction)
     direction = [np.sin(0.3), 0.0, np.cos(0.3)]

@@ -35,10 +35,7 @@ def test_a_twisted_straight_cantilever_turns_by_torque_over_stiffness() -> None:
     # the arm twists a little too, and the corner twists and bends: 10 % of the shaft's length
     assert load.joints_mm[-1, 1] / lever == pytest.approx(twist, rel=0.12)
     ideal = relax(
-        GuideWire(0.5, 0.1, 1e3, rest),
-        depth_mm=shaft + arm + 2,
-        material_axis=[1, 0, 0],
-        load_N=[0, force, 0],
+        GuideWire(0.5, 0.1, 1e3, rest), depth_mm=shaft + arm + 2, material_axis=[1, 0, 0], load_N=[0, force, 0]
     )
     assert abs(ideal.joints_mm[-1, 1]) < 0.2 * abs(load.joints_mm[-1, 1])
 

@@ -84,12 +84,7 @@ def other(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     (copy / "_kernels" / "wall_law.py").write_text(LAW, encoding="utf-8")
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(folder)}
     done = subprocess.run(
-        [sys.executable, "-c", CHILD],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        [sys.executable, "-c", CHILD], cwd=folder, env=environment, capture_output=True, encoding="utf-8", check=False
     )
     assert done.returncode == 0, done.stderr
     said: dict[str, Any] = json.loads(done.stdout)

@@ -21,15 +21,7 @@ from reports.tables import read
 
 TREES = ("BG001", "BG0002", "BG05", "BG10", "BG0019")
 FRAMES, SIZE, SEED = 6, 128, 100
-COLUMNS = (
-    "insertion_mm",
-    "trace_mean_mm",
-    "trace_tip_mm",
-    "rms_mm",
-    "tip_mm",
-    "truth_rms_mm",
-    "truth_tip_mm",
-)
+COLUMNS = ("insertion_mm", "trace_mean_mm", "trace_tip_mm", "rms_mm", "tip_mm", "truth_rms_mm", "truth_tip_mm")
 
 
 def files(data: Path) -> list[Path]:
@@ -54,9 +46,7 @@ def run_tree(path: Path, root: Path, size: int = SIZE, frames: int = FRAMES) -> 
     code, said = quietly(["synth", "--anatomy", str(path), "-o", str(study), *sizes])
     if code:
         return pd.DataFrame(), said.strip().splitlines()[-1]
-    code, said = quietly(
-        ["run", str(study / "manifest.toml"), "-o", str(out), "--no-cache", "--until", "compare"]
-    )
+    code, said = quietly(["run", str(study / "manifest.toml"), "-o", str(out), "--no-cache", "--until", "compare"])
     if code not in (0, 1):
         return pd.DataFrame(), said.strip().splitlines()[-1]
     table = read(next((out / "cases").iterdir()) / "errors.csv", ERRORS)
@@ -69,9 +59,7 @@ def lines(path: Path, table: pd.DataFrame, trouble: str) -> list[str]:
         return [f"{path.name}: {trouble}"]
     rows = [f"{path.name}: {(table['status'] == 'ok').sum()} of {len(table)} frames ok"]
     for record in table.to_dict("records"):
-        numbers = "".join(
-            f"{float(record[c]):15.3f}" if pd.notna(record[c]) else f"{'-':>15s}" for c in COLUMNS
-        )
+        numbers = "".join(f"{float(record[c]):15.3f}" if pd.notna(record[c]) else f"{'-':>15s}" for c in COLUMNS)
         rows.append(f"  {record['frame']:3d} {record['status']:22s}{numbers}")
     good = table[table["status"] == "ok"]
     if len(good):

@@ -13,10 +13,7 @@ from reports.tables import read
 def row(out: Path) -> str:
     """Frames ok, tracing in voxels (median frame), simulated against truth, peak memory."""
     case = next((out / "cases").iterdir())
-    table, result = (
-        read(case / "errors.csv", ERRORS),
-        json.loads((case / "result.json").read_text(encoding="utf-8")),
-    )
+    table, result = (read(case / "errors.csv", ERRORS), json.loads((case / "result.json").read_text(encoding="utf-8")))
     voxel = min(result["geometry"]["spacing_mm"])
     numbers = result["summary"]
     return (

@@ -55,9 +55,7 @@ class Outcome:
     def unexpected(self) -> list[str]:
         """One sentence per frame whose status is none of those expected."""
         pairs = enumerate(zip(self.statuses, self.expected, strict=True))
-        return [
-            f"{self.name} frame {i}: got {s}, expected {e}" for i, (s, e) in pairs if s not in e.split("|")
-        ]
+        return [f"{self.name} frame {i}: got {s}, expected {e}" for i, (s, e) in pairs if s not in e.split("|")]
 
 
 def size_of(scene: NamedScene) -> int:

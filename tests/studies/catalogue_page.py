@@ -92,11 +92,7 @@ def main(names: list[str]) -> None:
     for name in names or catalogue.names():
         scene = catalogue.describe(name)
         study = catalogue.build(
-            name,
-            frames=small.FRAMES,
-            size=small.size_of(scene),
-            seed=small.SEED,
-            truth_step_mm=small.TRUTH_STEP_MM,
+            name, frames=small.FRAMES, size=small.size_of(scene), seed=small.SEED, truth_step_mm=small.TRUTH_STEP_MM
         )
         draw(study).save(PICTURES / f"{name}.png", optimize=True)
     PAGE.write_text(page(), encoding="utf-8")

@@ -88,9 +88,7 @@ def main(words: list[str]) -> None:
     parser.add_argument("--size", type=int, default=SIZE)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--picture", type=Path, help="where to draw; default OUT/conebeam.png")
-    parser.add_argument(
-        "--drawn", action="store_true", help="nothing is made or run again: table and picture only"
-    )
+    parser.add_argument("--drawn", action="store_true", help="nothing is made or run again: table and picture only")
     args = parser.parse_args(words)
     for scanner in () if args.drawn else SCANNERS:
         seconds = make_and_run(scanner, args.out, args)

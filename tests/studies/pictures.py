@@ -56,8 +56,7 @@ def main() -> None:
     """Write both pictures."""
     validate, aneurism = Path(sys.argv[1]), Path(sys.argv[2])
     save(
-        stacked([last_row(figure(validate, "projections")), figure(validate, "error_by_depth")]),
-        "circle_of_willis.png",
+        stacked([last_row(figure(validate, "projections")), figure(validate, "error_by_depth")]), "circle_of_willis.png"
     )
     save(figure(aneurism, "simulated_wires"), "aneurism.png")
 

@@ -36,9 +36,7 @@ def at_arc(frame: TrueFrame, places: Array) -> Array:
     """Points at shares of the wire's own length: it stretches by a millionth."""
     edges = np.linalg.norm(np.diff(frame.points_mm, axis=0), axis=1)
     arc = np.concatenate([[0.0], np.cumsum(edges)])
-    return np.column_stack(
-        [np.interp(places * arc[-1] / frame.depth_mm, arc, frame.points_mm[:, a]) for a in range(3)]
-    )
+    return np.column_stack([np.interp(places * arc[-1] / frame.depth_mm, arc, frame.points_mm[:, a]) for a in range(3)])
 
 
 def scene_setup(name: str, seed: int, frames: int) -> Setup:
@@ -55,8 +53,7 @@ def halved(name: str, setup: Setup, step_mm: float) -> tuple[str, float, bool]:
     step = min(step_mm, min(setup.depths_mm) / 8.0)
     clock = process_time()
     coarse, fine = (
-        list(replay(at_step(setup.insertion(), h), setup.depths_mm, setup.rolls_deg))
-        for h in (step, 0.5 * step)
+        list(replay(at_step(setup.insertion(), h), setup.depths_mm, setup.rolls_deg)) for h in (step, 0.5 * step)
     )
     moves = [apart(a, b) for a, b in zip(coarse, fine, strict=True)]
     worst = int(np.argmax(moves))
@@ -71,9 +68,7 @@ def halved(name: str, setup: Setup, step_mm: float) -> tuple[str, float, bool]:
 def main(words: list[str]) -> None:
     """Print the table; exit 1 where a frictionless scene moves by more than is allowed."""
     parser = argparse.ArgumentParser(prog="python -m tests.studies.truth", description=__doc__)
-    parser.add_argument(
-        "names", nargs="*", help="scenes (all of them without), or volume files for a real background"
-    )
+    parser.add_argument("names", nargs="*", help="scenes (all of them without), or volume files for a real background")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--step", type=float, default=STEP_MM)
     parser.add_argument("--frames", type=int, default=FRAMES)

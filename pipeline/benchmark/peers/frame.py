@@ -1,7 +1,5 @@
 """What every rival is asked, what its file has to provide, and how it is timed."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -109,8 +107,7 @@ class RivalWire(ABC):
             if np.abs(now - before).max() < still_mm:
                 return
             before = now
-        msg = f"{self.name}: not at rest after {self.steps} steps"
-        raise RuntimeError(msg)
+        raise RuntimeError(f"{self.name}: not at rest after {self.steps} steps")
 
     @abstractmethod
     def push(self, depth_mm: float) -> None:

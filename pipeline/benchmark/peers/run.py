@@ -1,7 +1,5 @@
 """The rivals one after the other, and this solver in the same run."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import re
@@ -141,7 +139,5 @@ def bending_energy(points: Array) -> float:
     along = np.diff(points, axis=0)
     length = np.linalg.norm(along, axis=1)
     unit = along / length[:, None]
-    turn = np.arctan2(
-        np.linalg.norm(np.cross(unit[:-1], unit[1:]), axis=1), np.einsum("na,na->n", unit[:-1], unit[1:])
-    )
+    turn = np.arctan2(np.linalg.norm(np.cross(unit[:-1], unit[1:]), axis=1), np.einsum("na,na->n", unit[:-1], unit[1:]))
     return float(0.5 * EI * np.sum(turn**2 / (0.5 * (length[:-1] + length[1:]))))

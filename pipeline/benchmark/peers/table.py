@@ -1,7 +1,5 @@
 """The comparison in words: ratios within one run, never seconds of two machines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Random scenes: a moderate plan is drawn, then made extreme along one to three axes of stress."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

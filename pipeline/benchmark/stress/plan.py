@@ -1,7 +1,5 @@
 """The plan of one random scene, and the wall and the entry that it makes: at the origin, the vessel along +z."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

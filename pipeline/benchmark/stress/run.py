@@ -1,7 +1,5 @@
 """The whole study: scenes in, tables out. Each row is on disk as soon as its scene has ended."""
 
-from __future__ import annotations
-
 import io
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -28,18 +26,14 @@ BUSY = 10.0
 """A busy machine gives a process a tenth of a core; one that is silent for longer waits for something."""
 
 
-def run_isolated(
-    seed: int, indices: Sequence[int], jobs: int = 1, limit_s: float = LIMIT_S
-) -> Iterator[SceneOutcome]:
+def run_isolated(seed: int, indices: Sequence[int], jobs: int = 1, limit_s: float = LIMIT_S) -> Iterator[SceneOutcome]:
     """Outcomes of the scenes as they end, ``jobs`` of them at a time."""
     warm_up(beside=True)  # compiled once, here; a worker only loads the machine code
     for done in run_all(indices, partial(_run_alone, run_scene, limit_s, seed), jobs):
         yield done.result or _failed(seed, done.job, Lost("crash", done.error))
 
 
-def _run_alone(
-    run: Callable[[int, int], SceneOutcome], limit_s: float, seed: int, index: int
-) -> SceneOutcome:
+def _run_alone(run: Callable[[int, int], SceneOutcome], limit_s: float, seed: int, index: int) -> SceneOutcome:
     """Run one scene in a fork of this process, whose kernels are loaded; a crash or a hang is its outcome."""
     _loaded()
     answer = alone("fork", partial(run, seed, index), BUSY * limit_s, limit_s)
@@ -102,9 +96,7 @@ def _rows_at(path: Path, seed: int, indices: Sequence[int]) -> list[dict[str, An
         return []
     # an empty text is a text
     numbers = {"residual": ["", "nan"], "stretch": ["", "nan"]}
-    table = pd.read_csv(
-        io.StringIO(whole + end), dtype={"version": str}, keep_default_na=False, na_values=numbers
-    )
+    table = pd.read_csv(io.StringIO(whole + end), dtype={"version": str}, keep_default_na=False, na_values=numbers)
     mine = table[(table["seed"] == seed) & (table["version"] == version()) & table["index"].isin(indices)]
     return [{str(name): value for name, value in row.items()} for row in mine.to_dict("records")]
 

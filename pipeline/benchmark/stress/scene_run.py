@@ -1,7 +1,5 @@
 """Run one plan and judge every depth of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from time import process_time
 
@@ -97,9 +95,7 @@ def _straight_energy(plan: ScenePlan, wire: GuideWire, wall: VesselWall | None, 
     return chain.energy(*chain.roll_out(angles, solution.joints_mm[0], solution.frames[0]))
 
 
-def _outcome(
-    plan: ScenePlan, solutions: list[Solution], verdicts: list[SceneVerdict], seconds: float
-) -> SceneOutcome:
+def _outcome(plan: ScenePlan, solutions: list[Solution], verdicts: list[SceneVerdict], seconds: float) -> SceneOutcome:
     """The first fault, the last status that is not "converged", and the worst of what was measured."""
     bad = next((v for v in verdicts if v.fault), None)
     failed = [s.status for s in solutions if s.status is not Status.CONVERGED]

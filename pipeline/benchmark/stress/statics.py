@@ -5,8 +5,6 @@ summed from the tip to the clamp, and only the interpolated distance itself is t
 Valid without friction; the wall is looked up at the joints (trapezium rule, half a weight at the tip).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -131,9 +129,7 @@ def assemble(
     return StaticChain(wire, wall, length, 1.0 / compliance, twist, rest, at_rest, load, kinds)
 
 
-def _integral(
-    at: Array, value: Array, low: Array, high: Array, mean: Callable[[Array, Array], Array]
-) -> Array:
+def _integral(at: Array, value: Array, low: Array, high: Array, mean: Callable[[Array, Array], Array]) -> Array:
     """Integral (k,) over [low, high] of what has this mean where a piecewise linear function goes from p to q.
 
     The function is constant beyond its ends; two equal places make a jump.

@@ -1,7 +1,5 @@
 """Is what the solver returned sound? Checked from the published state alone, with a second assembly of the statics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -48,12 +46,7 @@ class SceneVerdict:
 
 
 def judge(
-    plan: ScenePlan,
-    wire: GuideWire,
-    wall: VesselWall | None,
-    solution: Solution,
-    start_energy: float,
-    deep: bool,
+    plan: ScenePlan, wire: GuideWire, wall: VesselWall | None, solution: Solution, start_energy: float, deep: bool
 ) -> SceneVerdict:
     """Judge one solution.
 

@@ -3,8 +3,6 @@
 A step takes what is known of the case and returns more; what it writes down on the way goes to the log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

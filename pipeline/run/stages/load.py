@@ -2,8 +2,6 @@
 the user's own, the stored one, or segmented from the wire-free scan.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +25,7 @@ def open_case(run: Context, known: Known) -> Known:
     count = len(scans.frames) or case.frame_count
     wrong = not_one_per_frame({"insertion_mm": case.insertion_mm, "roll_deg": case.roll_deg}, count)
     if wrong:
-        msg = f"case {case.id!r}: {wrong[0]}"
-        raise LoadError(msg)
+        raise LoadError(f"case {case.id!r}: {wrong[0]}")
     offset = run.config.simulate.roll_offset_deg
     frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(rolls(case.roll_deg, count))]
     if case.insertion_mm:
@@ -55,9 +52,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
     if known.scans.reference is None:
-        log.assumptions.append(
-            "no reference scan: the lumen was segmented from frame 0, which has a wire in it"
-        )
+        log.assumptions.append("no reference scan: the lumen was segmented from frame 0, which has a wire in it")
     crop = Crop(scan, scan.box, config.load)
     lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment)
     log.warnings += lumen.warnings

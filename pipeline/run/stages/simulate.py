@@ -1,7 +1,5 @@
 """simulate: the whole insertion replayed once, from the clamp to the depth of every frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
@@ -61,6 +59,4 @@ def _with_depth(frame: Frame, source: str) -> Frame:
     found = replace(frame, depth_mm=depth)
     if not np.isnan(depth):
         return found
-    return found.failed(
-        "simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given"
-    )
+    return found.failed("simulate", FrameStatus.SIMULATE_FAILED, "no depth: nothing traced and no insertion_mm given")

@@ -1,7 +1,5 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -47,9 +45,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     work = _Tracing(run, known, own_curves=bool(given))
     frames: list[Frame] = []
     for frame, header in zip(known.frames, known.scans.frames, strict=True):
-        previous = next(
-            (f.curve for f in reversed(frames) if f.curve is not None and len(f.curve.points_mm)), None
-        )
+        previous = next((f.curve for f in reversed(frames) if f.curve is not None and len(f.curve.points_mm)), None)
         try:
             done = work.look(frame, header, previous, given[frame.index] if given else None)
         except StageError as error:

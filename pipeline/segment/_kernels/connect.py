@@ -6,8 +6,6 @@ the tile. There is a cell for every voxel, and a layer of tiles around the volum
 they are written to (:mod:`pipeline.arrays.lattice`), so cost and memory follow the object, not the volume.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,9 +109,7 @@ def _flat(s: Search, cells: NDArray[Any]) -> NDArray[Any]:
 
 
 @kernel
-def _affinity(
-    cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: int, to: int
-) -> float:
+def _affinity(cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: int, to: int) -> float:
     """Affinity of a voxel of grey level ``here`` and that of the cell ``to``, 0 to 255; -1 where that is SEEN.
 
     Arrays, not a Search: both searches spend their time here, and would take five times as long.

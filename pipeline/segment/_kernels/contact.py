@@ -1,7 +1,5 @@
 """Cores of a lumen's parts, how far along each part a voxel lies, and where two parts' voxels meet."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,9 +29,7 @@ class Cores(NamedTuple):
 
 
 @kernel
-def _covered(
-    ids: NDArray[Any], spacing: NDArray[Any], depth: NDArray[Any], n: int, at: tuple[int, int, int]
-) -> bool:
+def _covered(ids: NDArray[Any], spacing: NDArray[Any], depth: NDArray[Any], n: int, at: tuple[int, int, int]) -> bool:
     """Whether the ball of voxel n, at indices ``at``, lies within that of a neighbour, to a tenth of a voxel."""
     i, j, k = at
     covered = False

@@ -1,7 +1,5 @@
 """Crests through given voxels: where a thin bright line runs, to a fraction of a voxel, and how bright it is."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -18,9 +16,7 @@ FURTHEST = 1.8
 
 
 @entry_point
-def crests(
-    field: Blurred, voxels: NDArray[Any], outside: float, sharp: float
-) -> tuple[NDArray[Any], NDArray[Any]]:
+def crests(field: Blurred, voxels: NDArray[Any], outside: float, sharp: float) -> tuple[NDArray[Any], NDArray[Any]]:
     """Crest points (n, 3), index * spacing, and the blurred grey there, of flat voxels that have one.
 
     On a crest the weaker curvature across is at least ``sharp`` (1/mm^2) of the height above ``outside``; a flank's is

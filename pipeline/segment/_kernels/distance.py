@@ -3,8 +3,6 @@
 Coordinates are index * spacing (mm along the grid's axes).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +30,7 @@ def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
 
 
 @kernel
-def _takes(
-    at: tuple[float, float, float], known: int, inside: int, foot: NDArray[Any], m: int, most: float
-) -> bool:
+def _takes(at: tuple[float, float, float], known: int, inside: int, foot: NDArray[Any], m: int, most: float) -> bool:
     """Whether a voxel at ``at`` takes foot m for its own: nearer than what it has (``known`` - 1), or its first.
 
     Outside a first one must lie within the square root of ``most``.

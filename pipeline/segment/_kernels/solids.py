@@ -3,8 +3,6 @@
 Coordinates are index * spacing (mm along the grid's axes).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

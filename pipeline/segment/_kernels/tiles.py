@@ -5,8 +5,6 @@ separable kernel takes three sweeps over a few kilobytes. A voxel's value does n
 the result is bit for bit that of smoothing everything first (tests/pipeline/test_segment_connect.py).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -37,10 +35,7 @@ def _sweep(source: NDArray[Any], taps: NDArray[Any], stride: int, length: int, o
         d[n] = w0 * s0[n] + w1 * s1[n] + w2 * s2[n]
     for t in range(3, taps.shape[0], 2):
         w0, w1 = taps[t], taps[t + 1]
-        s0, s1 = (
-            source[t * stride : t * stride + length],
-            source[(t + 1) * stride : (t + 1) * stride + length],
-        )
+        s0, s1 = (source[t * stride : t * stride + length], source[(t + 1) * stride : (t + 1) * stride + length])
         for n in range(length):
             d[n] += w0 * s0[n] + w1 * s1[n]
 

@@ -6,8 +6,6 @@ of the cubic B-spline). Coordinates are index * spacing (mm along the grid's axe
 voxels on every side.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -180,12 +178,7 @@ def smooth_lattice(
 
 @entry_point
 def surface_voxels(
-    state: NDArray[Any],
-    lattice: NDArray[Any],
-    level: float,
-    deep: int,
-    voxels: NDArray[Any],
-    inside: NDArray[Any],
+    state: NDArray[Any], lattice: NDArray[Any], level: float, deep: int, voxels: NDArray[Any], inside: NDArray[Any]
 ) -> NDArray[Any]:
     """Voxels (flat) with a 6-neighbour on the other side, and beside those; ``inside`` gets 1 where it holds.
 

@@ -3,8 +3,6 @@
 ``runs`` : (n, 4) rows i, j, first k, stop k of a box.  ``corner`` : the scan's voxel that is (0, 0, 0) of the box.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

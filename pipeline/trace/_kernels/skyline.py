@@ -5,8 +5,6 @@ strands touch, some fill in between. LAPACK's dense factorisation takes a hundre
 stall one another when several frames or other programs run.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bright ridges as ordered sub-voxel points: a predictor-corrector walk from every strong voxel that is left."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ c_m = sum_k B_k(u_m) P_k on the curve, W_m its arc weight (quadrature weight tim
 The arc weights depend on the control points too: that is what places the tip along the wire.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,17 +90,11 @@ def _around(
 ) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
     """First and stop index, along each axis, of the voxels within ``radius`` mm of a point."""
     (ni, nj, nk), (hx, hy, hz) = shape, (spacing[0], spacing[1], spacing[2])
-    return (
-        nodes_near(x, x, radius, hx, ni),
-        nodes_near(y, y, radius, hy, nj),
-        nodes_near(z, z, radius, hz, nk),
-    )
+    return (nodes_near(x, x, radius, hx, ni), nodes_near(y, y, radius, hy, nj), nodes_near(z, z, radius, hz, nk))
 
 
 @entry_point
-def active_voxels(
-    slot: NDArray[Any], spacing: NDArray[Any], curve: NDArray[Any], radius: float
-) -> NDArray[Any]:
+def active_voxels(slot: NDArray[Any], spacing: NDArray[Any], curve: NDArray[Any], radius: float) -> NDArray[Any]:
     """Flat indices of the voxels within ``radius`` mm of the samples (n, 3); ``slot`` gets their position + 1."""
     _, nj, nk = slot.shape
     found = np.empty(4096, np.int64)
@@ -153,13 +145,7 @@ def _find(row: NDArray[Any], count: int, wanted: int) -> int:
 
 @kernel
 def _add_tints(
-    ids: NDArray[Any],
-    used: NDArray[Any],
-    by_tint: NDArray[Any],
-    s: int,
-    first: int,
-    share: float,
-    shade: float,
+    ids: NDArray[Any], used: NDArray[Any], by_tint: NDArray[Any], s: int, first: int, share: float, shade: float
 ) -> None:
     """Add to a voxel's derivatives by the two amplitude nodes that a sample lies between."""
     for q in range(2):

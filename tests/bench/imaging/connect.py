@@ -110,9 +110,7 @@ def embedded(sides=(256, 640)):
 
 def report(quick):
     """Print the table."""
-    print(
-        "\n## Fuzzy connectedness: CPU seconds, one thread, one run (identity with max-min Dijkstra and with"
-    )
+    print("\n## Fuzzy connectedness: CPU seconds, one thread, one run (identity with max-min Dijkstra and with")
     print("   reconstruction on every voxel: tests/pipeline/test_segment_connect.py)")
     for side in (256,) if quick else (256, 512):
         rows, share, (ours, plain, queue) = compare(side)
@@ -123,6 +121,4 @@ def report(quick):
             print(f"  {name:36s} {seconds:7.4f} s   Dice with ours {dice:.3f}")
     far = 384 if quick else 640
     small, large = embedded((256, far))
-    print(
-        f"one object inside 256^3 and {far}^3: {small:.4f} and {large:.4f} s, ratio {large / small:.2f} (bar 1.8)"
-    )
+    print(f"one object inside 256^3 and {far}^3: {small:.4f} and {large:.4f} s, ratio {large / small:.2f} (bar 1.8)")

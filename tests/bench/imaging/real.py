@@ -18,12 +18,7 @@ from pipeline.segment import segment
 from tests.pipeline.in_region import trace_region
 
 # corners (x, y) in pixels of four boxes, each around one ramp of the CTP404 module, slices 26 to 38
-BOXES = (
-    ((168, 195), (188, 315)),
-    ((324, 195), (344, 315)),
-    ((195, 166), (319, 186)),
-    ((195, 322), (319, 342)),
-)
+BOXES = (((168, 195), (188, 315)), ((324, 195), (344, 315)), ((195, 166), (319, 186)), ((195, 322), (319, 342)))
 
 
 def catphan(data: Path):
@@ -104,9 +99,7 @@ def draw(volume, lumen, picture: Path):
 
     figure, axes = plt.subplots(2, 3, figsize=(18, 12.5))
     for axis, panel in enumerate(axes[0]):
-        panel.imshow(
-            np.max(-lumen.distance.values, axis=axis).T.clip(0), origin="lower", cmap="magma", vmax=5.5
-        )
+        panel.imshow(np.max(-lumen.distance.values, axis=axis).T.clip(0), origin="lower", cmap="magma", vmax=5.5)
         panel.set_title(f"greatest distance to the wall along {'xyz'[axis]}, 0 to 5.5 mm")
     corner = np.rint(volume.to_index(lumen.distance.origin_mm)).astype(int)
     for z, panel in zip(SLICES, axes[1], strict=True):
@@ -152,7 +145,5 @@ def report(quick, picture=None):
         "\n## CatPhan 504, cone-beam CT, 0.49 x 0.49 x 2.5 mm: four wires at 23 degrees (bars 1 degree, 0.05 mm across)"
     )
     for angle, across, up, status in catphan(Path(root)):
-        print(
-            f"   angle {angle:.2f}  rms within the slice {across:.3f} mm, across the slices {up:.3f} mm  {status}"
-        )
+        print(f"   angle {angle:.2f}  rms within the slice {across:.3f} mm, across the slices {up:.3f} mm  {status}")
     report_aneurysm(Path(root), picture)

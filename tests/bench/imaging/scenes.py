@@ -49,9 +49,7 @@ def _faded(vessel, shape, origin, seed):
 
 def scene(seed, side, uneven=False):
     """A 4 mm helical vessel and a wire that wanders in it, in side^3 voxels; its contrast even, or fading."""
-    vessel = phantoms.helix(
-        0.36 * VOXEL * (side - 30), 0.5 * VOXEL * (side - 60), 1.25 if side > 150 else 0.9
-    )
+    vessel = phantoms.helix(0.36 * VOXEL * (side - 30), 0.5 * VOXEL * (side - 60), 1.25 if side > 150 else 0.9)
     centre = 0.5 * (vessel.min(axis=0) + vessel.max(axis=0))
     origin = centre - 0.5 * VOXEL * side
     shape = (side, side, side)
@@ -66,20 +64,14 @@ def scene(seed, side, uneven=False):
     shift = rng.normal(size=3)
     shift *= 0.5 * VOXEL / np.linalg.norm(shift)
     blurred = (ndimage.gaussian_filter(empty, PSF), ndimage.gaussian_filter(wired, PSF))
-    return Scene(
-        seed, origin, empty, wired, blurred, phantoms.resample(wire, 0.005), wire[40] + shift, direction
-    )
+    return Scene(seed, origin, empty, wired, blurred, phantoms.resample(wire, 0.005), wire[40] + shift, direction)
 
 
 def volumes(s, cnr, correlation=0.0):
     """Frame and reference of the same noise."""
     noise = PEAK / cnr
     return tuple(
-        Volume(
-            np.asfortranarray(phantoms.scan(v, 0, noise, 1000 * s.seed + n, correlation)),
-            [VOXEL] * 3,
-            s.origin,
-        )
+        Volume(np.asfortranarray(phantoms.scan(v, 0, noise, 1000 * s.seed + n, correlation)), [VOXEL] * 3, s.origin)
         for n, v in enumerate(s.blurred[::-1])
     )
 

@@ -29,9 +29,7 @@ def write_study(folder: Path, side: int, frames: int):
     length = len(s.wire)
     for n in range(frames):
         part = s.wire[: int(length * (0.35 + 0.65 * (n + 1) / frames))]
-        wired = phantoms.add_wire(
-            s.empty.copy(), part[::6], scenes.RADIUS, phantoms.WIRE, scenes.VOXEL, s.origin
-        )
+        wired = phantoms.add_wire(s.empty.copy(), part[::6], scenes.RADIUS, phantoms.WIRE, scenes.VOXEL, s.origin)
         _write(folder / f"frame_{n:02d}.mha", phantoms.scan(wired, scenes.PSF, scenes.PEAK / 8, n), s.origin)
     _write(folder / "reference.mha", phantoms.scan(s.empty, scenes.PSF, scenes.PEAK / 8, 999), s.origin)
     (folder / "entry.json").write_text(json.dumps([s.entry.tolist(), s.direction.tolist()]))
@@ -71,9 +69,7 @@ def report(quick):
         r = json.loads(done.stdout.splitlines()[-1])
         others = rivals(folder, s, RIVAL_FRAMES)
     parts, total = r["seconds"], sum(r["seconds"].values())
-    print(
-        f"\n## {frames} frames of {side}^3 as int16 .mha, warm files, registration skipped; one process, wall s"
-    )
+    print(f"\n## {frames} frames of {side}^3 as int16 .mha, warm files, registration skipped; one process, wall s")
     good, share = r["status"].count("OK"), 100 * r["crop"]
     print(f"   {good} of {frames} frames OK; read on the lumen's box, {share:.0f} % of them")
     spent = " + ".join(f"{stage} {seconds:.2f}" for stage, seconds in parts.items())
@@ -84,9 +80,7 @@ def report(quick):
     for rival, (seconds, error) in others.items():
         ratio = (seconds * frames + parts["load"]) / total
         bar = "(bar 10)" if "ridge" in rival else "(no bar: cheap and off)"
-        print(
-            f"     {rival:22s} {seconds:6.2f} s a frame, {ratio:5.1f} times as long {bar}, error {error:.2f} voxel"
-        )
+        print(f"     {rival:22s} {seconds:6.2f} s a frame, {ratio:5.1f} times as long {bar}, error {error:.2f} voxel")
     frame = side**3 * 2 / 2**20
     print(f"   peak resident memory over the imported, warm program ({r['base']:.0f} MiB; {r['how']}): "
           f"{r['peak']:.0f} MiB = {r['peak'] / frame:.2f} int16 frames (bar 4)")  # fmt: skip

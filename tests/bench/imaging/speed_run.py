@@ -74,8 +74,7 @@ def work_all(folder, peak=None):
     for file in sorted(folder.glob("frame_*.mha")):
         frame = timed("load", lambda f=file: load(read_header(f), box, config))
         curve = timed(
-            "trace",
-            lambda f=frame, p=previous: trace(f, lumen, entry, direction, reference=reference, previous=p),
+            "trace", lambda f=frame, p=previous: trace(f, lumen, entry, direction, reference=reference, previous=p)
         )
         previous = curve if len(curve.points_mm) else previous
         found.append(curve.status.name)

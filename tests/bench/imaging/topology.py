@@ -95,9 +95,7 @@ def report(quick):
     for kind, c in counts.items():
         print(
             f"   {kind:9s} "
-            + "  ".join(
-                f"{name} {c[name]}" for name in ("all", "right", "wrong, unflagged", "right, flagged")
-            )
+            + "  ".join(f"{name} {c[name]}" for name in ("all", "right", "wrong, unflagged", "right, flagged"))
         )
     total = sum(counts.values(), Counter())
     print(
@@ -112,9 +110,7 @@ def report(quick):
     )
     faint = range(720, 724 if quick else 732)
     print(f"   low contrast, plain wires of seeds {faint[0]}-{faint[-1]}; a previous curve is 6 mm short and")
-    print(
-        "   half a voxel off (right) or 2 mm aside (wrong); it counts where its crest stands 3 sigmas out on 95 %"
-    )
+    print("   half a voxel off (right) or 2 mm aside (wrong); it counts where its crest stands 3 sigmas out on 95 %")
     print("   of it and ends where the curve does")
     print("   CNR  previous  right, ok  right, flagged  wrong, flagged  wrong, unflagged  statuses")
     for cnr in (3.0, 2.5, 2.0, 1.5):

@@ -114,18 +114,10 @@ def report(quick):
     bars = "  ".join(f"{cnr}: {mean} / {tip}" for cnr, (mean, tip) in BARS.items())
     print(f"   bars at CNR  {bars}  (mean / median tip), cover 0.99, pull 0.8-1.25")
     print("   limit: mean 2-D error of a line fit with knots every 8 voxels, 1.25 * 0.8 / (CNR sqrt 8)")
-    print(
-        "   none: no reference scan, lumen and background from the frame itself; uneven: contrast that fades by"
-    )
-    print(
-        "   a quarter along the vessel and is mottled by 4 %. Rivals: threshold half way up, skeleton, longest path;"
-    )
-    print(
-        "   Sato filter on the lumen's box (on the frame it would take minutes), cheapest path to the TRUE tip"
-    )
-    print(
-        "   method or noise       CNR   mean   p95    tip  worst   cover   pull  tip pull  limit    CPU s  frames"
-    )
+    print("   none: no reference scan, lumen and background from the frame itself; uneven: contrast that fades by")
+    print("   a quarter along the vessel and is mottled by 4 %. Rivals: threshold half way up, skeleton, longest path;")
+    print("   Sato filter on the lumen's box (on the frame it would take minutes), cheapest path to the TRUE tip")
+    print("   method or noise       CNR   mean   p95    tip  worst   cover   pull  tip pull  limit    CPU s  frames")
     for (name, cnr), cell in sorted(measure(side, seeds, rivals).items(), key=_order):
         print(cell.line(name, cnr))
 

@@ -107,8 +107,7 @@ class WithoutJacobian(RivalWire):
         if not self._step(depth_mm, step):
             self.halved += 1
             if step < SMALLEST_STEP_MM:
-                msg = f"Exudyn: no static solution at {depth_mm:g} mm"
-                raise RuntimeError(msg)
+                raise RuntimeError(f"Exudyn: no static solution at {depth_mm:g} mm")
             self.push(depth_mm - 0.5 * step)
             self.push(depth_mm)
         how = f"static Newton, wall through GenericODE2 callbacks ({self.given})"

@@ -99,8 +99,7 @@ class Wire(RivalWire):
         self.steps += CHECK
         # MuJoCo answers an unstable step by putting the wire back as it was built, with no more than a warning
         if self.data.warning.number.any():
-            msg = "MuJoCo: the simulation became unstable and was reset"
-            raise RuntimeError(msg)
+            raise RuntimeError("MuJoCo: the simulation became unstable and was reset")
         return self.points()
 
 

@@ -1,7 +1,5 @@
 """This project's own solver on the same work, measured in the same way; its wall is sampled at the same voxels."""
 
-from __future__ import annotations
-
 from pipeline.benchmark.peers.frame import RivalWire, Task
 from pipeline.model import Array
 from solver import Insertion, relax
