@@ -3,8 +3,6 @@
 Reads tidy CSV files; what they hold in excess of the named columns is kept in the tables of the page.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +84,7 @@ def recommended(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(found, ignore_index=True) if found else nothing
 
 
-def _worst_from_here(rows: pd.DataFrame) -> pd.Series[float]:
+def _worst_from_here(rows: pd.DataFrame) -> "pd.Series[float]":
     """Largest shape error of each row and of the shorter segments with the same other settings; a failure is inf."""
     same = [c for c in ("scene", "method", "hull", "quadrature", "tolerance") if c in rows]
     error = rows["shape_error_mm"].fillna(np.inf)

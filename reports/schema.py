@@ -6,8 +6,6 @@ an empty field, never 0. A new error metric is one line of columns.toml, or ``ER
 this package; a new trivial predictor is ``ERRORS.add(predictor(...))``.
 """
 
-from __future__ import annotations
-
 import difflib
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
@@ -72,7 +70,7 @@ class Column:
         word = {"median": "median", "max": "max", "share": "fraction"}.get(self.pooled, "")
         return self.name if not word or word in self.name.split("_") else self.with_word(word)
 
-    def pooled_column(self) -> Column:
+    def pooled_column(self) -> "Column":
         """The column of summary.csv for the case's value, where the table does not have one with words of its own."""
         shown = {"cases": ""} if "frames" in self.shown else {}
         meaning = f"{self.meaning}; {POOLED[self.pooled]}"
@@ -82,7 +80,7 @@ class Column:
 class Table:
     """A table: its file's name and its columns in the order of the file."""
 
-    def __init__(self, file: str, pooled_in: Table | None = None) -> None:
+    def __init__(self, file: str, pooled_in: "Table | None" = None) -> None:
         """The table of columns.toml for a file; ``pooled_in`` gets the pooled columns that it does not have."""
         self.file = file
         self.columns = tuple(Column(**entry) for entry in _DECLARED[file])

@@ -3,8 +3,6 @@
 Reading gives a DataFrame with every column of the table, in its order and kind, with NA for empty fields.
 """
 
-from __future__ import annotations
-
 import gzip
 import math
 from collections.abc import Iterable, Mapping
@@ -76,7 +74,7 @@ def _conform(content: pd.DataFrame, table: Table) -> pd.DataFrame:
     return pd.DataFrame({column.name: _typed(content, column) for column in table} | extra)
 
 
-def _typed(content: pd.DataFrame, column: Column) -> pd.Series[Any]:
+def _typed(content: pd.DataFrame, column: Column) -> "pd.Series[Any]":
     dtype: Any = _DTYPES[column.kind]
     if column.name not in content:
         return pd.Series(math.nan if dtype == "float64" else pd.NA, index=content.index, dtype=dtype)

@@ -1,7 +1,5 @@
 """A regular grid of values in space: the one place where index and millimetre meet."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -63,11 +61,11 @@ class Grid:
         scaled = np.asarray(index, dtype=np.float64) * self.spacing_mm
         return np.asarray(scaled @ self.direction.T + self.origin_mm)
 
-    def with_values(self, values: NDArray[Any]) -> Grid:
+    def with_values(self, values: NDArray[Any]) -> "Grid":
         """The same geometry holding other values."""
         return Grid(values, self.spacing_mm, self.origin_mm, self.direction)
 
-    def crop(self, start: tuple[int, int, int], stop: tuple[int, int, int]) -> Grid:
+    def crop(self, start: tuple[int, int, int], stop: tuple[int, int, int]) -> "Grid":
         """The sub-grid of voxels ``start`` (inclusive) to ``stop`` (exclusive), as a view."""
         window = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
         return Grid(self.values[window], self.spacing_mm, self.to_mm(start), self.direction)

@@ -1,7 +1,5 @@
 """Springs by which friction holds the nodes of a rod to points of the wall, and which slip at a limit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +19,7 @@ class Sliders:
     anchor: Array
 
     @staticmethod
-    def under(coefficient: float, contact_N: Array, anchor: Array) -> Sliders:
+    def under(coefficient: float, contact_N: Array, anchor: Array) -> "Sliders":
         """The sliders under given forces (n + 1, 3) of the wall."""
         load = np.linalg.norm(contact_N, axis=1)
         return Sliders(coefficient * load, contact_N / np.maximum(load, 1e-300)[:, None], anchor)

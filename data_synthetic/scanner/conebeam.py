@@ -6,8 +6,6 @@ drawn but follow from the physics: three energies, attenuation coefficients of t
 wash out while the arm turns; a phantom that was moved is projected again where it then lies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -54,7 +52,7 @@ class ConeBeamScanner:
     share: Volume
 
     @staticmethod
-    def of(phantom: Phantom, grid: ScanGrid, arc: Arc = FULL_ARC) -> ConeBeamScanner:
+    def of(phantom: Phantom, grid: ScanGrid, arc: Arc = FULL_ARC) -> "ConeBeamScanner":
         """Project the phantom once; ImportError says how to get itk-rtk.
 
         Of its greys, contrast is the share of iodine, noise the exposure (photons go with its inverse square), both

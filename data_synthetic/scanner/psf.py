@@ -1,7 +1,5 @@
 """The ideal scanner: partial volume, Gaussian point spread, correlated noise, slow drift of the intensity."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,7 +24,7 @@ class PsfScanner:
     blurred: Volume
 
     @staticmethod
-    def of(phantom: Phantom, grid: ScanGrid) -> PsfScanner:
+    def of(phantom: Phantom, grid: ScanGrid) -> "PsfScanner":
         """Voxelise the phantom once."""
         greys, sharp = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         sharp *= (1.0 - 0.5 * greys.washout) * (greys.contrast - greys.background)

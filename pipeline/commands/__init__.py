@@ -4,8 +4,6 @@ Here is what several verbs share: settings from the command line, messages for w
 inside ``main``, so that --help is instant.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
@@ -26,7 +24,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
 
 
-def settings_of(args: argparse.Namespace) -> list[Setting]:
+def settings_of(args: argparse.Namespace) -> "list[Setting]":
     """Settings files first, then --set; raises SettingsError."""
     from pipeline.study.settings import parse_assignment, read_settings
 
@@ -34,7 +32,7 @@ def settings_of(args: argparse.Namespace) -> list[Setting]:
     return read + [parse_assignment(text) for text in args.settings]
 
 
-def resolved_settings(args: argparse.Namespace) -> Resolved:
+def resolved_settings(args: argparse.Namespace) -> "Resolved":
     """The settings in force; raises SettingsError listing every problem."""
     from pipeline.study.settings import resolve
 

@@ -1,7 +1,5 @@
 """``wireval run MANIFEST -o OUT``: the whole pipeline over every case."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
@@ -71,7 +69,7 @@ def main(args: argparse.Namespace) -> int:
     return 0 if totals.all_ok else 1
 
 
-def _plan(args: argparse.Namespace) -> Plan:
+def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError, chosen, guard_out, points_of
@@ -94,7 +92,7 @@ def _plan(args: argparse.Namespace) -> Plan:
     return Plan(manifest, cases, template, points, args.jobs, args.executor, args.shard, assumptions)
 
 
-def _manifest(args: argparse.Namespace) -> tuple[Manifest, tuple[str, ...]]:
+def _manifest(args: argparse.Namespace) -> "tuple[Manifest, tuple[str, ...]]":
     """The manifest as given, or inferred from a folder of scans and printed."""
     from pipeline.study.infer import infer_manifest
     from pipeline.study.manifest import read_manifest

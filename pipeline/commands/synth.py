@@ -1,7 +1,5 @@
 """``wireval synth NAME -o DIR``: a study with truth, written as real files."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -58,7 +56,7 @@ def _problems(args: Namespace) -> list[str]:
     return [] if args.out is not None else ["-o DIR is missing: where shall the study be written?"]
 
 
-def _scene(args: Namespace) -> NamedScene:
+def _scene(args: Namespace) -> "NamedScene":
     """The scene that is asked for; ValueError where its file holds none."""
     from data_synthetic import catalogue
 

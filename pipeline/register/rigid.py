@@ -1,7 +1,5 @@
 """A rigid motion of the phantom between two scans, and large ones found by SimpleITK at walls and bones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -48,7 +46,7 @@ class Motion:
         object.__setattr__(self, "shift_mm", read_only(self.shift_mm, np.float64))
 
     @staticmethod
-    def about(centre_mm: ArrayLike, rotation_rad: ArrayLike, shift_mm: ArrayLike) -> Motion:
+    def about(centre_mm: ArrayLike, rotation_rad: ArrayLike, shift_mm: ArrayLike) -> "Motion":
         """A turn by the rotation vector (3,) about a centre, then a shift (3,)."""
         turn = Rotation.from_rotvec(np.asarray(rotation_rad, float)).as_matrix()
         centre = np.asarray(centre_mm, float)
@@ -58,11 +56,11 @@ class Motion:
         """Where points (..., 3) of the reference scan lie in the frame."""
         return np.asarray(np.asarray(points_mm, float) @ self.rotation.T + self.shift_mm)
 
-    def then(self, later: Motion) -> Motion:
+    def then(self, later: "Motion") -> "Motion":
         """This motion followed by another."""
         return Motion(later.rotation @ self.rotation, later.moved(self.shift_mm))
 
-    def after(self, earlier: Motion) -> Motion:
+    def after(self, earlier: "Motion") -> "Motion":
         """What this motion adds to an earlier one: ``earlier.then(m.after(earlier))`` is ``m``."""
         turn = self.rotation @ earlier.rotation.T
         return Motion(turn, self.shift_mm - turn @ earlier.shift_mm)

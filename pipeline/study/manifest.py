@@ -3,8 +3,6 @@
 Everything that is wrong with it is listed at once.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections import Counter
@@ -136,7 +134,7 @@ class Case(Strict):
         return len(self.frames) == 1 and self.frames[0].path.is_file()
 
     @model_validator(mode="after")
-    def _something_to_do(self) -> Case:
+    def _something_to_do(self) -> "Case":
         if not self.frames and self.insertion_mm is None:
             raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
         if not self.frames and self.reference is None and self.lumen is None:
@@ -144,7 +142,7 @@ class Case(Strict):
         return self
 
     @model_validator(mode="after")
-    def _one_per_frame(self) -> Case:
+    def _one_per_frame(self) -> "Case":
         lists = {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
         if problems := () if self._one_file else not_one_per_frame(lists, self.frame_count):
             raise _problem(*problems)
@@ -186,7 +184,7 @@ class ManifestTables(Strict):
         return value
 
     @model_validator(mode="after")
-    def _unique(self) -> ManifestTables:
+    def _unique(self) -> "ManifestTables":
         counts = Counter(case.id for case in self.case)
         repeats = [name for name, count in counts.items() if count > 1]
         if repeats:

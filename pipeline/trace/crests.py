@@ -1,7 +1,5 @@
 """Pieces of wire: sub-voxel crests of the smoothed grey above the background, each an ordered tracklet."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -51,7 +49,7 @@ class Tracklet:
         """Median crest grey."""
         return float(np.median(self.values))
 
-    def reversed(self) -> Tracklet:
+    def reversed(self) -> "Tracklet":
         """The other way round."""
         return Tracklet(self.points[::-1], -self.tangents[::-1], self.values[::-1])
 

@@ -1,7 +1,5 @@
 """A whole run: error of every frame, pooled error of every case, and how the error answers to a setting."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -136,7 +134,7 @@ def _panel(axes: Axes, rows: pd.DataFrame, unchanged: pd.DataFrame) -> None:
     plain(axes)
 
 
-def _value_axis(axes: Axes, values: pd.Series[Any]) -> pd.Series[float]:
+def _value_axis(axes: Axes, values: "pd.Series[Any]") -> "pd.Series[float]":
     """Name the values below the panel; returns their places: numbers as they are, words in their order."""
     numbers = pd.to_numeric(values, errors="coerce")
     numeric = bool(numbers.notna().all())

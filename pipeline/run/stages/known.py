@@ -1,7 +1,5 @@
 """What the steps of a case work with, and what they have found out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TypeVar, cast
@@ -62,7 +60,7 @@ class Frame:
         """The traced curve of a frame that loading and tracing found nothing wrong with."""
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
 
-    def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> Frame:
+    def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
         if not self.ok:
             return self

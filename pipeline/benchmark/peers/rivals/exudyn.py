@@ -1,7 +1,5 @@
 """Exudyn: absolute nodal coordinate cable elements, static Newton; the wall is a Python callback with its Jacobian."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import pairwise
 from typing import Any

@@ -9,8 +9,6 @@ those before it; a force one step late is a negative damping of dt times the wal
 take away, and the wire flew apart soon after it had touched.
 """
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

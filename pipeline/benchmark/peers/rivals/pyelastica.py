@@ -5,8 +5,6 @@ step of one unit of time; as documented (true density) the same answer takes a h
 lies about the clamp, half a cell behind it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import elastica as ea
@@ -39,7 +37,7 @@ class _Clamp(ea.OneEndFixedBC):  # type: ignore[misc]
 class _Push(ea.NoForces):  # type: ignore[misc]
     """The load or the wall, and drag towards rest."""
 
-    def __init__(self, wire: Wire, drag: float) -> None:
+    def __init__(self, wire: "Wire", drag: float) -> None:
         super().__init__()
         self.wire, self.drag = wire, drag
 

@@ -4,8 +4,6 @@ Segments lie about the nodes, so that the first joint is half a cell behind the 
 this kind second order. Statics by time steps with momentum kept and partly taken away, until nothing moves.
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 
