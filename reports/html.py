@@ -1,18 +1,64 @@
 """The pages: one per case, one for the run. Built from files on disk, so they can be rebuilt at any time."""
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import jinja2
+
 from reports import _content
 from reports._content import flatten, settings, size
-from reports._pages import draw_sections, write_page
+from reports.atomic import write_text
 from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
-from reports.figures import RunFiles, declared
+from reports.figures import RunFiles, declared, figures_of
+from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.scene3d import write_scene
 from reports.schema import ERRORS, FAILURES, SUMMARY, SWEEP
 from reports.tables import read_if_there
+
+
+def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[str, Any]]:
+    """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
+
+    Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or the files
+    themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
+    gone is removed, so that nobody finds it in the folder.
+    """
+    sections = []
+    for entry in declared(page):
+        path = folder / "figures" / f"{entry['figure']}.png"
+        drawing = figures_of(page)[entry["figure"]](data)
+        if drawing is None:
+            path.unlink(missing_ok=True)
+            path.with_suffix(".csv").unlink(missing_ok=True)
+            continue
+        save(drawing, path)
+        width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
+        source = _link(path, folder, "image/png", embed)
+        numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
+        sections.append({**entry, "source": source, "numbers": numbers, "width": width, "height": height})
+    return sections
+
+
+def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
+    """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    write_text(path, environment.get_template(template).render(page))
+    return path
+
+
+def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
+    if not embed:
+        return path.relative_to(folder).as_posix()
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
+
 
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
 

@@ -50,7 +50,7 @@ class Column:
     shown: Mapping[str, str] = field(default_factory=dict)
     """The PLACES that show it, each with what a legend calls it there."""
     style: str = ""
-    """How figures draw it, a name of ``figures._style.LINES``; empty: in a colour that the panel does not use."""
+    """How figures draw it, a name of ``figures._drawing.LINES``; empty: in a colour that the panel does not use."""
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored in silence."""
@@ -108,16 +108,11 @@ class Table:
         """Columns that a page shows at these places, place by place, each in the order of the file."""
         return tuple(c for place in places for c in self.columns if place in c.shown)
 
-    def add(self, column: Column, before: str = "") -> None:
-        """Take in a column from outside, ``before`` another or else before the timings, and its pooled column.
-
-        Raises ValueError where the table has a column of that name, or none of the name ``before``.
-        """
+    def add(self, column: Column) -> None:
+        """Take in a column from outside, before the timings, and its pooled column; ValueError where it is there."""
         if column.name in self.names:
             raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
-        followers = [before] if before else [c.name for c in self.columns if c.unit == "s"]
-        self.check(followers, self.file)
-        place = self.names.index(followers[0]) if followers else len(self.columns)
+        place = next((i for i, c in enumerate(self.columns) if c.unit == "s"), len(self.columns))
         self.columns = (*self.columns[:place], column, *self.columns[place:])
         self._pool(column)
 

@@ -11,13 +11,10 @@ Vector = tuple[float, float, float]
 
 BLOCK = 16
 """Samples under one bounding ball: 16 halves the cost of 8 at a thousand samples and gains nothing beyond."""
-
 FAR = 1e30
 """Stands for no tube yet; finite, so that differences stay finite."""
-
 TINY_LENGTH_MM = 1e-12
 """Lengths below this are treated as zero where a direction has to be formed (coordinates are below 1e3 mm)."""
-
 FOOT_TOLERANCE_MM = 1e-10
 """Step at which the foot on a centreline counts as found: far below the 1e-7 mm that a force of 1e-7 N needs."""
 

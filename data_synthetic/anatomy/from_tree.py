@@ -12,13 +12,10 @@ from data_synthetic.geometry import Array, Index, arc_lengths, at_arc
 STEP_MM = 0.5
 SMOOTHING_MM = 2.0
 """sd along the centreline: BraVa's points jump by a voxel of 0.3 to 0.6 mm every 1.85 mm."""
-
 WIDEST_MM = 3.0
 """The wire enters where the vessel's radius first falls below this: an aorta holds no guide wire in place."""
-
 NARROWEST_MM = 0.7
 """The way ends where the radius falls below this: four wire radii."""
-
 LONGEST_WAY_MM = 80.0
 TIGHTEST = 0.85
 """Largest product of radius and curvature of a smoothed tube; above one it would fold into itself."""

@@ -16,10 +16,8 @@ from data_synthetic.geometry import Array, Index, ScanGrid, Volume, voxels_near
 
 BAND_MM = 1.5
 """Distances are exact up to here and cut beyond: a wire touches at less than its radius."""
-
 SMOOTHING_VOXELS = 0.4
 """sd before the threshold: takes the staircase of an 8-bit scan away."""
-
 NEAREST_TRIANGLES = 8
 """Triangles tried per point, by their centroids; they are smaller than half a voxel, so the nearest is among them."""
 

@@ -14,7 +14,6 @@ Mask = NDArray[np.bool_]
 
 BEFORE_MM, AFTER_MM = 75.0, 20.0
 """The way begins this far before the widest place (an aneurysm, where there is one) and ends this far after it."""
-
 WIDE_ENOUGH, NEAR_VOXELS = 0.8, 6
 """Share of the widest end's radius from which an end may be the inlet, and how near to an end its radius is taken."""
 

@@ -29,10 +29,8 @@ DIAMETERS_MM = {
 }
 SPREAD_LIMIT = 1.0
 """Diameters are normal, cut at this many published sd: a vessel far from its mean would be another scene."""
-
 CENTRELINES = Path(__file__).with_name("willis.csv")
 """Control points of every vessel in its own direction, LPS mm: of the right side (x < 0) where it has two."""
-
 BOTH_SIDES = ("ICA", "M1", "A1", "A2", "PCoA", "P1", "P2", "vertebral")
 
 SWING_MM = np.array([[0.0, 0.0, 0.0], [-3.0, -2.0, 0.0], [1.5, 1.5, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])

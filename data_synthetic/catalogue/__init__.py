@@ -5,8 +5,7 @@ A new scene is one function in ``plain``, ``hard`` or ``willis``, below the deco
 
 from data_synthetic.catalogue import hard, plain, willis
 from data_synthetic.catalogue.limits import Wanted
-from data_synthetic.catalogue.own_anatomy import from_anatomy
-from data_synthetic.catalogue.own_background import background_scene
+from data_synthetic.catalogue.own_scenes import background_scene, from_anatomy
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory
 from data_synthetic.catalogue.study import Study, make_study
 from data_synthetic.scanner import PsfScanner
@@ -16,7 +15,6 @@ __all__ = ["Wanted", "background_scene", "build", "describe", "from_anatomy", "n
 
 SCANNERS: dict[str, ScannerFactory] = {"psf": PsfScanner.of, "conebeam": ConeBeamScanner.of}
 """What turns a phantom into grey values: the ideal scanner, and 3D rotational X-ray (needs the extra [conebeam])."""
-
 _BY_NAME = {
     scene.name: scene
     for module in (plain, hard, willis)

@@ -9,8 +9,7 @@ import numpy as np
 from data_synthetic.anatomy.tubes import Tube
 from data_synthetic.geometry import Array, ScanGrid
 from data_synthetic.rod.replay import TrueInsertion
-from data_synthetic.rod.rod import Wall
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.rod.rod import TrueWire, Wall
 from data_synthetic.scanner import Phantom, PsfScanner
 from data_synthetic.scanner.conebeam import ConeBeamScanner
 from data_synthetic.scanner.phantom import Wires

@@ -16,10 +16,8 @@ from data_synthetic.scanner.phantom import Scan, Wires
 
 ENTRY_ERROR_VOXELS = 0.5
 """How far the manifest's entry is from the true one: what pointing at a scan achieves."""
-
 DIRECTION_ERROR_DEG = 2.0
 """How far the manifest's entry direction is from the true one."""
-
 DEPTH_NOISE_MM = 0.2
 """sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
 

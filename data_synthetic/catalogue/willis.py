@@ -14,10 +14,8 @@ CENTRE_MM = np.array([0.0, -2.0, -2.0])
 SIPHON_MM = np.array([-14.0, -8.0, -14.0])
 CLOSE: dict[str, Any] = {"fov_mm": 52.8, "size": 176}
 """A field of view about one carotid, for scenes that are run small."""
-
 ENTRY_ARC_MM = 17.0
 """Into the carotid, at the foot of the petrous bend: an entry tilted by 2 degrees has a short lever there."""
-
 ROLL_DEG = 95.0
 """The roll that leads into a terminus aneurysm without a snap; tried on seeds 0 to 9."""
 

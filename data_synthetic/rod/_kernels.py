@@ -17,11 +17,9 @@ Vector = tuple[float, float, float]
 
 BANDS = 11
 """Rows of the lower band matrix: a vertex couples three nodes and two angles, 4 unknowns apart."""
-
 LOCAL = np.eye(8, BANDS, 4) - np.eye(8, BANDS)
 LOCAL[[3, 7]] = np.eye(BANDS)[[3, 7]]
 """Edges and angles (8,) about a vertex from its unknowns (11,): node v - 1, angle, node v, angle, node v + 1."""
-
 HESSIAN_STEP = 1e-6
 """Relative step of the central difference of the exact gradient; its error is about 1e-10 of the stiffness."""
 

@@ -11,10 +11,8 @@ from data_synthetic.rod.rod import Rod, Wall
 
 PLACES, WEIGHTS = (0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
 """Gauss points of an edge, as shares of it, and their weights, which add up to one."""
-
 STEEPEST = 1.1
 """Largest slope of a signed distance: 1 for the analytic anatomy, a little more for a spline through distances."""
-
 CURVATURE_STEP_MM = 1e-4
 """Step of the central difference of the wall's gradient; its Hessian is only needed to a few digits."""
 

@@ -14,8 +14,7 @@ import numpy as np
 from data_synthetic.geometry import Array
 from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.relax import Equilibrium, relax
-from data_synthetic.rod.rod import Rod
-from data_synthetic.rod.sliders import ELASTIC_SLIP_MM, Sliders
+from data_synthetic.rod.rod import ELASTIC_SLIP_MM, Rod, Sliders
 
 ROUNDS = 60
 """Rounds of normal forces; each shrinks their change by about mu times the angle that the wire bears on."""

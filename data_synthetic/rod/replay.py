@@ -16,15 +16,12 @@ from data_synthetic.geometry import Array, at_arc, ends_of, normal_to, rotate, u
 from data_synthetic.rod._kernels import Shape
 from data_synthetic.rod.friction import by_tip, held_back, relax_with_friction
 from data_synthetic.rod.relax import Equilibrium, relax
-from data_synthetic.rod.rod import TIP_EDGES, Rod, Wall, edge_lengths, make_rod, shape_from_points
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.rod.rod import TIP_EDGES, Rod, TrueWire, Wall, edge_lengths, make_rod, shape_from_points
 
 ROLL_STEP_DEG = 5.0
 """Largest roll between two equilibria of the replay."""
-
 NEWTON_FORCE_N = 1e-7
 """Largest unbalanced nodal force of a recorded wire; rounding leaves about 1e-9 N at 2e4 N of axial stiffness."""
-
 REPLAY_FORCE_N = 1e-5
 """Largest unbalanced nodal force between recorded depths: it only has to follow the branch."""
 

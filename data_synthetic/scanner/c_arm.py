@@ -17,13 +17,10 @@ from data_synthetic.geometry import Array, ScanGrid, Volume
 
 ABSENT = "scanner conebeam: itk-rtk is not installed; it comes with the extra: pip install 'wireval[conebeam]'"
 """What is said where RTK is missing."""
-
 MARGIN = 1.16
 """The detector sees the volume's width and a sixth more: what lies further out is cut off, as a head is."""
-
 BODY = 0.625
 """Radius of the phantom's body, an upright cylinder, over the width of the field of view: it is truncated."""
-
 TRUNCATION = 0.2
 """Share of the detector's width over which cut-off projections are rolled down before they are filtered."""
 

@@ -19,7 +19,6 @@ from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires, splat, w
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""
-
 ATTENUATION_PER_MM = {
     "body": np.array([0.02683, 0.02059, 0.01837]),  # water
     "contrast": np.array([0.0884, 0.0303, 0.0140]),  # 40 mg iodine per ml, beyond the water it is mixed with
@@ -29,13 +28,10 @@ ATTENUATION_PER_MM = {
 
 BLUR_PIXELS = 0.5
 """sd of the detector's own blur."""
-
 WIRE_BLUR_VOXELS = 0.35
 """sd, in half voxels, with which the wire is laid on its own fine grid, against aliasing."""
-
 VESSEL_MM = 5.0
 """The vessel behind the body by which grey values are calibrated."""
-
 FULL, FULL_ARC = Greys(), Arc()
 """The grey values that a full dose of 40 mg iodine per ml at full exposure stands for, and the run that gives them."""
 

@@ -51,7 +51,6 @@ class Phantom:
 
 CUT = 4.0
 """Gaussians are cut at this many sd: the rest of the weight is 6e-5."""
-
 RING_POINTS, RINGS = 16, 4
 """Points over the wire's cross-section, rings of equal area."""
 

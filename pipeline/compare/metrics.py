@@ -139,7 +139,6 @@ OF_POINTS: dict[str, Callable[[Array], float]] = {
     "max_mm": lambda errors: float(errors.max()),
 }
 """Statistics of point errors: of one frame's points, and pooled over all points of a case alike."""
-
 METRICS: dict[str, Metric] = {
     **{name: lambda pair, of=of: of(pair.error_mm) for name, of in OF_POINTS.items()},  # type: ignore[misc]
     "back_rms_mm": lambda pair: rms(pair.back_mm),

@@ -66,7 +66,9 @@ def _with_intervals(frames: Sequence[tuple[Row, Array]], points: Array, draws: i
     tips = [_number(row.get("tip_mm")) for row, _ in frames]
     rows = np.column_stack([points, squares, points * null**2, tips])
     units = blocks(len(frames), max(round(np.sqrt(len(frames))), 1))
-    rms_ci, tip_ci, skill_ci = intervals(rows, units, (pooled_rms, _median_tip, _pooled_skill), draws)
+    rms_ci, tip_ci, skill_ci = intervals(
+        rows, units, (pooled_rms, lambda r: float(np.median(r[:, 3])), _pooled_skill), draws
+    )
     return {
         "rms_mm": pooled_rms(rows),
         "rms_low_mm": rms_ci[0],
@@ -124,7 +126,3 @@ def intervals(
 
 def _pooled_skill(rows: Array) -> float:
     return 1.0 - float(rows[:, 1].sum() / rows[:, 2].sum()) if rows[:, 2].sum() > 0 else float("nan")
-
-
-def _median_tip(rows: Array) -> float:
-    return float(np.median(rows[:, 3]))

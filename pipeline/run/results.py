@@ -68,7 +68,11 @@ def found_results(out: Path) -> list[Result]:
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
-    frames = [_frame_entry(frame) for frame in known.frames]
+    frames = [
+        {name: getattr(f, name) for name in ("status", "sentence", "stage", "message")}
+        | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
+        for f in known.frames
+    ]
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
@@ -101,11 +105,6 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "inputs": _inputs(known.scans),
         "counters": log.counters,
     }
-
-
-def _frame_entry(frame: Frame) -> dict[str, Any]:
-    said = {name: getattr(frame, name) for name in ("status", "sentence", "stage", "message")}
-    return said | {"frame": frame.index, "registration": record(frame.registration), "trace": _marked(frame)}
 
 
 def _marked(frame: Frame) -> dict[str, float]:

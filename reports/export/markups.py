@@ -1,7 +1,6 @@
 """3D Slicer markups curves (.mrk.json), LPS mm."""
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,11 @@ _POSITION_DIGITS = 6  # a nanometre: below any voxel, above float noise
 
 
 def write_markups_curve(
-    path: Path,
-    points_mm: ArrayLike,
-    name: str,
-    measurements: Mapping[str, ArrayLike] | None = None,
-    colour: tuple[float, float, float] = (0.0, 0.447, 0.698),
+    path: Path, points_mm: ArrayLike, name: str, colour: tuple[float, float, float] = (0.0, 0.447, 0.698)
 ) -> None:
     """Write a curve through points (n, 3), LPS mm, in order.
 
-    measurements : name -> finite values (n,), shown by Slicer as control-point measurements; the ending
-    of the name (``_mm``, ``_N``, ``_deg``) gives the unit.     colour : red, green, blue from 0 to 1.
+    colour : red, green, blue from 0 to 1.
     """
     points = checked_points(points_mm, path)
     markup = {
@@ -38,7 +32,7 @@ def write_markups_curve(
         "locked": True,
         "labelFormat": "%N-%d",
         "controlPoints": [_control_point(name, i, p) for i, p in enumerate(points, start=1)],
-        "measurements": [_measurement(key, values, path) for key, values in (measurements or {}).items()],
+        "measurements": [],
         "display": {"visibility": True, "color": list(colour), "selectedColor": list(colour)},
     }
     write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
@@ -62,17 +56,4 @@ def _control_point(name: str, number: int, point: Array) -> dict[str, Any]:
         "locked": True,
         "visibility": False,  # a curve is read as a line; 400 glyphs would hide it
         "positionStatus": "defined",  # without it some versions take the point as a preview
-    }
-
-
-def _measurement(name: str, values: ArrayLike, path: Path) -> dict[str, Any]:
-    numbers = np.asarray(values, dtype=np.float64)
-    if not np.all(np.isfinite(numbers)):
-        raise ValueError(f"{path}: measurement {name} has values that are not finite; leave it out")
-    ending = name.rsplit("_", 1)[-1]
-    return {
-        "name": name,
-        "enabled": True,
-        "units": ending if ending in ("mm", "N", "deg") else "",
-        "controlPointValues": [float(f"{v:.6g}") for v in numbers],
     }

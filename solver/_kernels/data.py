@@ -14,7 +14,6 @@ OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", 
 CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID = range(7)
 UNFINISHED = -1
 """It goes on."""
-
 CURRENT, TRIAL, LAST_GOOD = range(3)
 """Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes."""
 
@@ -26,7 +25,6 @@ def record(*fields: tuple[Any, ...]) -> np.dtype[Any]:
 
 ENERGIES = record(*((name, float) for name in ("bending", "wall", "load", "friction")))
 """The parts of a state's energy, N mm."""
-
 WORK = (
     "wall_look_ups",
     "wall_look_ups_cheap",
@@ -47,7 +45,6 @@ WORK = (
 """What is counted, by the keys of ``Solution.work``."""
 COUNTERS = record(*((name, np.int64) for name in (*WORK, "passed")))
 """passed : joints and look-up points that the iterations of a depth have gone through, see ``tol.WORK``."""
-
 REPORT = record(
     ("start", float),
     ("penetration", float),
@@ -70,7 +67,6 @@ turned : the same to turning segments 0 and 1, in their own frames.     moment :
 decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
 joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
 """
-
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
     *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
@@ -82,7 +78,6 @@ Newton's method. first_free : joints before it are left alone.     damping : Lev
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
-
 PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")))
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
 step, mm (0 after a roll)."""

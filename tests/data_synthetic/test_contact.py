@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.rod.contact import add_wall, wall_energy
-from data_synthetic.rod.rod import Rod, make_rod
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.rod.rod import Rod, TrueWire, make_rod
 
 Array = NDArray[np.float64]
 X, Y, Z = np.eye(3)

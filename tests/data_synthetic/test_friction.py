@@ -12,9 +12,7 @@ from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.rod import replay as replaying
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.replay import TrueInsertion, _advance, _rod, replay
-from data_synthetic.rod.rod import Rod, edge_lengths, shape_from_points
-from data_synthetic.rod.sliders import ELASTIC_SLIP_MM, Sliders
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.rod.rod import ELASTIC_SLIP_MM, Rod, Sliders, TrueWire, edge_lengths, shape_from_points
 
 X, Y, Z = np.eye(3)
 LOAD_N, SOFT_N_MM2 = 0.5, 0.01

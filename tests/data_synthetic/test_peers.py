@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from data_synthetic.anatomy.shapes import straight
 from data_synthetic.rod.relax import relax
-from data_synthetic.rod.rod import Rod, make_rod, shape_from_points
-from data_synthetic.rod.wire import TrueWire
+from data_synthetic.rod.rod import Rod, TrueWire, make_rod, shape_from_points
 
 Array = NDArray[np.float64]
 pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore")]

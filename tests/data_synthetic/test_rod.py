@@ -12,8 +12,7 @@ from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.rod.relax import Equilibrium, relax
 from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay
-from data_synthetic.rod.rod import Rod, edge_lengths, make_rod, shape_from_points
-from data_synthetic.rod.wire import TrueWire, cell_means
+from data_synthetic.rod.rod import Rod, TrueWire, cell_means, edge_lengths, make_rod, shape_from_points
 
 Array = NDArray[np.float64]
 LENGTH, STIFFNESS = 100.0, 10.0

@@ -17,8 +17,7 @@ from pipeline.benchmark.cost import advice, costs, settings
 from pipeline.benchmark.insert import SolverSetting, insert, timed
 from pipeline.benchmark.isolate import Lost
 from pipeline.benchmark.peers.frame import Task, pushed
-from pipeline.benchmark.peers.run import ask, bending_energy
-from pipeline.benchmark.peers.table import sentences
+from pipeline.benchmark.peers.run import ask, bending_energy, sentences
 from pipeline.benchmark.reference import arc_samples, reference, resampled, shape_error
 from pipeline.benchmark.stress import statics
 from pipeline.commands import bench as command

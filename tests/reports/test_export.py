@@ -26,7 +26,7 @@ TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 @given(points=CURVES)
 def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray) -> None:
     folder = tmp_path_factory.mktemp("curve")
-    export.write_markups_curve(folder / "w.mrk.json", points, "wire", {"error_mm": points[:, 0]})
+    export.write_markups_curve(folder / "w.mrk.json", points, "wire")
     np.testing.assert_allclose(read_markups_curve(folder / "w.mrk.json"), points, atol=1e-6)
     export.write_polyline_vtp(folder / "w.vtp", points, {"error_mm": points[:, 0], "force_N": points})
     back = read_vtp(folder / "w.vtp")
@@ -37,12 +37,10 @@ def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.n
 
 
 def test_markups_say_lps_mm_and_defined(tmp_path: Path) -> None:
-    export.write_markups_curve(tmp_path / "w.mrk.json", np.eye(3), "wire", {"error_mm": [0, 1, 2]})
+    export.write_markups_curve(tmp_path / "w.mrk.json", np.eye(3), "wire")
     markup = json.loads((tmp_path / "w.mrk.json").read_text(encoding="utf-8"))["markups"][0]
     assert (markup["type"], markup["coordinateSystem"], markup["coordinateUnits"]) == ("Curve", "LPS", "mm")
     assert {p["positionStatus"] for p in markup["controlPoints"]} == {"defined"}
-    assert markup["measurements"][0]["units"] == "mm"
-    assert markup["measurements"][0]["controlPointValues"] == [0, 1, 2]
 
 
 def test_ras_markups_are_turned(tmp_path: Path) -> None:
@@ -77,8 +75,8 @@ def test_nan_survives_in_vtp_and_is_refused_elsewhere(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_vtp(tmp_path / "w.vtp").point_arrays["error_mm"], values)
     with pytest.raises(ValueError, match="finite"):
         export.write_polyline_vtp(tmp_path / "x.vtp", [[0, 0, np.nan]])
-    with pytest.raises(ValueError, match="not finite"):
-        export.write_markups_curve(tmp_path / "x.mrk.json", np.eye(3), "wire", {"error_mm": values})
+    with pytest.raises(ValueError, match="finite"):
+        export.write_markups_curve(tmp_path / "x.mrk.json", [[0, 0, np.nan]], "wire")
     with pytest.raises(ValueError, match=r"\(3,\) or \(3, 3\)"):
         export.write_polyline_vtp(tmp_path / "x.vtp", np.eye(3), {"error_mm": [1.0]})
     assert [p.name for p in tmp_path.iterdir()] == ["w.vtp"]

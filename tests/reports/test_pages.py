@@ -16,7 +16,7 @@ import pytest
 
 from reports import figures, tables
 from reports.case_files import find_cases, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, declared
+from reports.figures import CASE_FIGURES, RUN_FIGURES, Drawing, declared
 from reports.html import render_case, render_index
 from reports.schema import ERRORS, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
@@ -69,7 +69,7 @@ def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
 
 
 def _draws(thing: object) -> bool:
-    return inspect.isfunction(thing) and thing.__annotations__.get("return") == "Drawing | None"
+    return inspect.isfunction(thing) and thing.__annotations__.get("return") == Drawing | None
 
 
 def test_every_link_leads_somewhere(run: Path) -> None:
