@@ -9,9 +9,8 @@ import SimpleITK as sitk
 
 from data_synthetic.anatomy.centrelines import read_tree
 from data_synthetic.anatomy.from_tree import way_through
-from data_synthetic.anatomy.iso_wall import iso_wall
+from data_synthetic.anatomy.real_scan import find_way, iso_wall, vessel_threshold
 from data_synthetic.anatomy.tubes import Anatomy, Tube
-from data_synthetic.anatomy.vessel_way import find_way, vessel_threshold
 from data_synthetic.catalogue.scene import NamedScene, Setup, spread
 from data_synthetic.geometry import Array, ScanGrid, Volume, arc_lengths, world_axis_across
 from data_synthetic.rod.replay import TrueFrame, TrueInsertion, replay

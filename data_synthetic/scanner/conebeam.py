@@ -14,8 +14,16 @@ from scipy.ndimage import gaussian_filter
 
 from data_synthetic.geometry import Array, ScanGrid, Volume
 from data_synthetic.scanner.c_arm import Arc, CArm
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
-from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires, splat, wire_particles
+from data_synthetic.scanner.phantom import (
+    Greys,
+    Phantom,
+    Scan,
+    Wires,
+    bone_coverage,
+    lumen_coverage,
+    splat,
+    wire_particles,
+)
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""

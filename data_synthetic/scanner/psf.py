@@ -7,8 +7,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from data_synthetic.geometry import Array, ScanGrid, Volume
-from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage
-from data_synthetic.scanner.phantom import CUT, Greys, Phantom, Scan, Wires, splat, wire_particles
+from data_synthetic.scanner.phantom import (
+    CUT,
+    Greys,
+    Phantom,
+    Scan,
+    Wires,
+    bone_coverage,
+    lumen_coverage,
+    splat,
+    wire_particles,
+)
 
 WIRE_STEP_VOXELS = 0.1
 """Distance between the discs of points that fill the wire; blurred by 0.8 voxel, nothing of it is left to see."""

@@ -3,8 +3,7 @@
 Slicer: ``.mrk.json`` curves, ``.seg.nrrd`` label maps, ``.vtp`` models. ParaView: ``.vtp`` with point arrays.
 """
 
-from reports.export.markups import write_markups_curve
-from reports.export.segmentation import write_segmentation_nrrd
+from reports.export.slicer import write_markups_curve, write_segmentation_nrrd
 from reports.export.vtp import read_surface_vtp, write_polyline_vtp, write_surface_vtp
 
 __all__ = [

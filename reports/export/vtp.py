@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reports.atomic import write_bytes
-from reports.export.markups import checked_points
+from reports.export.slicer import checked_points
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from data_synthetic import _compile
-from data_synthetic.scanner import coverage
+from data_synthetic.scanner import phantom
 
 PACKAGE = Path(_compile.__file__).parent
 
@@ -23,8 +23,8 @@ def test_the_two_copies_of_the_mechanism_are_one() -> None:
 
 
 def test_a_caller_depends_on_the_files_of_what_it_calls() -> None:
-    behind = {str(p.relative_to(PACKAGE)) for p in _compile.sources_of(Path(coverage.__file__))}
-    assert {"scanner/coverage.py", "anatomy/_kernels.py", "geometry.py"} <= behind
+    behind = {str(p.relative_to(PACKAGE)) for p in _compile.sources_of(Path(phantom.__file__))}
+    assert {"scanner/phantom.py", "anatomy/_kernels.py", "geometry.py"} <= behind
 
 
 def test_an_edit_behind_a_caller_is_run(tmp_path: Path) -> None:
