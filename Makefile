@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study baseline anatomies bench stress peers aneurism conebeam truth clean
+.PHONY: setup validate test lint study bars baseline anatomies bench stress peers aneurism conebeam truth clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin

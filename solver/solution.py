@@ -21,7 +21,7 @@ class Status(Enum):
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
-    TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise solver.max_joints"
+    TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise max_joints"
     NON_FINITE = "the energy became infinite or undefined; check stiffnesses and loads"
 
     @property

@@ -1,4 +1,4 @@
-"""The vessel wall: Hooke's law on the signed distance to the lumen, interpolated so that energies can be checked."""
+"""The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
 import math
 from dataclasses import dataclass, field
@@ -28,7 +28,7 @@ def _checked(grid: Grid) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class VesselWall:
-    """The lumen's wall as a signed distance in mm, negative inside; costs ½ k d² per mm of wire.
+    """The lumen's wall as a signed distance in mm, negative inside; its law is in ``_kernels.wall_law``.
 
     stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient, 0 costs nothing.
     hull : "offset" (the smooth limit d = max(0, φ + radius)) or "samples:N" (N points around each joint).

@@ -19,6 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression, 2 on wrong input."""
+    import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
     from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
 
     try:

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
     add("--executor", default="", metavar="ADDRESS", help="tcp://host:port of a dask scheduler")
-    add("--resume", action="store_true", help="go on in an OUT made from another manifest or settings")
+    add("--resume", action="store_true", help="go on in an OUT made from another manifest")
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")

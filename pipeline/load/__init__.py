@@ -1,7 +1,8 @@
 """load: scans in. ``read_header`` reads geometry alone, ``read_headers`` that of all scans of a case, which is held
 against each other before any voxel is read, ``Crop.load`` the voxels of a box alone.
 
-A format is a module with three functions: ``recognises`` a path, ``read_header`` of a source, ``read`` voxels of a box.
+A format is a module with four functions: ``recognises`` a path, ``parts`` (other files that belong to it),
+``read_header`` of a source, ``read`` voxels of a box.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,6 +40,9 @@ class Format(Protocol):
     def recognises(self, path: Path, /) -> bool:
         """Whether the file or folder is of this format."""
 
+    def parts(self, path: Path, /) -> tuple[Path, ...]:
+        """Other files that belong to it: a change of theirs is a change of the scan."""
+
     def read_header(self, source: Source, config: LoadConfig, /) -> Header:
         """Its geometry; raises LoadError where it cannot be used."""
 
@@ -66,7 +70,7 @@ def read_header(
     if not source.path.exists():
         why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
         raise unusable(source.path, why)
-    header = _format_of(source.path).read_header(source, config)
+    header = format_of(source.path).read_header(source, config)
     if spacing_mm is None:
         return header
     spacing = np.asarray(spacing_mm, float)
@@ -77,7 +81,7 @@ def read_header(
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
-    values = _format_of(header.source.path).read(header, (start, stop), config)
+    values = format_of(header.source.path).read(header, (start, stop), config)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
         why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
@@ -107,7 +111,7 @@ class Crop:
         return {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
 
 
-def _format_of(path: Path) -> Format:
+def format_of(path: Path) -> Format:
     """The module that reads a path."""
     return next(kind for kind in FORMATS if kind.recognises(path))
 

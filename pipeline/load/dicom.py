@@ -222,6 +222,11 @@ def recognises(path: Path) -> bool:
     return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
 
 
+def parts(_path: Path) -> tuple[Path, ...]:
+    """A file or a folder is all there is."""
+    return ()
+
+
 def read_header(source: Source, config: LoadConfig) -> Header:
     """Geometry of a series; tilt, gaps and repeats are refused, or resampled where the setting asks for it."""
     stack = read_stack(source)

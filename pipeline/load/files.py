@@ -106,20 +106,23 @@ def recognises(_path: Path) -> bool:
     return True
 
 
-def detached(path: Path) -> tuple[Path, ...]:
-    """The files that hold the voxels of a header that stands alone (.mhd, .nhdr); none for other files."""
-    if path.suffix.lower() not in {".mhd", ".nhdr"}:
+def parts(path: Path) -> tuple[Path, ...]:
+    """Other files that hold the voxels of a header: those that a MetaImage or NRRD names, and Analyze's other half."""
+    if path.suffix.lower() in {".hdr", ".img"}:
+        return tuple(p for p in (path.with_suffix(".img"), path.with_suffix(".hdr")) if p != path and p.is_file())
+    if path.suffix.lower() not in {".mhd", ".mha", ".nhdr", ".nrrd"}:
         return ()
-    text = path.read_text(encoding="latin-1")
+    with path.open("rb") as file:
+        text = file.read(LONGEST_HEADER).decode("latin-1")
     found = re.search(r"^(?:ElementDataFile\s*=|data ?file:)[ \t]*(.*)$", text, re.IGNORECASE | re.MULTILINE)
-    if found is None:
+    if found is None or found[1].strip().upper() == "LOCAL":
         return ()
     name = found.group(1).strip()
     # a list stands below; a pattern as slice_%03d.raw takes numbers
     names = text[found.end() :].split() if name.upper().startswith("LIST") else [name]
     pattern = re.sub(r"%\d*d.*", "*", name)
     matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()
-    return tuple(sorted({p for p in (*(path.parent / n for n in names), *matches) if p.is_file()}))
+    return tuple(sorted({p for p in (*(path.parent / n for n in names), *matches) if p.is_file() and p != path}))
 
 
 def read_header(source: Source, _config: LoadConfig) -> Header:
@@ -146,7 +149,7 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
         np.array(reader.GetOrigin()[:3]),
         direction,
         sitk.GetPixelIDValueAsString(reader.GetPixelID()),
-        (source.path, *detached(source.path)),
+        (source.path, *parts(source.path)),
         item_count=size[3] if len(size) == 4 else 1,
     )
 

@@ -45,6 +45,11 @@ def recognises(path: Path) -> bool:
     return path.suffix.lower() in {".h5", ".hdf5"}
 
 
+def parts(_path: Path) -> tuple[Path, ...]:
+    """All is in the one file."""
+    return ()
+
+
 def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
     with h5py.File(source.path, "r") as file:

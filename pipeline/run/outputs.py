@@ -16,9 +16,9 @@ from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, counts, pooled, skill_of
 from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
+from pipeline.run.projections import projections
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.trace import projections
 from pipeline.study.manifest import Case
 from reports import export, frames_file
 

@@ -8,7 +8,7 @@ from pipeline.model import Lumen, Volume
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
-from pipeline.segment.region import scanner_blur
+from pipeline.segment.levels import scanner_blur
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
 

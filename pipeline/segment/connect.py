@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL, READ, Affinity, Search, flood, strengths
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, SIDE
-from pipeline.segment.region import GreyLevels, Index
+from pipeline.segment.levels import GreyLevels, Index
 from solver.grid import Grid
 
 HALF_HEIGHT_SPREAD = 0.42

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.contact import Cores, Inner, along_cores, meetings, nearest_core, runs_on, thickness
-from pipeline.segment.region import Index
+from pipeline.segment.levels import Index
 from solver.grid import Array, Grid
 
 CORE = 0.7

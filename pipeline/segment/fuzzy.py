@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
-from pipeline.segment.region import GreyLevels, Index, Region, failed, levels_at, seed_voxels
+from pipeline.segment.levels import GreyLevels, Index, Region, failed, levels_at, seed_voxels
 from pipeline.segment.thin import thin_branches
 from solver.grid import Grid
 

@@ -10,7 +10,7 @@ from pipeline.model import Branches, Lumen, Shapes, Volume
 from pipeline.segment._kernels.distance import Owned, propagate
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
 from pipeline.segment.config import SegmentConfig
-from pipeline.segment.region import GreyLevels
+from pipeline.segment.levels import GreyLevels
 from pipeline.segment.surface import prepare, signed, signed_distance
 from solver.grid import Grid
 

@@ -17,7 +17,7 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
-from pipeline.segment.region import GreyLevels, Index, failed, plateau, scanner_blur
+from pipeline.segment.levels import GreyLevels, Index, failed, plateau, scanner_blur
 from solver.grid import Array, Grid
 
 LAYERS = 4

@@ -19,7 +19,7 @@ from pipeline.segment._kernels.solids import cones
 from pipeline.segment._kernels.wall import PAD, dilate
 from pipeline.segment.connect import connect, neighbours, noise_after
 from pipeline.segment.contact import numbered, parts
-from pipeline.segment.region import GreyLevels, Index
+from pipeline.segment.levels import GreyLevels, Index
 from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 

@@ -3,16 +3,23 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from pipeline.ranges import Finite, Positive, PositiveCount
+from solver._kernels.minimise import METHODS
+
+
+def _known(method: str) -> str:
+    if method not in METHODS:
+        raise ValueError(f"Input should be {' or '.join(map(repr, METHODS))}")
+    return method
 
 
 @dataclass(frozen=True)
 class SolverConfig:
     """The energy minimisation."""
 
-    method: Literal["newton", "closed_form"] = "newton"
+    method: Annotated[str, AfterValidator(_known)] = "newton"
     """newton, or the seed's closed_form."""
     segment_mm: Positive = 1.0
     """Length of the wire's rigid segments."""

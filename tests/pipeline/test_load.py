@@ -12,7 +12,9 @@ import SimpleITK as sitk
 
 from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
+from pipeline.load.files import parts as file_parts
 from pipeline.load.files import read_mha_box
+from pipeline.run.store import file_hash
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -82,6 +84,31 @@ def test_big_endian_and_detached_data_are_read(tmp_path: Path) -> None:
     sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mhd"), useCompression=False)
     crop = load(read_header(tmp_path / "scan.mhd"), box)
     np.testing.assert_array_equal(crop.values, numbered()[1:4, 2:6, 3:8])
+
+
+def test_files_that_hold_a_headers_voxels_are_part_of_it(tmp_path: Path) -> None:
+    """An edit of theirs is one of the scan: kept results hang on them."""
+    for name in ("a.mhd", "b.nhdr", "c.hdr"):
+        sitk.WriteImage(image_of(numbered()), str(tmp_path / name), useCompression=False)
+    for attached, header in (("d.mha", "a.mhd"), ("e.nrrd", "b.nhdr")):
+        (tmp_path / attached).write_bytes((tmp_path / header).read_bytes())
+    sitk.WriteImage(image_of(numbered()), str(tmp_path / "whole.mha"), useCompression=False)
+    assert file_parts(tmp_path / "whole.mha") == ()
+    voxels = {
+        "a.mhd": "a.raw",
+        "b.nhdr": "b.raw",
+        "c.hdr": "c.img",
+        "c.img": "c.hdr",
+        "d.mha": "a.raw",
+        "e.nrrd": "b.raw",
+    }
+    for name, other in voxels.items():
+        assert file_parts(tmp_path / name) == (tmp_path / other,)
+        before = file_hash(tmp_path / name)
+        changed = bytearray((tmp_path / other).read_bytes())
+        changed[-1] ^= 1
+        (tmp_path / other).write_bytes(changed)
+        assert file_hash(tmp_path / name) != before
 
 
 def test_loaded_voxels_outlive_the_image_that_holds_them(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from pipeline.segment.connect import (
     neighbours,
     strength_list,
 )
-from pipeline.segment.region import GreyLevels
+from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 from tests.naive import connectedness as naive
 

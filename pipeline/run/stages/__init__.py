@@ -9,7 +9,8 @@ from dataclasses import replace
 from pipeline.run.log import STAGES, Stage
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Context, Known
-from pipeline.run.stages.load import open_case, segment_vessel
+from pipeline.run.stages.load import open_case
+from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.simulate import simulate_frames
 from pipeline.run.stages.trace import trace_frames
 from pipeline.status import StageError

@@ -1,18 +1,11 @@
-"""load and segment: what holds for all frames. Headers, truth and the list of frames; then the lumen, once per case:
-the user's own, the stored one, or segmented from the wire-free scan.
-"""
+"""load: headers, truth and the list of frames."""
 
 from dataclasses import replace
 
-import numpy as np
-
-from pipeline.load import Crop, read_headers
+from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
-from pipeline.load.lumens import read_lumen
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.segment import segment
-from pipeline.segment.given import given_lumen
 from pipeline.study.manifest import not_one_per_frame
 
 
@@ -39,22 +32,3 @@ def open_case(run: Context, known: Known) -> Known:
 def rolls(roll_deg: float | tuple[float, ...], count: int) -> tuple[float, ...]:
     """Roll of every frame in degrees: the manifest's list, or its one number for all."""
     return roll_deg if isinstance(roll_deg, tuple) else (roll_deg,) * count
-
-
-def segment_vessel(run: Context, known: Known) -> Known:
-    """The lumen of the case."""
-    case, config, log = run.case, run.config, run.log
-    if case.lumen is not None:
-        with log.timed("segment"):
-            given = read_lumen(case.lumen.path, config.segment.least_voxels)
-            return replace(known, lumen=given_lumen(given, config.segment))
-    assert known.scans is not None
-    scan = known.scans.first
-    assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
-    if known.scans.reference is None:
-        log.assumptions.append("no reference scan: the lumen was segmented from frame 0, which has a wire in it")
-    crop = Crop(scan, scan.box, config.load)
-    lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment)
-    log.warnings += lumen.warnings
-    log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.mask.values))} voxels")
-    return replace(known, lumen=lumen)

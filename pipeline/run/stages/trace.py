@@ -11,28 +11,10 @@ from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Place, counters_of, place_of, put_in_place, said
+from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import trace
-
-
-def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np.uint8], ...]:
-    """Maximum-intensity projections along the three array axes, 8 bit within the grey-value ``window``."""
-    low, high = window
-    scale = 255.0 / max(high - low, 1e-9)
-
-    def project(axis: int) -> NDArray[np.uint8]:
-        peak = volume.values.max(axis=axis).astype(np.float32)
-        return np.asarray(np.clip((peak - low) * scale, 0, 255), dtype=np.uint8)
-
-    return project(0), project(1), project(2)
-
-
-def grey_window(volume: Volume) -> tuple[float, float]:
-    """Grey values from the darkest projection pixels to the wire's: 1st and 99.9th percentile of a projection."""
-    peak = volume.values.max(axis=2)
-    low, high = np.percentile(peak, (1.0, 99.9))
-    return float(low), float(high)
 
 
 def trace_frames(run: Context, known: Known) -> Known:

@@ -11,7 +11,7 @@ from skimage.segmentation import flood as skimage_flood
 
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, estimate_affinity, neighbours, strength_list
-from pipeline.segment.region import GreyLevels
+from pipeline.segment.levels import GreyLevels
 from solver.grid import Grid
 
 LEVELS = GreyLevels(1000.0, 100.0, 50.0)
