@@ -49,7 +49,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     columns = next(([head.index(c) for c in names] for names in _NAMES if set(names) <= set(head)), None)
     try:
         if columns is None:
-            return np.array([[float(c) for c in r[:3]] for r in rows]).reshape(-1, 3)
+            return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
         return np.array([[float(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
     except (ValueError, IndexError) as error:
         allowed = "columns x_mm, y_mm, z_mm of numbers"

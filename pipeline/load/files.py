@@ -119,7 +119,7 @@ def parts(path: Path) -> tuple[Path, ...]:
         return ()
     name = found.group(1).strip()
     # a list stands below; a pattern as slice_%03d.raw takes numbers
-    names = text[found.end() :].split() if name.upper().startswith("LIST") else [name]
+    names = text[found.end() :].split() if name.upper().split()[:1] == ["LIST"] else [name]
     pattern = re.sub(r"%\d*d.*", "*", name)
     matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()
     return tuple(sorted({p for p in (*(path.parent / n for n in names), *matches) if p.is_file() and p != path}))

@@ -13,8 +13,8 @@ from pipeline.model import Branches, Shapes, Volume
 
 def read_swc(path: Path) -> Branches:
     """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
-    lines = path.read_text(encoding="utf-8").splitlines()
     try:
+        lines = path.read_text(encoding="utf-8").splitlines()
         table = np.array([r.split() for r in lines if r.strip() and not r.lstrip().startswith("#")], float)
     except ValueError as error:
         raise refused(path, str(error), "seven numbers a line", "export it again as .swc") from error
@@ -42,6 +42,9 @@ def read_markups_branches(path: Path) -> Branches:
             allowed = "a measurement named Radius with one of controlPointValues for every point"
             raise refused(path, f"curve {markup.get('name', '?')!r} without radii", allowed, "or give an .swc")
         radius = np.array(values, dtype=float)
+        if len(points) < 2 or not np.all(np.isfinite(points)) or not np.all((radius > 0) & np.isfinite(radius)):
+            got = f"curve {markup.get('name', '?')!r} of {len(points)} points, radii {radius.tolist()[:4]}"
+            raise refused(path, got, "two finite points or more, radii above 0", "correct the curve")
         branches.append((points[:-1], points[1:], radius[:-1], radius[1:]))
     if not branches:
         raise refused(path, "no control points", "at least one curve with radii", "or give an .swc")

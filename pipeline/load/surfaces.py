@@ -122,7 +122,10 @@ def read_stl(path: Path) -> Shapes:
         corners = np.frombuffer(raw[84:], record)["corner"].reshape(-1, 3).astype(np.float64)
     else:
         found = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", raw)
-        corners = np.array(found, dtype=float).reshape(-1, 3)
+        try:
+            corners = np.array(found, dtype=float).reshape(-1, 3)
+        except ValueError as error:
+            raise refused(path, str(error), "three numbers after each vertex", "export it again as .stl") from error
     if len(corners) == 0 or len(corners) % 3:
         raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
     points, index = np.unique(corners, axis=0, return_inverse=True)

@@ -3,11 +3,14 @@
 import functools
 import hashlib
 import os
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
 import solver
+from pipeline.compare.metrics import METRICS
+from pipeline.compare.nulls import NULLS
 from pipeline.run import outputs, results
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
@@ -43,9 +46,19 @@ class Job:
 
     @property
     def key(self) -> str:
-        """What the result depends on: the case, its files' contents, the settings, the code."""
-        inputs = (self.case, self.settings.config, self.until, package_version(), hash_of(Path(__file__)))
+        """What the result depends on: the case, its files' contents, the settings, the code, what is registered."""
+        code = (package_version(), hash_of(Path(__file__)), ERRORS.columns, tuple(METRICS), tuple(NULLS))
+        inputs = (self.case, self.settings.config, self.until, code)
         return hashlib.sha256(digest(inputs).encode()).hexdigest()
+
+
+def clear(folder: Path) -> None:
+    """Make a case's folder, and take out of it what an earlier run wrote: it belongs to another result."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("result.json", ERRORS.file, POINTS.file, "frames.h5", "report.html", "scene3d.html"):
+        (folder / name).unlink(missing_ok=True)
+    for name in ("view", "figures"):
+        shutil.rmtree(folder / name, ignore_errors=True)
 
 
 def finished(job: Job, key: str) -> bool:
@@ -69,7 +82,7 @@ def run_case(job: Job) -> None:
         if job.embed and job.pictures:
             render_case(job.folder, embed=True)
         return
-    (job.folder / "result.json").unlink(missing_ok=True)
+    clear(job.folder)
     if job.until in ("simulate", "compare", "report"):
         load_kernels(progress)
     clock = perf_counter()

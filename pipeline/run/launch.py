@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
-from pipeline.run.case import Job, finished, run_case
+from pipeline.run.case import Job, clear, finished, run_case
 from pipeline.run.provenance import collect
 from pipeline.run.results import Result, crashed, found_results, write_json
 from pipeline.run.store import file_hash
@@ -25,9 +25,7 @@ from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assi
 from reports import tables
 from reports.atomic import write_text
 from reports.html import render_index
-from reports.schema import ERRORS, POINTS, SWEEP
-
-CASE_FILES = (ERRORS.file, POINTS.file, "frames.h5", "report.html")
+from reports.schema import SWEEP
 
 
 class UsageError(InputError):
@@ -129,10 +127,15 @@ def _shard(text: str) -> tuple[int, int]:
 
 def guard_out(out: Path, manifest: Path) -> None:
     """Refuse an output folder that holds something else than a run of the same manifest."""
+    if out.exists() and not out.is_dir():
+        raise UsageError([f"-o {out}: this is a file; name a folder"])
     if not out.exists() or not any(out.iterdir()):
         return
     info = out / "run.json"
-    known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256") if info.exists() else None
+    try:
+        known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256") if info.exists() else None
+    except ValueError:
+        raise UsageError([f"{info} is damaged; say --resume (keep what fits) or --fresh (compute again)"]) from None
     if not info.exists() and (list(out.glob("run.*.json")) or (out / "manifest.inferred.toml").exists()):
         return
     if known != file_hash(manifest):
@@ -172,9 +175,7 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
 
 def _write_crash(job: Job, error: str, log: str) -> None:
     """A result for a job that could not be finished; files of an earlier run, which belong to another one, go."""
-    job.folder.mkdir(parents=True, exist_ok=True)
-    for name in CASE_FILES:
-        (job.folder / name).unlink(missing_ok=True)
+    clear(job.folder)
     with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
         handle.write(log + "\n")
     crashed(job.case, error).write(job.folder)

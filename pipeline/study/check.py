@@ -27,7 +27,7 @@ def check_case(case: Case, config: Config) -> list[str]:
         return [str(error)]
     count = len(scans.frames) or case.frame_count
     problems += _entry_problems(case, scans)
-    problems += not_one_per_frame({"insertion_mm": case.insertion_mm, "roll_deg": case.roll_deg}, count)
+    problems += not_one_per_frame(case.lists, count)
     if case.truth:
         try:
             read_truth(case.truth, count)

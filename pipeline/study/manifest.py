@@ -129,6 +129,11 @@ class Case(Strict):
         return len(self.frames) or len(self.insertion_mm or ())
 
     @property
+    def lists(self) -> dict[str, Any]:
+        """What must have one entry per frame."""
+        return {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
+
+    @property
     def _one_file(self) -> bool:
         """A single file may hold many volumes; their number is known once its header is read."""
         return len(self.frames) == 1 and self.frames[0].path.is_file()
@@ -143,8 +148,7 @@ class Case(Strict):
 
     @model_validator(mode="after")
     def _one_per_frame(self) -> "Case":
-        lists = {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
-        if problems := () if self._one_file else not_one_per_frame(lists, self.frame_count):
+        if problems := () if self._one_file else not_one_per_frame(self.lists, self.frame_count):
             raise _problem(*problems)
         return self
 
@@ -211,7 +215,7 @@ def read_manifest(path: Path) -> Manifest:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ManifestError([f"{path}: no such manifest"]) from None
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ManifestError([f"{path}: not valid TOML: {error}"]) from None
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})

@@ -79,7 +79,7 @@ def read_settings(path: Path) -> list[Setting]:
     """All settings of a TOML file of tables."""
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SettingsError([f"{path}: cannot be read as TOML: {error}"]) from None
     found: list[Setting] = []
     for table, values in data.items():

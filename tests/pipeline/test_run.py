@@ -240,6 +240,20 @@ def test_predictors_are_told_of_trusted_traces_alone(study: Path, tmp_path: Path
     assert [p is not None and p is good.points_mm for p in _trusted_before(frames)] == [False, True, True]
 
 
+def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Traced only, a case has no errors: those of the run before must not come back in the last line."""
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    assert run(study, out, "--until", "trace") == 0
+    assert "median point error" not in capsys.readouterr().out
+    assert json.loads((out / "run.json").read_text(encoding="utf-8"))["overall"] == {}
+    left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
+    assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
+    assert not list((out / "cases" / "bifurcation" / "view").glob("wire_simulated*"))
+
+
 def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(finished, out)

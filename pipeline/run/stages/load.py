@@ -16,7 +16,7 @@ def open_case(run: Context, known: Known) -> Known:
         scans = read_headers(case.reference, case.frames, run.config.load, case.spacing_mm)
     run.log.assumptions += scans.assumed
     count = len(scans.frames) or case.frame_count
-    wrong = not_one_per_frame({"insertion_mm": case.insertion_mm, "roll_deg": case.roll_deg}, count)
+    wrong = not_one_per_frame(case.lists, count)
     if wrong:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
     offset = run.config.simulate.roll_offset_deg
