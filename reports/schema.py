@@ -14,7 +14,7 @@ from pathlib import Path
 
 _DECLARED = tomllib.loads((Path(__file__).parent / "columns.toml").read_text(encoding="utf-8"))
 POOLED = {
-    "points": "from all points of all frames",
+    "points": "from all points of the frames that are ok",
     "rms": "root of the mean square over frames, weighted by their number of points",
     "mean": "mean over frames",
     "median": "median over frames",
