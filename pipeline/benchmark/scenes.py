@@ -1,4 +1,4 @@
-"""The scenes of the benchmark: vessels with a closed form, sampled as a scan would give them, and a user's own."""
+"""The scenes of the benchmark: vessels with a closed form, sampled as the voxel wall that a scan would give."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,61 +11,9 @@ from data_synthetic import catalogue
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.anatomy.willis import WillisPlan, circle_of_willis
 from data_synthetic.catalogue.scene import Setup
+from pipeline.benchmark.vessels import BEND_INLET_MM, BEND_TURN_MM, SHEATH_MM, bend_distance, sheath_distance
 from pipeline.model import Array
-from pipeline.run.log import Log
-from pipeline.run.stages import Context, run_stages
-from pipeline.run.stages.load import rolls
-from pipeline.run.store import Store, default_root
-from pipeline.simulate import guide_wire
-from pipeline.study.manifest import Case
-from pipeline.study.settings import Config
 from solver import Grid, GuideWire, VesselWall
-
-BEND_TURN_MM, BEND_INLET_MM, BEND_LUMEN_MM = 30.0, 30.0, 2.0
-SHEATH_MM, MOUTH_MM = 400.0, 4.0
-"""Length of the sheath, and over how much of its end it opens into the vessel."""
-SPHERE_MM = 9.0
-
-
-def bend_distance(points: Array) -> Array:
-    """Scene B: a straight inlet, a quarter torus towards +x, and straight on."""
-    return _axis_distance(points, BEND_INLET_MM, BEND_TURN_MM) - BEND_LUMEN_MM
-
-
-def sheath_distance(points: Array, bore_mm: float) -> Array:
-    """A straight sheath that opens into scene B."""
-    z = points[..., 2]
-    t = np.clip((z + 0.5 * MOUTH_MM) / MOUTH_MM, 0.0, 1.0)
-    bore = bore_mm + (BEND_LUMEN_MM - bore_mm) * t * t * (3.0 - 2.0 * t)
-    tube = np.hypot(points[..., 0], points[..., 1]) - bore
-    return np.asarray(np.where(z < MOUTH_MM, tube, bend_distance(points)))
-
-
-def lumen_distance(kind: str, points: Array, radius: float) -> Array:
-    """A lumen of the stress study, by its kind; what has no case of its own is a straight tube."""
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    if kind == "bend":
-        return _axis_distance(points, 10.0, 20.0) - radius
-    if kind == "siphon":
-        first = _axis_distance(points, 8.0, 8.0)
-        # the second bend turns back from where the first one ends
-        second = np.where(x > 8.0, np.hypot(np.hypot(x - 8.0, z - 24.0) - 8.0, y), np.inf)
-        return np.asarray(np.minimum(np.where(x > 8.0, np.inf, first), second) - radius)
-    if kind == "sphere":
-        neck = np.hypot(np.hypot(x, y), np.maximum(z - 4.0, 0.0)) - min(radius, 3.0)
-        return np.asarray(np.minimum(neck, np.sqrt(x**2 + y**2 + (z - 12.0) ** 2) - SPHERE_MM))
-    if kind == "channel":
-        return np.asarray(np.abs(y) - radius)
-    return np.asarray(np.hypot(x, y) - radius)
-
-
-def _axis_distance(points: Array, inlet_mm: float, turn_mm: float) -> Array:
-    """Distance to a line along +z, a quarter circle towards +x after the inlet, and a line straight on."""
-    x, y, z = points[..., 0], points[..., 1], points[..., 2] - inlet_mm
-    ring = np.hypot(np.hypot(turn_mm - x, z) - turn_mm, y)
-    outlet = np.hypot(z - turn_mm, y)
-    return np.asarray(np.where(z < 0, np.hypot(x, y), np.where(x > turn_mm, outlet, ring)))
-
 
 Distance = Callable[[Array], Array]
 Vector = tuple[float, float, float]
@@ -217,32 +165,4 @@ def _of_catalogue(name: str, depth_mm: float, setup: Setup) -> BenchScene:
         wall_stiffness=setup.stiffness_N_mm2,
         distance=setup.anatomy.distance,
         box=(tuple(low.tolist()), tuple(high.tolist())),
-    )
-
-
-class NoScene(ValueError):
-    """A case that cannot be pushed through: the sentence says why."""
-
-
-def scene_of(case: Case, config: Config) -> BenchScene:
-    """Segment the case's lumen (or read it) and push to its deepest insertion_mm; raises NoScene."""
-    if not case.insertion_mm:
-        msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
-        raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")
-    silent = Log(lambda *_: None)
-    known = run_stages(Context(case, config, Store(default_root()), silent), until="segment")
-    if known.failure is not None or known.lumen is None:
-        raise NoScene(f"bench: case {case.id!r}: {known.failure}")
-    return BenchScene(
-        case.id,
-        max(case.insertion_mm),
-        step_mm=config.solver.step_mm,
-        entry_mm=case.entry_mm,
-        direction=case.entry_direction,
-        material_axis=case.material_axis,
-        roll_deg=rolls(case.roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
-        guide_wire=guide_wire(case.wire, config.solver.segment_mm, config.simulate.bending_scale),
-        wall_stiffness=case.wall.stiffness_N_mm2,
-        friction=case.wall.friction,
-        ready=known.lumen.distance,
     )

@@ -26,8 +26,8 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.benchmark import page, scenes
     from pipeline.benchmark.claims import measure_claims
     from pipeline.benchmark.cost import measure_cost
+    from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
-    from pipeline.benchmark.scenes import NoScene, scene_of
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
     from pipeline.load import LoadError
     from pipeline.study.manifest import ManifestError, read_manifest

@@ -41,7 +41,7 @@ class Format(Protocol):
         """Whether the file or folder is of this format."""
 
     def parts(self, path: Path, /) -> tuple[Path, ...]:
-        """Other files that belong to it: a change of theirs is a change of the scan."""
+        """Other files that belong to it, by its name or its head: a change of theirs is a change of the scan."""
 
     def read_header(self, source: Source, config: LoadConfig, /) -> Header:
         """Its geometry; raises LoadError where it cannot be used."""
@@ -70,7 +70,7 @@ def read_header(
     if not source.path.exists():
         why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
         raise unusable(source.path, why)
-    header = format_of(source.path).read_header(source, config)
+    header = _format_of(source.path).read_header(source, config)
     if spacing_mm is None:
         return header
     spacing = np.asarray(spacing_mm, float)
@@ -81,7 +81,7 @@ def read_header(
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
-    values = format_of(header.source.path).read(header, (start, stop), config)
+    values = _format_of(header.source.path).read(header, (start, stop), config)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
         why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
@@ -111,9 +111,14 @@ class Crop:
         return {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
 
 
-def format_of(path: Path) -> Format:
+def _format_of(path: Path) -> Format:
     """The module that reads a path."""
     return next(kind for kind in FORMATS if kind.recognises(path))
+
+
+def parts_of(path: Path) -> tuple[Path, ...]:
+    """Other files that belong to a file, as any format says: asked of every path that goes into a key."""
+    return tuple(part for kind in FORMATS for part in kind.parts(path))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from reports import export, frames_file
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
+SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
 def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
@@ -114,9 +115,6 @@ def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
         for f in known.frames
         if not f.ok
     ]
-
-
-SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
 def write_frames(path: Path, known: Known) -> None:

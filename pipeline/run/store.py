@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from pipeline.load import format_of
+from pipeline.load import parts_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
@@ -85,7 +85,7 @@ def file_hash(path: Path) -> str:
         for item in sorted(p for p in path.rglob("*") if p.is_file()):
             hasher.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
         return hasher.hexdigest()
-    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *format_of(path).parts(path))]
+    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts_of(path))]
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import check_grad
 
-from pipeline.benchmark import page, scenes
+from pipeline.benchmark import page, scenes, vessels
 from pipeline.benchmark.claims import Claim, fitted, measure_claims
 from pipeline.benchmark.cost import advice, costs, settings
 from pipeline.benchmark.insert import SolverSetting, insert, timed
@@ -29,9 +29,9 @@ def test_bend_scene_is_a_distance() -> None:
     scene = scenes.bend()
     wall = scene.wall()
     assert wall is not None
-    turn, lumen = scenes.BEND_TURN_MM, scenes.BEND_LUMEN_MM
+    turn, lumen = vessels.BEND_TURN_MM, vessels.BEND_LUMEN_MM
     angle = np.linspace(0.05, 1.3, 20)
-    centre = np.column_stack([turn * (1 - np.cos(angle)), 0 * angle, scenes.BEND_INLET_MM + turn * np.sin(angle)])
+    centre = np.column_stack([turn * (1 - np.cos(angle)), 0 * angle, vessels.BEND_INLET_MM + turn * np.sin(angle)])
     outward = np.column_stack([-np.cos(angle), 0 * angle, np.sin(angle)])
     for offset in (1.0, 1.9, 2.3):
         assert wall.look_up(centre + offset * outward)[0] == pytest.approx(offset - lumen, abs=2e-3)

@@ -111,6 +111,14 @@ def test_files_that_hold_a_headers_voxels_are_part_of_it(tmp_path: Path) -> None
         assert file_hash(tmp_path / name) != before
 
 
+def test_a_key_opens_no_header_of_a_series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every frame and every point of a sweep asks for the hash of its folder."""
+    for name in ("a.dcm", "b"):
+        (tmp_path / name).write_bytes(name.encode())
+    monkeypatch.delattr("pipeline.load.dicom.frames_of")
+    assert file_hash(tmp_path) == file_hash(tmp_path)
+
+
 def test_loaded_voxels_outlive_the_image_that_holds_them(tmp_path: Path) -> None:
     sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
     volumes = [load(read_header(tmp_path / "scan.mha")) for _ in range(3)]

@@ -17,6 +17,11 @@ from pipeline.benchmark.peers.frame import EI, RivalWire, Task, pushed
 from pipeline.benchmark.reference import Reference, reference, resampled, shape_error
 from pipeline.model import Array, arc_length
 
+PEERS_CSV = "peers.csv"
+LIMIT_S = 300.0
+QUICK_SEGMENTS = {"cantilever": 20, "bend": 30}
+WARM_SEGMENTS = 6
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 OURS, OUR_METHOD = "wireval", "wireval newton"
 TARGET_A = 1e-4
 CAVEAT = "Each rival was set up in a short time; an expert of a tool may do better."
@@ -73,13 +78,6 @@ def _scene_b(rows: pd.DataFrame) -> Iterator[str]:
             text += f"; {took / best['ms_per_step']:.3g} times ours of equal or lower error "
             text += f"(n = {best['joints']}, {best['shape_error_mm']:.4f} mm)"
         yield text
-
-
-PEERS_CSV = "peers.csv"
-LIMIT_S = 300.0
-QUICK_SEGMENTS = {"cantilever": 20, "bend": 30}
-WARM_SEGMENTS = 6
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def measure_peers(out: Path, say: Callable[[str], None], *, quick: bool) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.benchmark.scenes import lumen_distance
 from pipeline.benchmark.stress.statics import Array
+from pipeline.benchmark.vessels import lumen_distance
 from solver import Grid
 
 BOXES = {
