@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from reports.atomic import write_text
 from reports.case_files import CaseFiles, thinned
 from reports.export import read_surface_vtp
-from reports.figures._drawing import SIMULATED, TRACED, TRUTH
+from reports.figures._style import SIMULATED, TRACED, TRUTH
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

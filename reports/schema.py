@@ -50,7 +50,7 @@ class Column:
     shown: Mapping[str, str] = field(default_factory=dict)
     """The PLACES that show it, each with what a legend calls it there."""
     style: str = ""
-    """How figures draw it, a name of ``figures._drawing.LINES``; empty: in a colour that the panel does not use."""
+    """How figures draw it, a name of ``figures._style.LINES``; empty: in a colour that the panel does not use."""
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored in silence."""

@@ -10,7 +10,7 @@ import pytest
 from reports import diff, tables
 from reports.case_files import read_case
 from reports.figures import CASE_FIGURES, Drawing
-from reports.figures._drawing import LINES, predictors
+from reports.figures._style import LINES, predictors
 from reports.html import render_case, render_index
 from reports.schema import ERRORS, PLACES, SUMMARY, Column, predictor
 from tests.reports.fake_results import FakeCase, write_run
