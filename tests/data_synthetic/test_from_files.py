@@ -16,7 +16,7 @@ from data_synthetic.anatomy.real_scan import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.catalogue import background_scene, build, from_anatomy
 from data_synthetic.geometry import centred_grid
-from data_synthetic.scanner.phantom import lumen_coverage
+from data_synthetic.scanner.coverage import lumen_coverage
 from data_synthetic.write.volumes import to_image
 
 Z = np.linspace(0.0, 45.0, 25)
