@@ -99,10 +99,7 @@ class Table:
 
     def __getitem__(self, name: str) -> Column:
         """The column of a name; KeyError for one that the table does not have."""
-        for column in self.columns:
-            if column.name == name:
-                return column
-        raise KeyError(name)
+        return {column.name: column for column in self.columns}[name]
 
     def shown(self, *places: str) -> tuple[Column, ...]:
         """Columns that a page shows at these places, place by place, each in the order of the file."""

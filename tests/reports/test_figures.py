@@ -14,12 +14,15 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _drawing, _planes, _style
+from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
 from tests.reports.fake_results import FakeCase, write_run
+
+CASE_FIGURES = figures_of("case")
+RUN_FIGURES = figures_of("run")
 
 # no permutation, so that swapped or transposed axes cannot hide
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
