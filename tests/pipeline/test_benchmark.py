@@ -18,7 +18,7 @@ from pipeline.benchmark.insert import SolverSetting, insert, timed
 from pipeline.benchmark.isolate import Lost
 from pipeline.benchmark.peers.frame import Task, pushed
 from pipeline.benchmark.peers.run import ask, bending_energy, sentences
-from pipeline.benchmark.reference import arc_samples, reference, resampled, shape_error
+from pipeline.benchmark.reference import reference, resampled, shape_error
 from pipeline.benchmark.stress import statics
 from pipeline.commands import bench as command
 from solver import GuideWire
@@ -83,7 +83,7 @@ def test_every_setting_is_of_its_own() -> None:
 
 
 def test_shape_error_of_a_shift_and_of_sampling() -> None:
-    arcs = arc_samples(10.0)
+    arcs = np.linspace(0.0, 10.0, 21)
     line = np.column_stack([arcs, 0 * arcs, 0 * arcs])
     assert shape_error(line + np.array([0.0, 3.0, 4.0]), line) == pytest.approx((5.0, 5.0))
     coarse = np.array([[0.0, 0, 0], [10.0, 0, 0]])
