@@ -9,9 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
-from data_synthetic.geometry import ScanGrid, centred_grid
+from data_synthetic.geometry import ScanGrid
 from data_synthetic.scanner import Greys, Phantom, PsfScanner
 from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
+from tests.data_synthetic.grids import centred_grid
 from tests.naive.tubes import inside_share
 
 QUIET = Greys(noise=0.0, drift=0.0)
