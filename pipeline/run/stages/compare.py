@@ -20,8 +20,11 @@ def compare_frames(run: Context, known: Known) -> Known:
         with run.log.timed("compare", frame.index):
             if known.scans.frames:
                 frames.append(_compared(run, known, frame, clues, previous))
+            elif frame.ok:
+                only = FrameStatus.SIMULATED
+                frames.append(replace(frame, status=only.identifier, sentence=only.value))
             else:
-                frames.append(_simulated_only(frame))
+                frames.append(frame)
             if frame.truth_mm is not None:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
                 frames[-1] = replace(frames[-1], truth=truth)
@@ -31,12 +34,12 @@ def compare_frames(run: Context, known: Known) -> Known:
 def _clues(run: Context, known: Known) -> Clues | None:
     """What predictors may know; None where no trace is to be trusted."""
     assert known.lumen is not None
-    assert known.entry is not None
+    assert known.clamp is not None
     curves = [curve for frame in known.frames if (curve := frame.trusted_curve) is not None]
     if not curves:
         return None
     deepest = max(curves, key=lambda curve: curve.length_mm)
-    return Clues(known.lumen, known.entry, run.case.wire.radius_mm, deepest.points_mm)
+    return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, deepest.points_mm)
 
 
 def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
@@ -57,11 +60,3 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, pre
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, previous, curve.points_mm, settings.sample_mm)
     return replace(frame, comparison=errors, nulls_rms_mm=nulls)
-
-
-def _simulated_only(frame: Frame) -> Frame:
-    """A frame of a case without scans: there is nothing to compare with."""
-    if not frame.ok:
-        return frame
-    only = FrameStatus.SIMULATED
-    return replace(frame, status=only.identifier, sentence=only.value)
