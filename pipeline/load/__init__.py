@@ -137,11 +137,9 @@ class Scans:
 
 def each_volume(header: Header) -> Iterator[Header]:
     """A sequence in one file as one header per volume."""
-    if header.item_count == 1:
-        yield header
-        return
     for item in range(header.item_count):
-        yield replace(header, source=replace(header.source, item=item), item_count=1)
+        source = header.source if header.item_count == 1 else replace(header.source, item=item)
+        yield replace(header, source=source, item_count=1)
 
 
 def read_headers(

@@ -14,7 +14,7 @@ from pipeline.model import Curve, Lumen, Volume, arc_length
 from pipeline.run.log import Log
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import trace
+from pipeline.trace import of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.subtraction import levelled, subtracted
 from pipeline.trace.verdict import near_rotation_plane
@@ -327,6 +327,9 @@ def test_a_length_that_disagrees_with_the_insertion_is_a_named_status():
         assert curve.status is status
     assert "insertion_mm" in curve.note
     assert "16.00" in curve.note
+    given = Curve(wire, np.full(len(wire), np.nan))
+    assert of_length(given, 11.0, TraceConfig()) is of_length(given, None, TraceConfig()) is given
+    assert of_length(given, 16.0, TraceConfig()).status is FrameStatus.LENGTH_MISMATCH
 
 
 def test_a_curve_that_leaves_the_lumen_is_a_named_status():

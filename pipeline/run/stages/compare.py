@@ -12,22 +12,16 @@ from pipeline.status import FrameStatus
 
 def compare_frames(run: Context, known: Known) -> Known:
     """Errors of every frame with both curves, beside those of the trivial predictors."""
-    assert known.scans is not None
     with run.log.timed("compare"):
         clues = _clues(run, known)
     frames = []
     for frame, previous in zip(known.frames, _trusted_before(known.frames), strict=True):
         with run.log.timed("compare", frame.index):
-            if known.scans.frames:
-                frames.append(_compared(run, known, frame, clues, previous))
-            elif frame.ok:
-                only = FrameStatus.SIMULATED
-                frames.append(replace(frame, status=only.identifier, sentence=only.value))
-            else:
-                frames.append(frame)
+            done = _compared(run, known, frame, clues, previous)
             if frame.truth_mm is not None:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
-                frames[-1] = replace(frames[-1], truth=truth)
+                done = replace(done, truth=truth)
+            frames.append(done)
     return replace(known, frames=tuple(frames))
 
 
@@ -51,6 +45,10 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
 
 
 def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, previous: Array | None) -> Frame:
+    assert known.scans is not None
+    if frame.ok and not known.scans.frames:
+        only = FrameStatus.SIMULATED
+        return replace(frame, status=only.identifier, sentence=only.value)
     if frame.curve is None or not frame.traced or frame.simulated is None:
         return frame
     assert known.lumen is not None

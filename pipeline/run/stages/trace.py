@@ -65,7 +65,8 @@ class _Tracing:
 
     def look(self, frame: Frame, header: Header, previous: Curve | None, given: Curve | None) -> Frame:
         """One frame read, put in place and traced; LoadError where it cannot be read."""
-        log, volume = self.run.log, self.run.load(Crop(header, self.box, self.load), frame.index)
+        log, settings = self.run.log, self.run.config.trace
+        volume = self.run.load(Crop(header, self.box, self.load), frame.index)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
@@ -78,27 +79,23 @@ class _Tracing:
         pictures = projections(shown, self.window)
         expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
         if given is None:
-            curve = self._trace(frame.index, here, previous, expected)
+            curve = self.run.stored(
+                "trace",
+                trace,
+                here,
+                self.lumen,
+                self.run.case.entry_mm,
+                self.run.case.entry_direction,
+                of_frame=frame.index,
+                reference=self.reference,
+                previous=previous,
+                expected_mm=expected,
+                config=settings,
+            )
         else:
-            curve = of_length(given, expected, self.run.config.trace)
+            curve = of_length(given, expected, settings)
         done = replace(frame, registration=registration, projections=pictures, curve=curve)
         return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
-
-    def _trace(self, frame: int, volume: Volume, previous: Curve | None, expected_mm: float | None) -> Curve:
-        case = self.run.case
-        return self.run.stored(
-            "trace",
-            trace,
-            volume,
-            self.lumen,
-            case.entry_mm,
-            case.entry_direction,
-            of_frame=frame,
-            reference=self.reference,
-            previous=previous,
-            expected_mm=expected_mm,
-            config=self.run.config.trace,
-        )
 
 
 def _given_traces(run: Context) -> list[Curve]:
