@@ -80,12 +80,10 @@ class Volume(Grid):
 class Lumen:
     """The vessel: ``distance`` is the signed distance to its wall in mm on the vessel's own box, negative inside.
 
-    mask : uint8 on the same box, the voxels that are connected to the seeds.
     wall_level : the grey value taken as the wall; NaN where the lumen did not come from grey values.
     """
 
     distance: Grid
-    mask: Grid
     wall_level: float = float("nan")
     warnings: tuple[str, ...] = ()
     counters: Counters = field(default_factory=dict)
@@ -149,11 +147,6 @@ class Curve:
             object.__setattr__(self, name, read_only(marks, bool))
 
     @property
-    def arc_mm(self) -> Array:
-        """Arc length (n,) from the entry, mm."""
-        return arc_length(self.points_mm)
-
-    @property
     def length_mm(self) -> float:
         """Length of the curve, mm; 0 for an empty one."""
-        return float(self.arc_mm[-1]) if len(self.points_mm) else 0.0
+        return float(arc_length(self.points_mm)[-1]) if len(self.points_mm) else 0.0

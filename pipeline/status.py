@@ -38,7 +38,12 @@ class StageError(Exception):
 
 
 class InputError(Exception):
-    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it."""
+    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it.
+
+    place : where it was written, as the line that counts the problems calls it; empty for the manifest.
+    """
+
+    place = ""
 
     def __init__(self, problems: Sequence[str]) -> None:
         super().__init__("\n".join(problems))

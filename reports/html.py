@@ -139,6 +139,7 @@ def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:
     """Rows of failures.csv, then what it does not know of: cases without result.json."""
     table = read_if_there(out_dir / FAILURES.file, FAILURES)
+    table = table[table["status"] != "damaged"]  # the page finds out itself what it cannot read
     rows: list[dict[Any, Any]] = table.astype(object).where(table.notna(), "").to_dict("records")
     known = {row["case"] for row in rows}
     for case in cases:

@@ -1,6 +1,7 @@
 """``wireval report OUT``: tables, figures and pages again, from result files alone."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from pipeline.commands import complain, say
@@ -29,5 +30,7 @@ def main(args: argparse.Namespace) -> int:
     for result in found:
         if result.frames:
             render_case(args.out / "cases" / result.case, embed=args.embed)
+        elif result.status == "damaged":
+            sys.stderr.write(f"{result.case}: {result.failures[0]['message']}\n")
     say(last_line(totals, render_index(args.out, embed=args.embed)))
     return 0 if totals.all_ok else 1

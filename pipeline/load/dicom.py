@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import shift as shift_slice
 
 from pipeline.load.config import LoadConfig
-from pipeline.load.files import to_xyz
-from pipeline.load.geometry import Box, Header, Source, unusable
+from pipeline.load.files import reader_of, to_xyz
+from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 
 GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
 TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
@@ -133,24 +133,17 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     return [Path(name) for name in next(iter(images.values()))]
 
 
-def _header_of(path: Path) -> sitk.ImageFileReader:
-    reader = sitk.ImageFileReader()
-    reader.SetFileName(str(path))
-    reader.ReadImageInformation()
-    return reader
-
-
 def _is_image(path: Path) -> bool:
     try:
-        return bool(_header_of(path).HasMetaDataKey(POSITION)) or frames_of(path) is not None
-    except RuntimeError:
+        return bool(reader_of(path).HasMetaDataKey(POSITION)) or frames_of(path) is not None
+    except LoadError:
         return False
 
 
 def read_stack(source: Source) -> Stack:
     """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
     files = _series_files(source.path, source.dataset) if source.path.is_dir() else [source.path]
-    headers = [_header_of(path) for path in files]
+    headers = [reader_of(path) for path in files]
     several = frames_of(files[0]) if len(files) == 1 else None
     where = several or _slices(files, headers)
     if several is not None:
@@ -222,11 +215,6 @@ def recognises(path: Path) -> bool:
     return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
 
 
-def parts(_path: Path) -> tuple[Path, ...]:
-    """A file or a folder is all there is."""
-    return ()
-
-
 def read_header(source: Source, config: LoadConfig) -> Header:
     """Geometry of a series; tilt, gaps and repeats are refused, or resampled where the setting asks for it."""
     stack = read_stack(source)
@@ -249,7 +237,6 @@ def read_header(source: Source, config: LoadConfig) -> Header:
         stack.positions[0],
         np.column_stack([stack.axes, stack.normal]),
         stack.pixel_type,
-        (source.path,),
         assumed=tuple(f"resampled onto a regular grid: {p}" for p in problems),
     )
 
@@ -263,9 +250,7 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     if stack.frames:
         whole = to_xyz(sitk.ReadImage(str(stack.files[0])))
         return np.asfortranarray(whole[x0:x1, y0:y1, list(stack.frames[z0:z1])])
-    reader = sitk.ImageSeriesReader()
-    reader.SetFileNames([str(f) for f in stack.files[z0:z1]])
-    return to_xyz(reader.Execute())[x0:x1, y0:y1]
+    return to_xyz(sitk.ReadImage([str(f) for f in stack.files[z0:z1]]))[x0:x1, y0:y1]
 
 
 def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:

@@ -45,11 +45,6 @@ def recognises(path: Path) -> bool:
     return path.suffix.lower() in {".h5", ".hdf5"}
 
 
-def parts(_path: Path) -> tuple[Path, ...]:
-    """All is in the one file."""
-    return ()
-
-
 def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
     with h5py.File(source.path, "r") as file:
@@ -66,7 +61,6 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
             np.array(data.attrs.get("origin_mm", np.zeros(3)), float),
             np.array(data.attrs.get("direction", np.eye(3)), float).reshape(3, 3),
             str(data.dtype),
-            (source.path,),
             item_count=data.shape[0] if data.ndim == 4 else len(volumes),
         )
 

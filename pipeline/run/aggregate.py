@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.pooled import counts, intervals, pooled_rms
+from pipeline.compare.pooled import intervals, is_pooled, pooled_rms
 from pipeline.model import Array
 from pipeline.run.results import Result, found_results, write_json
 from reports import tables
@@ -24,7 +24,10 @@ DRAWS = 2000
 
 @dataclass(frozen=True)
 class Totals:
-    """The numbers of the last line. Errors are those of all points of the frames that count."""
+    """The numbers of the last line. Errors are those of all points of the frames that are pooled.
+
+    sweep_lost : cases that crashed at a point of a sweep, which are none of ``cases``.
+    """
 
     cases: int
     cases_ok: int
@@ -33,11 +36,12 @@ class Totals:
     median_mm: float
     p95_mm: float
     solver_s: float
+    sweep_lost: int = 0
 
     @property
     def all_ok(self) -> bool:
         """The one source of the exit code and of the printed counts."""
-        return self.cases > 0 and self.cases_ok == self.cases
+        return self.cases > 0 and self.cases_ok == self.cases and not self.sweep_lost
 
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
@@ -93,7 +97,7 @@ def _point_errors(out: Path, result: Result) -> Array:
         return np.zeros(0)
     points = tables.read(path, POINTS)
     frame, error = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
-    good = [entry["frame"] for entry in result.frames if counts(entry, error[frame == entry["frame"]])]
+    good = [entry["frame"] for entry in result.frames if is_pooled(entry, error[frame == entry["frame"]])]
     return np.asarray(error[np.isin(frame, good)])
 
 

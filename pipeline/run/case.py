@@ -65,7 +65,7 @@ def finished(job: Job, key: str) -> bool:
         return False
     try:
         result = results.read_result(path)
-    except (ValueError, KeyError):
+    except ValueError:
         return False
     return result.key == key and result.ok
 

@@ -18,10 +18,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from pipeline.load import parts_of
+from pipeline.load.files import parts
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
@@ -85,7 +84,7 @@ def file_hash(path: Path) -> str:
         for item in sorted(p for p in path.rglob("*") if p.is_file()):
             hasher.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
         return hasher.hexdigest()
-    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts_of(path))]
+    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts(path))]
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 
@@ -97,11 +96,6 @@ def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
     """
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
-
-
-Arrays = dict[str, NDArray[Any]]
-Packed = tuple[Arrays, dict[str, Any]]
-"""Arrays, and a part that JSON can hold."""
 
 
 def default_root() -> Path:
@@ -127,9 +121,11 @@ class Store:
         try:
             with np.load(path, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data.files if name != "json"}
-                unpack = unpack_lumen if stage == "segment" else unpack_curve
-                return unpack(arrays, json.loads(str(data["json"])))
-        except (OSError, ValueError, KeyError, EOFError):
+                rest = json.loads(str(data["json"]))
+            if stage == "segment":
+                return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
+            return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
+        except (OSError, ValueError, KeyError, TypeError, EOFError):
             path.unlink(missing_ok=True)
             return None
 
@@ -138,11 +134,14 @@ class Store:
         path = self._path(stage, key)
         if path is None:
             return
-        arrays, meta = pack_lumen(result) if isinstance(result, Lumen) else pack_curve(result)
+        named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
+        arrays = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
+        rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}
+        text = json.dumps(rest, default=lambda status: status.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
         with temporary.open("wb") as handle:
-            np.savez(handle, json=np.array(json.dumps(meta)), **arrays)  # type: ignore[arg-type]
+            np.savez(handle, json=np.array(text), **arrays)  # type: ignore[arg-type]
         temporary.replace(path)
 
     def entries(self) -> list[Path]:
@@ -156,37 +155,3 @@ class Store:
         for path in found:
             path.unlink(missing_ok=True)
         return len(found), size
-
-
-def pack_lumen(lumen: Lumen) -> Packed:
-    """Arrays and JSON part of a lumen."""
-    grid = lumen.distance
-    arrays = {
-        "distance": grid.values,
-        "mask": np.packbits(np.asarray(lumen.mask.values, bool)),
-        "spacing": grid.spacing_mm,
-        "origin": grid.origin_mm,
-        "direction": grid.direction,
-    }
-    names = ("wall_level", "warnings", "counters", "levels")
-    return arrays, {name: getattr(lumen, name) for name in names}
-
-
-def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
-    """The inverse of :func:`pack_lumen`."""
-    distance = Grid(arrays["distance"], arrays["spacing"], arrays["origin"], arrays["direction"])
-    mask = np.unpackbits(arrays["mask"], count=distance.values.size).reshape(distance.shape)
-    return Lumen(distance, distance.with_values(mask), **meta | {"warnings": tuple(meta["warnings"])})
-
-
-def pack_curve(curve: Curve) -> Packed:
-    """Arrays and JSON part of a traced curve."""
-    arrays = {name: value for name, value in vars(curve).items() if isinstance(value, np.ndarray)}
-    meta = {name: value for name, value in vars(curve).items() if name not in arrays}
-    return arrays, meta | {"status": curve.status.name}
-
-
-def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
-    """The inverse of :func:`pack_curve`."""
-    fields: dict[str, Any] = {**arrays, **meta, "status": FrameStatus[meta["status"]]}
-    return Curve(**fields)

@@ -37,9 +37,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         found = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
     distance = reorder(site.grid.with_values(wall.values), axes)
-    mask = distance.with_values((distance.values < 0).view(np.uint8))
     return Lumen(
-        distance, mask, wall.level, warning(touching),
+        distance, wall.level, warning(touching),
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
         {"noise": region.levels.noise, "blur_mm": wall.blur_mm, "scanner_blur_mm": blur},
     )  # fmt: skip

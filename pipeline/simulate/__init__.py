@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
 from pipeline.ranges import Profile
 from pipeline.simulate.config import SimulateConfig, SolverConfig
@@ -44,8 +44,7 @@ def measured_clamp(curves: Sequence[Curve], given: Clamp) -> Clamp:
     tangent = np.median([t for _, t in starts], axis=0)
     tangent /= np.linalg.norm(tangent)
     moved = float(np.linalg.norm(point - given.entry_mm))
-    sine = float(np.linalg.norm(np.cross(tangent, given.direction)))
-    turned = float(np.degrees(np.arctan2(sine, tangent @ given.direction)))
+    turned = angle_deg(tangent, given.direction)
     offset = f"{moved:.2f} mm and {turned:.1f} degrees from the manifest's"
     if moved > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
@@ -85,12 +84,6 @@ def guide_wire(wire: Wire, segment_mm: float, bending_scale: float = 1.0) -> Gui
     )
 
 
-def vessel_wall(wall: Wall, lumen: Lumen, hull: str, stiffness_scale: float = 1.0) -> VesselWall:
-    """The lumen's signed distance as an elastic wall."""
-    stiffness = wall.stiffness_N_mm2 * stiffness_scale
-    return VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=hull)
-
-
 def simulate(insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> Iterator[Solution]:
     """Yield the simulated wire at each depth (mm from the clamp to the tip) and roll, in the order given.
 
@@ -108,9 +101,10 @@ def insertion_of(
     config: SimulateConfig = SimulateConfig(),
 ) -> Insertion:
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
+    stiffness = wall.stiffness_N_mm2 * config.wall_scale
     return Insertion(
         guide_wire(wire, solver.segment_mm, config.bending_scale),
-        vessel_wall(wall, lumen, solver.hull, config.wall_scale),
+        VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=solver.hull),
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,

@@ -49,11 +49,6 @@ def _source(value: Any, info: ValidationInfo) -> Source:
     return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
 
 
-def _path(value: Any, info: ValidationInfo) -> Path:
-    """A file, relative to the manifest."""
-    return _source(value, info).path
-
-
 def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
     """A list of sources, or a pattern whose matches come in natural order."""
     if isinstance(value, list):
@@ -92,7 +87,7 @@ def _not_yet(value: Any, info: ValidationInfo) -> Any:
 
 SourceText = Annotated[Source, BeforeValidator(_source)]
 Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(_path)]
+PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
 
 
 class Strict(BaseModel):
@@ -133,11 +128,6 @@ class Case(Strict):
         """What must have one entry per frame."""
         return {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
 
-    @property
-    def _one_file(self) -> bool:
-        """A single file may hold many volumes; their number is known once its header is read."""
-        return len(self.frames) == 1 and self.frames[0].path.is_file()
-
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
         if not self.frames and self.insertion_mm is None:
@@ -148,7 +138,9 @@ class Case(Strict):
 
     @model_validator(mode="after")
     def _one_per_frame(self) -> "Case":
-        if problems := () if self._one_file else not_one_per_frame(self.lists, self.frame_count):
+        # a single file may hold many volumes; their number is known once its header is read
+        one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
+        if problems := () if one_file else not_one_per_frame(self.lists, self.frame_count):
             raise _problem(*problems)
         return self
 

@@ -17,6 +17,11 @@ from pipeline.model import Array
 from reports.schema import ERRORS, SUMMARY, Column
 
 
+def test_a_metric_that_raises_is_named() -> None:
+    with pytest.raises(RuntimeError, match="metric 'near_share': ZeroDivisionError: division by zero"):
+        metrics.measured("near_share", lambda _: 1 / 0, None)  # type: ignore[arg-type]
+
+
 @pytest.fixture
 def as_before() -> Iterator[None]:
     """Take back what a test registers."""

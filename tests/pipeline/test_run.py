@@ -14,6 +14,7 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.model import Curve
+from pipeline.run.case import Job, run_case
 from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
@@ -278,6 +279,13 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     assert main(["diff", str(worse), str(finished)]) == 0
 
 
+def test_a_folder_that_is_not_there_is_no_regression(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["diff", str(finished), str(tmp_path / "nothere")]) == 2
+    assert "nothere: no such folder" in capsys.readouterr().err
+
+
 def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     shutil.copytree(study, folder)
     text = (folder / "manifest.toml").read_text(encoding="utf-8")
@@ -362,10 +370,46 @@ def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Pa
     assert np.degrees(np.arccos(np.dot(found[1], case["entry_direction"]))) < 8.0
 
 
+def test_a_crash_in_a_sweep_is_said_and_counted(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def burst(job: Job) -> None:
+        if job.settings.config.simulate.wall_scale == 2.0:
+            raise RuntimeError("burst pipe")
+        run_case(job)
+
+    monkeypatch.setattr("pipeline.run.launch.run_case", burst)
+    assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2") == 1
+    said = capsys.readouterr()
+    assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
+    assert "1 crashed in the sweep" in said.out
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"case": "other"}'])
+def test_a_damaged_result_hides_no_other(
+    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "cases" / "other").mkdir()
+    damaged = out / "cases" / "other" / "result.json"
+    damaged.write_text(content)
+    for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
+        assert main(words) == 1
+        said = capsys.readouterr()
+        assert f"{damaged}: " in said.err
+        assert "2 cases" in said.out
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
+    assert (out / "index.html").read_text(encoding="utf-8").count("a result file cannot be read") <= 1
+    damaged.rename(out / "cases" / "bifurcation" / "result.json")
+    assert run(study, out) == 0  # a case of the manifest is computed again
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
         (["--set", "solver.segmnt_mm=1"], "did you mean 'segment_mm'"),
+        (["--set", "solver.segmnt_mm=1"], "1 problem in the settings; nothing was run"),
         (["--only", "bifurcatoin"], "did you mean 'bifurcation'"),
         (["--shard", "3/2"], "expected I/N"),
         (["--until", "simulat"], "did you mean 'simulate'"),

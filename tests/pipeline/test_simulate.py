@@ -43,7 +43,7 @@ def case(tmp_path: Path) -> Case:
 def wide_open() -> Lumen:
     """Space without a wall nearby: the rest shape shows."""
     grid = Grid(np.full((20, 20, 20), -30.0, np.float32), np.full(3, 2.0), np.full(3, -19.0))
-    return Lumen(grid, grid.with_values(np.ones((20, 20, 20), np.uint8)))
+    return Lumen(grid)
 
 
 def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Solution]:

@@ -74,11 +74,11 @@ Result = TypeVar("Result", Lumen, Curve)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of a case so far. entry : the clamp that was simulated; failure : why the case went no further."""
+    """What is known of a case so far. clamp : the one that was simulated; failure : why the case went no further."""
 
     scans: Scans | None = None
     lumen: Lumen | None = None
-    entry: Clamp | None = None
+    clamp: Clamp | None = None
     frames: tuple[Frame, ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""

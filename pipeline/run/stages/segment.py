@@ -26,5 +26,5 @@ def segment_vessel(run: Context, known: Known) -> Known:
     crop = Crop(scan, scan.box, config.load)
     lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment)
     log.warnings += lumen.warnings
-    log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.mask.values))} voxels")
+    log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)

@@ -35,7 +35,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
             clock = perf_counter()
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
-    return replace(known, frames=tuple(frames), entry=clamp)
+    return replace(known, frames=tuple(frames), clamp=clamp)
 
 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
