@@ -21,6 +21,10 @@ class FrameStatus(Enum):
         "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "
         "correct the manifest or look for a gap in the trace"
     )
+    UNDER_RESOLVED = (
+        "a joint of the simulated wire is turned by more than 30 degrees: its segments are too long for this bend; "
+        "set a shorter solver.segment_mm, or auto"
+    )
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from solver._kernels.data import WORK
 from solver.grid import Array
 
@@ -70,6 +72,17 @@ class Solution:
         work["wall_look_ups_done_fraction"] = work["wall_look_ups"] / looked if looked else 0.0
         work["start_energy_N_mm"] = self.start_energy_N_mm
         return work
+
+    @property
+    def largest_turn_deg(self) -> float:
+        """Largest angle between two segments that meet, the introducer being the first; 0 for no wire.
+
+        Beyond 30 degrees a chain is no smooth wire: its bending energy is off by 2 % and more.
+        """
+        along = self.frames[:, :, 2]
+        sine = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
+        turns = np.degrees(np.arctan2(sine, np.sum(along[:-1] * along[1:], axis=1)))
+        return float(turns.max(initial=0.0))
 
     @property
     def converged(self) -> bool:

@@ -64,16 +64,20 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
     if frame.simulated is not None:
         wire = frame.simulated
         row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
-        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations}
+        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations, "num_mm": frame.num_mm}
     return row
 
 
 def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
-    """Magnitude (n,) of the contact force at the joint nearest to each arc length (n,), N."""
+    """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
+
+    Forces of joints are added up, so that their sum does not depend on the length of the segments.
+    """
     assert frame.simulated is not None
-    force = np.linalg.norm(frame.simulated.contact_force_N, axis=1)
     arc = arc_length(frame.simulated.joints_mm)
-    return np.asarray(force[np.abs(arc_mm[:, None] - arc[None, :]).argmin(axis=1)])
+    force = np.zeros((len(arc_mm), 3))
+    np.add.at(force, np.abs(arc_mm[None, :] - arc[:, None]).argmin(axis=1), frame.simulated.contact_force_N)
+    return np.asarray(np.linalg.norm(force, axis=1))
 
 
 def point_columns(frames: Sequence[Frame]) -> dict[str, NDArray[Any]]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
 from pipeline.ranges import Profile
-from pipeline.simulate.config import SimulateConfig, SolverConfig
+from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from solver import GuideWire, Insertion, Solution, VesselWall
 
 REACH_MM = 8.0
@@ -73,10 +73,10 @@ def _scaled(profile: Profile, factor: float) -> float | NDArray[np.float64]:
     return np.array(profile, dtype=np.float64) * (1.0, factor)
 
 
-def guide_wire(wire: Wire, segment_mm: float, bending_scale: float = 1.0) -> GuideWire:
-    """The manifest's wire as the solver takes it."""
+def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> GuideWire:
+    """The manifest's wire as the solver takes it; "auto" are the longest segments that ``resolution`` begins with."""
     return GuideWire(
-        segment_mm=segment_mm,
+        segment_mm=COARSEST_MM if segment_mm == "auto" else segment_mm,
         radius_mm=wire.radius_mm,
         bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, bending_scale),
         rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),

@@ -8,6 +8,10 @@ from pydantic import AfterValidator, Field
 from pipeline.ranges import Finite, Positive, PositiveCount
 from solver._kernels.minimise import METHODS
 
+Segment = Positive | Literal["auto"]
+COARSEST_MM = 1.0
+"""Length of the segments that ``auto`` begins with at most."""
+
 
 def _known(method: str) -> str:
     if method not in METHODS:
@@ -21,8 +25,8 @@ class SolverConfig:
 
     method: Annotated[str, AfterValidator(_known)] = "newton"
     """newton, or the seed's closed_form."""
-    segment_mm: Positive = 1.0
-    """Length of the wire's rigid segments."""
+    segment_mm: Segment = "auto"
+    """Length of the wire's rigid segments; auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d*)$")] = "offset"
     """offset (the smooth limit) or samples:N."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9

@@ -1,41 +1,66 @@
 """simulate: the whole insertion replayed once, from the clamp to the depth of every frame."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from pipeline.model import Clamp
+from pipeline.run.log import Log
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
+from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
+from solver import Solution
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
-    assert known.lumen is not None
-    case, config, log = run.case, run.config, run.log
+    lumen, case, config, log = known.lumen, run.case, run.config, run.log
+    assert lumen is not None
     clamp = _clamp(run, known.frames)
     frames = [_with_depth(frame, config.simulate.depth) for frame in known.frames]
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
-    try:
-        insertion = insertion_of(case.wire, case.wall, known.lumen, clamp, config.solver, config.simulate)
+
+    def insert(segment_mm: float) -> list[Solution]:
+        """The wire of every frame with segments of one length."""
+        settings = replace(config.solver, segment_mm=segment_mm)
+        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate)
         found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay])
-        clock = perf_counter()
-        for frame, wire in zip(replay, found, strict=True):
-            log.spent("simulate", perf_counter() - clock, frame.index)
-            work = dict(wire.work)
-            levels = {name: work.pop(name) for name in LEVELS}
-            log.count("simulate", work, levels)
-            done = replace(frame, simulated=wire)
-            frames[frame.index] = done if wire.converged else done.failed("simulate", wire.status)
-            said = f"{wire.status.identifier} {wire.depth_mm:.1f} mm"
-            log.progress("simulate", frame.index + 1, len(frames), said)
-            clock = perf_counter()
+        return list(_noted(log, replay, found, len(frames)))
+
+    try:
+        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire))
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
+    log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
+    for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
+        frames[frame.index] = _judged(replace(frame, simulated=wire, num_mm=float(num_mm)), wire)
     return replace(known, frames=tuple(frames), clamp=clamp)
+
+
+def _judged(frame: Frame, wire: Solution) -> Frame:
+    """The frame, failed where its wire is not at rest or its segments cannot follow the bend."""
+    if not wire.converged:
+        return frame.failed("simulate", wire.status)
+    turn = wire.largest_turn_deg
+    if turn <= LARGEST_JOINT_TURN_DEG:
+        return frame
+    return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
+
+
+def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
+    """The wires, each with its time, its work and a line in the log."""
+    clock = perf_counter()
+    for frame, wire in zip(frames, found, strict=True):
+        log.spent("simulate", perf_counter() - clock, frame.index)
+        work = dict(wire.work)
+        levels = {name: work.pop(name) for name in LEVELS}
+        log.count("simulate", work, levels)
+        log.progress("simulate", frame.index + 1, total, f"{wire.status.identifier} {wire.depth_mm:.1f} mm")
+        yield wire
+        clock = perf_counter()
 
 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
