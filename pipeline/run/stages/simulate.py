@@ -36,11 +36,11 @@ def simulate_frames(run: Context, known: Known) -> Known:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
-        frames[frame.index] = _judged(replace(frame, simulated=wire, num_mm=float(num_mm)), wire)
+        frames[frame.index] = judged(replace(frame, simulated=wire, num_mm=float(num_mm)), wire)
     return replace(known, frames=tuple(frames), clamp=clamp)
 
 
-def _judged(frame: Frame, wire: Solution) -> Frame:
+def judged(frame: Frame, wire: Solution) -> Frame:
     """The frame, failed where its wire is not at rest or its segments cannot follow the bend."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
