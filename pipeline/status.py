@@ -25,6 +25,10 @@ class FrameStatus(Enum):
         "a joint of the simulated wire is turned by more than 30 degrees: its segments are too long for this bend; "
         "set a shorter solver.segment_mm, or auto"
     )
+    SELF_CONTACT = (
+        "the simulated wire passes through itself; parts of the wire do not push each other in this model, so that "
+        "shape and force are not to be trusted from here on"
+    )
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property

@@ -92,7 +92,7 @@ def test_a_length_that_loses_depths_is_not_taken() -> None:
 def test_a_joint_that_cannot_follow_the_bend_is_no_result() -> None:
     """A soft tip behind a jump of 1:1000 goes round a U-turn by folding at a joint: at rest, and wrong."""
     tip = replace(siphon(), guide_wire=GuideWire(1.0, 0.18, np.array([[0.0, 0.01], [3.0, 0.01], [3.0, 10.0]])))
-    turns = [(w.largest_turn_deg, judged(Frame(0), w).status) for w in insert(tip, 1.0) if w.converged]
+    turns = [(w.largest_turn_deg, judged(Frame(0), w, 0.18).status) for w in insert(tip, 1.0) if w.converged]
     assert max(turn for turn, _ in turns) > 30
     assert {status for turn, status in turns if turn > 30} == {"under_resolved"}
     assert {status for turn, status in turns if turn <= 30} == {"ok"}

@@ -13,6 +13,10 @@ from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from solver import Solution
+from solver.self_contact import self_overlap_mm
+
+MOST_OVERLAP_RADII = 0.1
+"""Of the wire with itself that still counts as a touch: less than a scan can show."""
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
@@ -36,18 +40,21 @@ def simulate_frames(run: Context, known: Known) -> Known:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
-        frames[frame.index] = judged(replace(frame, simulated=wire, num_mm=float(num_mm)), wire)
+        found = replace(frame, simulated=wire, num_mm=float(num_mm))
+        frames[frame.index] = judged(found, wire, case.wire.radius_mm)
     return replace(known, frames=tuple(frames), clamp=clamp)
 
 
-def judged(frame: Frame, wire: Solution) -> Frame:
-    """The frame, failed where its wire is not at rest or its segments cannot follow the bend."""
+def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
+    """The frame, failed where its wire is not at rest, cannot follow a bend or passes through itself."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
-    turn = wire.largest_turn_deg
-    if turn <= LARGEST_JOINT_TURN_DEG:
-        return frame
-    return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
+    turn, overlap = wire.largest_turn_deg, self_overlap_mm(wire.joints_mm, radius_mm)
+    if turn > LARGEST_JOINT_TURN_DEG:
+        return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
+    if overlap > MOST_OVERLAP_RADII * radius_mm:
+        return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"it lies {overlap:.2f} mm deep in itself")
+    return frame
 
 
 def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
