@@ -13,6 +13,11 @@ MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
 """A block of the Hessian within this fraction of its joint's stiffness around zero is neutral, below it indefinite."""
+NEUTRAL = 1e-3
+"""Negative curvature, over the stiffest joint's stiffness, up to which a wire without moments is called at rest where
+no trial is lower: a turn of an angle there falls by less than a thousandth of what it would cost by itself."""
+SWING = 0.3
+"""Angle of the first step off a saddle, rad: the fourth order of the energy takes 1 % of its fall."""
 SUFFICIENT = 1e-4
 """Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
 STEP_ANGLE = 0.7
