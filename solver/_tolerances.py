@@ -32,6 +32,10 @@ SMALLEST_STEP = 2.0**-10
 """Smallest fraction of step_mm that a failing step is halved down to."""
 HOP_VOXELS = 0.02
 """Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
+MOST_JOINTS = 1_000_000
+"""Joints of the longest wire that may be asked for: its arrays fill 1.5 GB."""
+USUAL_JOINTS = 20_000
+"""Joints of the longest wire accepted unless something else is said."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
 FIRST_DAMPING = 1e-3
