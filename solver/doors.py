@@ -40,16 +40,22 @@ FORCE_N = Range(-1e6, 1e6, "a guide wire carries less than 10 N")
 
 def number(what: str, name: str, value: object, allowed: Range) -> float:
     """A finite number within a range; no text, no truth value, no list."""
-    taken = math.nan
-    scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
-    if (scalar or (not isinstance(value, bool) and isinstance(value, Real))) and not np.ma.is_masked(value):
-        try:
-            taken = float(value)  # type: ignore[arg-type]
-        except OverflowError:
-            taken = math.inf
-    if not (math.isfinite(taken) and allowed.least <= taken <= allowed.largest):
+    taken = value if type(value) is float else _float(value)
+    # written so that NaN fails
+    if not allowed.least <= taken <= allowed.largest:
         refuse(what, name, value, f"a number from {allowed.least:g} to {allowed.largest:g}", allowed.advice)
     return taken
+
+
+def _float(value: object) -> float:
+    """What is a number as a float, NaN for what is none."""
+    scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
+    if isinstance(value, (bool, np.ma.MaskedArray)) or not (scalar or isinstance(value, Real)):
+        return math.nan
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return math.nan
 
 
 def whole(what: str, name: str, value: object, largest: int) -> int:
@@ -85,8 +91,9 @@ def numbers(what: str, name: str, value: object, shape: Shape, allowed: Range) -
         raw = np.asarray(value)
     except (TypeError, ValueError, OverflowError):
         refuse(what, name, value, text, "rows must be equally long")
-    if raw.dtype.kind not in "iuf" or not _fits(raw.shape, shape) or np.ma.is_masked(value):
-        kind = "a masked array" if np.ma.is_masked(value) else f"{raw.dtype} of shape {raw.shape}"
+    masked = isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value)
+    if raw.dtype.kind not in "iuf" or not _fits(raw.shape, shape) or masked:
+        kind = "a masked array" if masked else f"{raw.dtype} of shape {raw.shape}"
         refuse(what, name, Found(f"{kind}, {value!r}"), text, "give plain numbers, in the unit of its name")
     taken = np.asarray(raw, dtype=np.float64)
     # written so that NaN, which is its own minimum, fails too

@@ -6,22 +6,22 @@ Several minima exist, so a depth is reached by replaying its history, never by j
 import copy
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from contextlib import contextmanager
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
-from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
-from solver.relax import Settings, base_frame, check_scene
+from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import Workspace
 
 ROLL_STEP_DEG = Range(1e-6, 1e6)
+DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
@@ -33,7 +33,7 @@ class Insertion:
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
-    tip_load_N : (3,) dead force on the tip.
+    tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
     where it is: ``clone`` makes branches, ``pickle`` checkpoints, and it goes one way at a time (see ``to_depths``).
     """
@@ -55,6 +55,7 @@ class Insertion:
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
+        down: ArrayLike | None = None,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
         check_scene("insertion", wire, wall)
@@ -66,7 +67,8 @@ class Insertion:
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
         self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
+        weight = weight_of("insertion", wire, down)
+        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (self.max_joints + 0.5 - 1e-12) * wire.segment_mm
@@ -93,45 +95,53 @@ class Insertion:
         The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
         and a call while another thread is at work, is a RuntimeError.
         """
-        depths = _depths(depths_mm)
-        if isinstance(roll_deg, (list, tuple)) or np.ndim(roll_deg) > 0:
-            rolls = numbers("insertion", "roll_deg", roll_deg, depths.shape, ANGLE_DEG)
+        if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
+            refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
+        depths = _list("depths_mm", depths_mm, DEPTH_MM)
+        if isinstance(roll_deg, (list, tuple, np.ndarray)) and np.ndim(roll_deg) > 0:
+            rolls = _list("roll_deg", roll_deg, ANGLE_DEG)
         else:
-            rolls = np.full(len(depths), number("insertion", "roll_deg", roll_deg, ANGLE_DEG))
-        return self._each(depths.tolist(), rolls.tolist())
+            rolls = [number("insertion", "roll_deg", roll_deg, ANGLE_DEG)] * len(depths)
+        if len(rolls) != len(depths):
+            refuse("insertion", "roll_deg", rolls, f"one number, or {len(depths)} as there are depths", "one per depth")
+        return self._each(depths, rolls)
 
     def _each(self, depths: list[float], rolls: list[float]) -> Iterator[Solution]:
         """Go to each depth, for as long as no later call has begun."""
-        way = object()
-        with self._alone():
-            self._way = way
-            # room for all of it at once
-            self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+        way = None
         for depth, roll in zip(depths, rolls, strict=True):
-            with self._alone():
+            self._hold()
+            try:
+                if way is None:
+                    way = self._way = object()
+                    # room for all of it at once
+                    self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
                 if self._way is not way:
                     raise RuntimeError(f"insertion: to_depths: a later call has begun since; {ONE_AT_A_TIME}")
                 solution = self._go(depth, roll)
+            finally:
+                self._lock.release()
             yield solution
 
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Refuse to touch the wire while another thread does."""
+    def _hold(self) -> None:
+        """Take the lock, or refuse to touch the wire while another thread does."""
         if not self._lock.acquire(blocking=False):
             raise RuntimeError(f"insertion: another thread is moving this wire; {ONE_AT_A_TIME}")
-        try:
-            yield
-        finally:
-            self._lock.release()
 
-    def clone(self) -> "Insertion":
+    def clone(self) -> Self:
         """A second insertion where this one is, to the last bit; both go on from there, each on its own way."""
-        return copy.deepcopy(self, {id(shared): shared for shared in (self.wire, self.wall)})
+        twin = object.__new__(type(self))
+        twin.__setstate__(self.__getstate__())
+        return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the lock, which belongs to a process."""
-        with self._alone():
-            return {name: value for name, value in vars(self).items() if name not in ("_lock", "_way")}
+        """A copy of all but the lock, which belongs to a process; wire and wall never change, and are shared."""
+        state = {name: value for name, value in vars(self).items() if name not in ("_lock", "_way")}
+        self._hold()
+        try:
+            return copy.deepcopy(state, {id(shared): shared for shared in (self.wire, self.wall)})
+        finally:
+            self._lock.release()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
@@ -153,10 +163,8 @@ class Insertion:
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
 
 
-def _depths(depths_mm: object) -> Array:
-    """Depths (n,) mm; ValueError where they are none, or where their order is nobody's."""
-    allowed = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
-    if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
-        refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
-    taken = depths_mm if isinstance(depths_mm, (np.ndarray, list)) else list(depths_mm)
-    return numbers("insertion", "depths_mm", taken, (None,), allowed)
+def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
+    """Numbers one by one: numpy would take a truth value among them for one."""
+    if isinstance(values, np.ndarray):
+        return [float(v) for v in numbers("insertion", name, values, (None,), allowed)]
+    return [number("insertion", name, value, allowed) for value in values]

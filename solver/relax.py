@@ -52,6 +52,15 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
     return np.column_stack([first, _cross(direction, first), direction])
 
 
+def weight_of(what: str, wire: GuideWire, down: ArrayLike | None) -> Array:
+    """What a mm of the wire weighs, (3,) N/mm; ValueError where it weighs something and nobody said where down is."""
+    if down is not None:
+        return unit(what, "down", down) * wire.weight_N_per_mm
+    if wire.weight_N_per_mm > 0.0:
+        refuse(what, "down", None, "a direction (3,), as the wire has a weight", "[0, 1, 0] for a patient on the back")
+    return np.zeros(3)
+
+
 def _cross(a: Array, b: Array) -> Array:
     """A x b: numpy's own costs 30 µs for three numbers."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
@@ -99,6 +108,7 @@ def relax(
     roll_deg: float = 0.0,
     start_mm: ArrayLike | None = None,
     load_N: ArrayLike | None = None,
+    down: ArrayLike | None = None,
     method: str = "newton",
     tolerance: float = tol.DECREMENT,
     max_iterations: int = 200,
@@ -109,6 +119,7 @@ def relax(
     depth_mm : length beyond the entry.     start_mm : (m, 3) polyline from the entry that the wire is laid along
     before it relaxes (straight along entry_direction by default); friction acts against leaving it.
     load_N : (3,) dead force on the tip, or (k + 1, 3) on every joint, k from ``wire.segments_at(depth_mm)``.
+    down : (3,) LPS, where the wire's weight pulls.
     Raises ValueError for arguments that cannot be used; failures of the relaxation are a Status.
     """
     settings = Settings(method, tolerance, max_iterations, quadrature)
@@ -121,9 +132,8 @@ def relax(
     curve = straight if start_mm is None else _polyline(start_mm, entry, wire.segment_mm)
     work = Workspace(wire, wall, settings.quadrature, settings.limits)
     work.lay_out(depth_mm)
-    if load_N is not None:
-        work.load(load_N)
-    work.clamp(entry, base_frame(direction, material_axis, roll_deg))
+    work.load((0.0, 0.0, 0.0) if load_N is None else load_N)
+    work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k)
     return work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)

@@ -73,6 +73,7 @@ def _compile(*kernels: Any) -> None:
         "now": work.problem.scratch.descent[0],
         "report": work.report[0],
         "force": work.force,
+        "weight": np.zeros(3),
         **dict.fromkeys(("slot", "k", "was"), 1),
         **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
     }

@@ -128,6 +128,7 @@ class Workspace:
         translate: bool = False,
         step_mm: float = 1.0,
         roll_step_deg: float = 1.0,
+        weight: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
         self.introducer = Introducer(
@@ -140,6 +141,7 @@ class Workspace:
             turn=float(roll_step_deg),
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
+            weight=np.array(weight, dtype=np.float64),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()
@@ -200,6 +202,9 @@ class Workspace:
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_ = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
+        if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
+            # half of the first segment's weight hangs at the entry, where no joint can move
+            force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)

@@ -25,7 +25,7 @@ from pipeline.load import parts_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
-from solver.grid import Grid
+from solver.grid import Grid, read_only
 
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
@@ -174,9 +174,9 @@ def pack_lumen(lumen: Lumen) -> Packed:
 
 def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
     """The inverse of :func:`pack_lumen`."""
-    distance = Grid(arrays["distance"], arrays["spacing"], arrays["origin"], arrays["direction"])
+    distance = Grid(read_only(arrays["distance"]), arrays["spacing"], arrays["origin"], arrays["direction"])
     mask = np.unpackbits(arrays["mask"], count=distance.values.size).reshape(distance.shape)
-    return Lumen(distance, distance.with_values(mask), **meta | {"warnings": tuple(meta["warnings"])})
+    return Lumen(distance, distance.with_values(read_only(mask)), **meta | {"warnings": tuple(meta["warnings"])})
 
 
 def pack_curve(curve: Curve) -> Packed:

@@ -82,6 +82,7 @@ def guide_wire(wire: Wire, segment_mm: float, bending_scale: float = 1.0) -> Gui
         bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, bending_scale),
         rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),
         torsional_stiffness_N_mm2=wire.torsional_stiffness_N_mm2,
+        weight_N_per_mm=wire.weight_N_per_mm,
     )
 
 
@@ -119,4 +120,5 @@ def insertion_of(
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
         step_mm=solver.step_mm,
+        down=clamp.down,
     )

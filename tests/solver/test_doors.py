@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -69,6 +70,7 @@ SCENE = {"wire": ["wire", None, 1.0, WALL], "wall": ["wall", 1.0, TUBE, Grid(TUB
 CLAMP = {
     "entry_mm": NOT_VECTORS + FAR,
     "entry_direction": [*NOT_VECTORS, [0, 0, 0], [0, 0, 1e300]],
+    "down": [v for v in NOT_VECTORS if v is not None] + [[0, 0, 0]],
     "material_axis": [v for v in NOT_VECTORS if v is not None] + [[0, 0, 2.0], [0, 0, 0]],
 }
 METHOD = {
@@ -85,6 +87,7 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "radius_mm": NOT_NUMBERS + HUGE + [-1.0],
             "bending_stiffness_N_mm2": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + BELOW,
             "rest_curvature_per_mm": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + [3.0, -3.0],
+            "weight_N_per_mm": NOT_NUMBERS + HUGE + [-1e-6],
             "torsional_stiffness_N_mm2": [v for v in NOT_NUMBERS if v is not np.inf] + HUGE + BELOW,
         },
     ),
@@ -296,3 +299,11 @@ def test_what_is_given_is_copied() -> None:
 def test_a_read_only_array_is_taken_as_it_is() -> None:
     values = solver.grid.read_only(TUBE)
     assert np.shares_memory(Grid(values).values, TUBE)
+
+
+@pytest.mark.parametrize("method", ["newton", "closed_form"])
+def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules["solver.relax"], "base_frame", lambda *_: np.full((3, 3), np.nan))
+    assert relaxed(method=method).status is solver.Status.NON_FINITE
