@@ -29,12 +29,11 @@ def _checked(grid: Grid) -> Array:
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
     least, largest = float(values.min()), float(values.max())
-    if not (-FAR_MM <= least < 0.0 and largest <= FAR_MM):
-        got, allowed = (
-            Found(f"values from {least:g} to {largest:g}"),
-            "signed distances in mm, negative inside the lumen",
-        )
-        refuse("wall", "grid values", got, allowed, "turn their sign, or make a mask a distance")
+    # a lumen thinner than a voxel may have no negative value; a mask has but two
+    mask = least >= 0.0 and largest <= 1.0 and bool(np.all((values == 0.0) | (values == 1.0)))
+    if mask or max(-least, largest) > FAR_MM:
+        got, allowed = Found(f"values from {least:g} to {largest:g}"), "signed distances in mm, negative inside"
+        refuse("wall", "grid values", got, allowed, "make a mask a distance")
     return values
 
 
