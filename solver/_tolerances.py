@@ -13,6 +13,11 @@ MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
 """A block of the Hessian within this fraction of its joint's stiffness around zero is neutral, below it indefinite."""
+NEUTRAL = 1e-3
+"""Negative curvature, over the stiffest joint's stiffness, up to which a wire without moments is called at rest where
+no trial is lower: a turn of an angle there falls by less than a thousandth of what it would cost by itself."""
+SWING = 0.3
+"""Angle of the first step off a saddle, rad: the fourth order of the energy takes 1 % of its fall."""
 SUFFICIENT = 1e-4
 """Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
 STEP_ANGLE = 0.7
@@ -27,6 +32,10 @@ SMALLEST_STEP = 2.0**-10
 """Smallest fraction of step_mm that a failing step is halved down to."""
 HOP_VOXELS = 0.02
 """Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
+MOST_JOINTS = 1_000_000
+"""Joints of the longest wire that may be asked for: its arrays fill 1.5 GB."""
+USUAL_JOINTS = 20_000
+"""Joints of the longest wire accepted unless something else is said."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
 FIRST_DAMPING = 1e-3

@@ -3,19 +3,26 @@
 Several minima exist, so a depth is reached by replaying its history, never by jumping to it.
 """
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+import copy
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
-from solver.relax import Settings, base_frame, unit, vector
+from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import Workspace
+
+ROLL_STEP_DEG = Range(1e-6, 1e6)
+DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
+ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
 class Insertion:
@@ -26,8 +33,9 @@ class Insertion:
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
-    tip_load_N : (3,) dead force on the tip.
-    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status.
+    tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
+    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
+    where it is: ``clone`` makes branches, ``pickle`` checkpoints, and it goes one way at a time (see ``to_depths``).
     """
 
     def __init__(
@@ -47,22 +55,23 @@ class Insertion:
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
+        down: ArrayLike | None = None,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
-        if initial not in ("slide", "translate"):
-            refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
-        positive = {"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}
-        for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0):
-                refuse("insertion", name, value, "a positive number", "leave it out for the default")
-        self.wire, self.wall, self.max_joints = wire, wall, max_joints
+        check_scene("insertion", wire, wall)
+        choice("insertion", "initial", initial, ("slide", "translate"))
+        number("insertion", "step_mm", step_mm, LENGTH_MM)
+        number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
+        self.wire, self.wall = wire, wall
+        self.max_joints = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
+        frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
+        entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
         self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
-        frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
-        entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
-        self._started = False
+        weight = weight_of("insertion", wire, down)
+        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight)
+        self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
-        self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
+        self._too_long = (self.max_joints + 0.5 - 1e-12) * wire.segment_mm
         self._outside = False
         if wall is not None:
             margin = tol.ENTRY_MARGIN_VOXELS * float(np.linalg.norm(wall.distance.spacing_mm))
@@ -83,17 +92,60 @@ class Insertion:
 
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base, one for all or
         one per depth. A depth that cannot be reached yields the last good state with its own depth and a status.
+        The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
+        and a call while another thread is at work, is a RuntimeError.
         """
-        depths = [float(d) for d in depths_mm]
-        rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
+        if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
+            refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
+        depths = _list("depths_mm", depths_mm, DEPTH_MM)
+        if isinstance(roll_deg, (list, tuple, np.ndarray)) and np.ndim(roll_deg) > 0:
+            rolls = _list("roll_deg", roll_deg, ANGLE_DEG)
+        else:
+            rolls = [number("insertion", "roll_deg", roll_deg, ANGLE_DEG)] * len(depths)
+        if len(rolls) != len(depths):
+            refuse("insertion", "roll_deg", rolls, f"one number, or {len(depths)} as there are depths", "one per depth")
+        return self._each(depths, rolls)
+
+    def _each(self, depths: list[float], rolls: list[float]) -> Iterator[Solution]:
+        """Go to each depth, for as long as no later call has begun."""
+        way = None
         for depth, roll in zip(depths, rolls, strict=True):
-            if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
-                allowed = "finite depths >= 0 and rolls"
-                refuse("insertion", "to_depths", (depth, roll), allowed, "mm from the entry")
-        # room for all of it at once
-        self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
-        for depth, roll in zip(depths, rolls, strict=True):
-            yield self._go(depth, roll)
+            self._hold()
+            try:
+                if way is None:
+                    way = self._way = object()
+                    # room for all of it at once
+                    self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+                if self._way is not way:
+                    raise RuntimeError(f"insertion: to_depths: a later call has begun since; {ONE_AT_A_TIME}")
+                solution = self._go(depth, roll)
+            finally:
+                self._lock.release()
+            yield solution
+
+    def _hold(self) -> None:
+        """Take the lock, or refuse to touch the wire while another thread does."""
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError(f"insertion: another thread is moving this wire; {ONE_AT_A_TIME}")
+
+    def clone(self) -> Self:
+        """A second insertion where this one is, to the last bit; both go on from there, each on its own way."""
+        twin = object.__new__(type(self))
+        twin.__setstate__(self.__getstate__())
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy of all but the lock, which belongs to a process; wire and wall never change, and are shared."""
+        state = {name: value for name, value in vars(self).items() if name not in ("_lock", "_way")}
+        self._hold()
+        try:
+            return copy.deepcopy(state, {id(shared): shared for shared in (self.wire, self.wall)})
+        finally:
+            self._lock.release()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        vars(self).update(state, _lock=threading.Lock(), _way=object())
 
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
@@ -109,3 +161,10 @@ class Insertion:
         else:
             status, iterations = work.advance(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+
+def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
+    """Numbers one by one: numpy would take a truth value among them for one."""
+    if isinstance(values, np.ndarray):
+        return [float(v) for v in numbers("insertion", name, values, (None,), allowed)]
+    return [number("insertion", name, value, allowed) for value in values]

@@ -1,6 +1,5 @@
 """The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,12 +8,18 @@ from numpy.typing import ArrayLike
 
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
+from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
-from solver.grid import Array, Grid
+from solver.grid import Grid
 
 
 def _checked(grid: Grid) -> Array:
     """The distances as float64, or a refusal of what no distance can be."""
+    if grid.values.dtype.kind != "f":
+        found, allowed = Found(f"values of type {grid.values.dtype}"), "floating-point signed distances in mm"
+        refuse(
+            "wall", "distance", found, allowed, "a mask has to be made a distance: negative inside, positive outside"
+        )
     values = np.array(grid.values, dtype=np.float64, order="C")
     if min(values.shape) < 2:
         refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
@@ -23,6 +28,12 @@ def _checked(grid: Grid) -> Array:
         where = [int(i) for i in np.argwhere(bad)[0]]
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
+    least, largest = float(values.min()), float(values.max())
+    # a lumen thinner than a voxel may have no negative value; a mask has but two
+    mask = least >= 0.0 and largest <= 1.0 and bool(np.all((values == 0.0) | (values == 1.0)))
+    if mask or max(-least, largest) > FAR_MM:
+        got, allowed = Found(f"values from {least:g} to {largest:g}"), "signed distances in mm, negative inside"
+        refuse("wall", "grid values", got, allowed, "make a mask a distance")
     return values
 
 
@@ -43,12 +54,10 @@ class VesselWall:
 
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
-        if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
-            refuse("wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual")
-        if not (math.isfinite(self.friction) and self.friction >= 0):
-            refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
+        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, Range(1e-9, 1e9, "0.1 to 100 is usual"))
+        number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
         _ = self.samples
-        values = _checked(self.distance)
+        values = _checked(instance("wall", "distance", self.distance, Grid))
         prefilter(values)
         # the ghost layers: c[-1] = 2 c[0] - c[1]
         padded = np.pad(values, 1, mode="reflect", reflect_type="odd")
@@ -61,23 +70,28 @@ class VesselWall:
     @cached_property
     def samples(self) -> int:
         """Number of hull points around a joint; 0 is the smooth limit."""
-        if self.hull == "offset":
+        if isinstance(self.hull, str) and self.hull == "offset":
             return 0
-        name, _, count = self.hull.partition(":")
-        if name != "samples" or not count.isdigit() or not 1 <= int(count) <= 256:
+        name, _, count = self.hull.partition(":") if isinstance(self.hull, str) else ("", "", "")
+        if name != "samples" or not (
+            count.isascii() and count.isdigit() and len(count) <= 3 and 1 <= int(count) <= 256
+        ):
             refuse("wall", "hull", self.hull, '"offset" or "samples:N", N from 1 to 256', "samples:16 is usual")
         return int(count)
 
     def hull_points(self, radius_mm: float) -> tuple[Array, float]:
         """Offsets (h, 2) across a wire of this radius where the distance is looked up, and what is added to it."""
+        radius_mm = number("wall", "radius_mm", radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
         if self.samples == 0:
-            return np.zeros((1, 2)), float(radius_mm)
+            return np.zeros((1, 2)), radius_mm
         angle = 2 * np.pi * np.arange(self.samples) / self.samples
         return radius_mm * np.column_stack([np.cos(angle), np.sin(angle)]), 0.0
 
     def look_up(self, points_mm: ArrayLike) -> tuple[Array, Array, Array]:
         """Distance (n,) mm, gradient (n, 3) and Hessian (n, 3, 3) per mm of the interpolant at points (n, 3)."""
-        points = np.atleast_2d(np.asarray(points_mm, dtype=np.float64))
+        points = np.atleast_2d(numbers("wall", "points_mm", points_mm, (..., 3), ANYWHERE_MM))
+        if points.ndim != 2:
+            refuse("wall", "points_mm", points.shape, "points (n, 3)", "reshape them")
         jets = np.zeros((len(points), 10))
         look_up(self.field, points, jets)
         order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]

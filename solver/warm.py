@@ -14,6 +14,7 @@ import numpy as np
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.insertion import lay_along
+from solver.doors import instance
 from solver.grid import Grid
 from solver.relax import Settings, relax
 from solver.wall import VesselWall
@@ -41,6 +42,7 @@ def warm_up(*, beside: bool = False) -> None:
 
     beside : all but Newton's method and the way to a depth is compiled by a process of its own, at the same time.
     """
+    instance("solver", "beside", beside, bool)
     with no_collection():
         if not beside or untyped.config.DISABLE_JIT:
             relax(WIRE, _wall(), depth_mm=1.0)
@@ -71,6 +73,7 @@ def _compile(*kernels: Any) -> None:
         "now": work.problem.scratch.descent[0],
         "report": work.report[0],
         "force": work.force,
+        "weight": np.zeros(3),
         **dict.fromkeys(("slot", "k", "was"), 1),
         **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
     }

@@ -1,17 +1,21 @@
 """A wire in memory: the arrays that the kernels work on, grown as the wire goes in, and the way into the kernels."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver import skips
+from solver._compile import hash_of
 from solver._kernels import data
 from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
 from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
+from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
-from solver.grid import Array
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
@@ -39,6 +43,7 @@ def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> R
     return Rule(hull, reach, at, weight, TIP_ZONE if quadrature == "tip" else 2**62)
 
 
+_VERSION = hash_of(Path(__file__))
 NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
 """A stand-in where there is no wall; it is never looked up."""
 
@@ -123,6 +128,7 @@ class Workspace:
         translate: bool = False,
         step_mm: float = 1.0,
         roll_step_deg: float = 1.0,
+        weight: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
         self.introducer = Introducer(
@@ -135,6 +141,7 @@ class Workspace:
             turn=float(roll_step_deg),
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
+            weight=np.array(weight, dtype=np.float64),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()
@@ -142,8 +149,8 @@ class Workspace:
     def load(self, load_N: ArrayLike) -> None:
         """Put dead loads on the joints, or one on the tip."""
         k, loads = self.k, self.problem.chain.load
-        load = np.asarray(load_N, dtype=np.float64)
-        if load.shape not in ((3,), (k + 1, 3)) or not np.all(np.isfinite(load)):
+        load = numbers("relax", "load_N", load_N, (..., 3), FORCE_N)
+        if load.shape not in ((3,), (k + 1, 3)):
             allowed = f"(3,) on the tip or ({k + 1}, 3)"
             refuse("relax", "load_N", load.shape, allowed, "see GuideWire.segments_at")
         loads[:] = 0.0
@@ -153,6 +160,23 @@ class Workspace:
         """Take a handle of the arrays, wherever in memory they are now."""
         settings = self.introducer, self.limits
         self._handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a checkpoint holds: the wall has the field already, and numba's handle is of this process."""
+        state = vars(self) | {"problem": self.problem._replace(field=NO_FIELD), "version": _VERSION}
+        return {name: value for name, value in state.items() if name not in ("_handle", "counts", "field")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take a checkpoint up, where the solver is the one that made it: its arrays mean the same then."""
+        if state.pop("version") != _VERSION:
+            raise ValueError("insertion: checkpoint: made by another version of the solver; insert the wire anew")
+        vars(self).update(state)
+        # the same arrays, and as read-only as they were: to numba that is a type
+        self.field = self.wall.field if self.wall is not None else NO_FIELD
+        self.problem = self.problem._replace(field=self.field)
+        self.table = self.table._replace(profile=self.wire.profile)
+        self.counts = self.counters.view(np.int64)
+        self._bind()
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""
@@ -178,6 +202,9 @@ class Workspace:
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_ = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
+        if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
+            # half of the first segment's weight hangs at the entry, where no joint can move
+            force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)

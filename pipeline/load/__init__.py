@@ -16,6 +16,7 @@ from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry, unusable
 from pipeline.model import Counters, Volume
+from solver.grid import read_only
 
 __all__ = [
     "SUFFIXES",
@@ -84,7 +85,7 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
         raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)
-    return Volume(values, header.spacing_mm, origin, header.direction, header.assumed, made_of)
+    return Volume(read_only(values), header.spacing_mm, origin, header.direction, header.assumed, made_of)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from pipeline.load.files import parts
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
-from solver.grid import Grid
+from solver.grid import Grid, read_only
 
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
@@ -120,7 +120,7 @@ class Store:
             return None
         try:
             with np.load(path, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in data.files if name != "json"}
+                arrays = {name: read_only(data[name]) for name in data.files if name != "json"}
                 rest = json.loads(str(data["json"]))
             if stage == "segment":
                 return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})

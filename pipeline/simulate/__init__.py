@@ -81,6 +81,7 @@ def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> G
         bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, bending_scale),
         rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),
         torsional_stiffness_N_mm2=wire.torsional_stiffness_N_mm2,
+        weight_N_per_mm=wire.weight_N_per_mm,
     )
 
 
@@ -113,4 +114,5 @@ def insertion_of(
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
         step_mm=solver.step_mm,
+        down=clamp.down,
     )

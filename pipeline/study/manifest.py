@@ -117,6 +117,7 @@ class Case(Strict):
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
     truth: PathText | None = None
     wall: Wall = Wall()
+    down: Axis | None = None
 
     @property
     def frame_count(self) -> int:
@@ -134,6 +135,13 @@ class Case(Strict):
             raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
+        return self
+
+    @model_validator(mode="after")
+    def _down_for_a_weight(self) -> "Case":
+        if self.wire.weight_N_per_mm > 0 and self.down is None:
+            problem = f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
+            raise _problem(problem)
         return self
 
     @model_validator(mode="after")

@@ -230,6 +230,7 @@ class Introducer(NamedTuple):
     load : (3,) dead force on the tip, N.     translate : the seed's start shape instead of sliding.
     idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : how much deeper in
     the wall a step may lead the tip, mm.     margin : how far a joint may leave the grid, mm.
+    weight : (3,) of the wire, N per mm of it.
     """
 
     entry: Any
@@ -241,6 +242,7 @@ class Introducer(NamedTuple):
     turn: float
     rise: float
     margin: float
+    weight: Any
 
 
 class Limits(NamedTuple):

@@ -150,8 +150,12 @@ def scale_of(problem: Problem, slot: int, k: int) -> float:
 
 @kernel
 def noise_of(problem: Problem, slot: int, scale: float) -> float:
-    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``."""
-    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load)))
+    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``.
+
+    A weight's energy counts from the entry: it is the difference of two that count from the origin.
+    """
+    at_entry = dot(load3(problem.chain.load, 0), load3(problem.state.x[slot], 0))
+    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load) + abs(at_entry)))
 
 
 @kernel

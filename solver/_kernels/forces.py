@@ -52,11 +52,12 @@ def profile_at(at: Any, value: Any, s: float) -> float:
 
 
 @cached
-def push_force(problem: Problem, table: WireTable, k: int, report: Any) -> float:
+def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
     The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
     share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
+    weight : (3,) N per mm of wire, of which the first segment gains.
     """
     chain, profile, u = problem.chain, table.profile, problem.state.u[CURRENT]
     depth = 0.0
@@ -64,6 +65,7 @@ def push_force(problem: Problem, table: WireTable, k: int, report: Any) -> float
         depth += chain.length[j]
     ahead = problem.state.r[CURRENT, 1]
     force = report.force[0] * ahead[0, 2] + report.force[1] * ahead[1, 2] + report.force[2] * ahead[2, 2]
+    force -= 0.5 * chain.length[0] * (weight[0] * ahead[0, 2] + weight[1] * ahead[1, 2] + weight[2] * ahead[2, 2])
     inner = depth - 0.5 * chain.length[0]
     flexible = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, inner)
     rest = profile_at(profile.rest_at, profile.rest, inner)

@@ -12,7 +12,7 @@ from numba.experimental import structref
 
 from solver import _tolerances as tol
 from solver._kernels import data
-from solver._kernels.chain import lay_out, segments_at
+from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
@@ -77,7 +77,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     if k > 0 and problem.stiffness > 0.0:
         report.penetration = contact_forces(problem, k, force)
     if k > 0:
-        report.push = push_force(problem, handle.table, k, report)
+        report.push = push_force(problem, handle.table, handle.introducer.weight, k, report)
     return outcome, iterations, k
 
 
@@ -127,6 +127,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         k = set_out(handle, depth, roll)
     outcome, used, energy = data.CONVERGED, 0, 0.0
     if k > 0:
+        weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:

@@ -83,6 +83,11 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
         if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
             break
         outcome = FRICTION
-    if outcome == CONVERGED and least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
-        outcome = FOLDED
+    if outcome == CONVERGED:
+        tip = problem.state.x[slot, k]
+        # whatever is undefined along the wire is so at its tip
+        if not math.isfinite(tip[0] + tip[1] + tip[2]):
+            outcome = NON_FINITE
+        elif least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
+            outcome = FOLDED
     return outcome, iterations, energy

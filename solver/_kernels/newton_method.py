@@ -18,15 +18,9 @@ from solver._kernels.energy import energy_of, noise_of, scale_of, stiffest, tota
 from solver._kernels.flags import cached, kernel, merged
 from solver._kernels.forces import at_rest, rounding_moment, unloaded
 from solver._kernels.newton import costate, sweep
-from solver._kernels.rollout import copy_base, place, rollout
-
-
-@kernel
-def step(problem: Problem, slot: int, first_free: int, k: int, fraction: float) -> float:
-    """Take a fraction of Newton's step; return the energy of the trial state, N mm."""
-    rollout(problem, slot, first_free, k, fraction)
-    problem.scratch.counters[0].rollouts += 1
-    return total_energy(problem, 1 - slot, first_free, k)
+from solver._kernels.rollout import copy_base, place
+from solver._kernels.saddle import off_saddle
+from solver._kernels.trial import step
 
 
 @kernel
@@ -76,29 +70,6 @@ def watchdog(problem: Problem, k: int, now: Any, rise: float, report: Any) -> bo
     sweep(problem, start, 0, k, 0.0, report)
     counters.sweeps += 1
     return False
-
-
-@merged
-def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) -> float:
-    """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
-    j, slot, gain = int(report.joint), now.slot, problem.scratch.gain
-    for a in range(3):
-        for b in range(7):
-            gain[j, a, b] = 0.0
-    for i in range(j + 1, k):
-        gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
-    size, least = 0.3, 0.1 * abs(report.curvature)
-    # joints further on may answer with a thousand times as much: nothing but rounding ends the search
-    while least * size * size > noise:
-        for side in (1.0, -1.0):
-            for a in range(2):
-                gain[j, a, 0] = side * size * report.bend[a]
-            gain[j, 2, 0] = side * size * report.twist
-            trial = step(problem, slot, j, k, 1.0)
-            if trial < now.energy - least * size * size and admissible(problem, slot, k):
-                return trial
-        size *= 0.25
-    return math.inf
 
 
 @merged
@@ -224,10 +195,11 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     elif now.damping == 0.0:
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):
-            trial = leave_saddle(problem, k, now, noise, report)
+            nearly = abs(report.curvature) <= tol.NEUTRAL * stiffest(problem.chain, k)
+            trial = off_saddle(problem, k, now, noise, report)
             if trial == math.inf:
-                # the way down is shorter than rounding can tell
-                return CONVERGED
+                # the way down is shorter than rounding can tell, unless it is steep, or the sweep overflowed
+                return CONVERGED if nearly else STALLED
     if trial <= now.energy:
         return take(problem, k, now, trial, definite and now.damping == 0.0, tolerance, report)
     return hold_back(problem, k, now, report)

@@ -12,7 +12,7 @@ from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.load import rolls
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
-from pipeline.study.manifest import Case, read_manifest
+from pipeline.study.manifest import Case, ManifestError, read_manifest
 from solver import Solution
 from solver.grid import Grid
 
@@ -50,6 +50,24 @@ def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> lis
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis))
     insertion = insertion_of(case.wire, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
     return list(simulate(insertion, depths, [roll] * len(depths)))
+
+
+def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
+    """Sag of a free tip of 12 mm under its weight, beside what its hook does; beam theory to 1 %."""
+    heavy = replace(case.wire, weight_N_per_mm=1e-5, rest_curvature_per_mm=0.0, bending_stiffness_N_mm2=0.6)
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis), np.array([0.0, 2.0, 0.0]))
+    insertion = insertion_of(heavy, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
+    last = list(simulate(insertion, [12.0], [0.0]))[-1]
+    assert last.joints_mm[-1, 1] == pytest.approx(1e-5 * 12.0**4 / (8 * 0.6), rel=0.01)
+
+
+def test_a_weight_without_down_is_a_problem_of_the_manifest(tmp_path: Path) -> None:
+    path, weighed = tmp_path / "manifest.toml", MANIFEST.replace("radius_mm", "weight_N_per_mm = 8e-6\nradius_mm")
+    path.write_text(weighed)
+    with pytest.raises(ManifestError, match=r"case 'tube': down is missing: wire 'w' has a weight; \[0, 1, 0\]"):
+        read_manifest(path)
+    path.write_text(weighed.replace("wire = ", "down = [0, 1, 0]\nwire = "))
+    assert read_manifest(path).cases[0].down == (0.0, 1.0, 0.0)
 
 
 def test_positive_rest_curvature_bends_towards_the_material_axis(case: Case) -> None:

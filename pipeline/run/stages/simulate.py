@@ -73,8 +73,8 @@ def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
     """The clamp of the simulation: measured in the scans, or the manifest's."""
     case = run.case
-    axis = None if case.material_axis is None else np.array(case.material_axis)
-    given = Clamp(np.array(case.entry_mm), np.array(case.entry_direction), axis)
+    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
+    given = Clamp(np.array(case.entry_mm), np.array(case.entry_direction), axis, down)
     if run.config.simulate.entry == "manifest":
         return given
     clamp = measured_clamp([curve for f in frames if (curve := f.trusted_curve) is not None], given)
