@@ -164,7 +164,7 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
 def _headline(cases: list[CaseFiles], failed: bool) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too."""
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
-    n_frames = sum(case.statistics.get("frames", len(case.errors)) for case in cases)
+    n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     sentence = f"{len(cases)} case{'s' * (len(cases) != 1)}, {n_frames} frames: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
     good = bool(cases) and not failed

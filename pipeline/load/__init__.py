@@ -1,7 +1,8 @@
 """load: scans in. ``read_header`` reads geometry alone, ``read_headers`` that of all scans of a case, which is held
 against each other before any voxel is read, ``Crop.load`` the voxels of a box alone.
 
-A format is a module with three functions: ``recognises`` a path, ``read_header`` of a source, ``read`` voxels of a box.
+A format is a module with four functions: ``recognises`` a path, ``parts`` (other files that belong to it),
+``read_header`` of a source, ``read`` voxels of a box.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,6 +40,9 @@ class Format(Protocol):
 
     def recognises(self, path: Path, /) -> bool:
         """Whether the file or folder is of this format."""
+
+    def parts(self, path: Path, /) -> tuple[Path, ...]:
+        """Other files that belong to it, by its name or its head: a change of theirs is a change of the scan."""
 
     def read_header(self, source: Source, config: LoadConfig, /) -> Header:
         """Its geometry; raises LoadError where it cannot be used."""
@@ -111,6 +115,11 @@ class Crop:
 def _format_of(path: Path) -> Format:
     """The module that reads a path."""
     return next(kind for kind in FORMATS if kind.recognises(path))
+
+
+def parts_of(path: Path) -> tuple[Path, ...]:
+    """Other files that belong to a file, as any format says: asked of every path that goes into a key."""
+    return tuple(part for kind in FORMATS for part in kind.parts(path))
 
 
 @dataclass(frozen=True, eq=False)

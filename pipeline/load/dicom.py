@@ -24,6 +24,7 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.files import reader_of, to_xyz
 from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 
+SUFFIXES = {".dcm", ".ima"}
 GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
 TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
 POSITION, ORIENTATION, PIXEL_SPACING = "0020|0032", "0020|0037", "0028|0030"
@@ -121,6 +122,11 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     sitk.ProcessObject.SetGlobalWarningDisplay(False)
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
+    known = {Path(name).name for files in sizes.values() for name in files}
+    lost = [p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
+    if lost:
+        which = f"{len(lost)} of its files cannot be read as DICOM: {', '.join(lost[:5])}. "
+        raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
     images = {uid: files for uid, files in sizes.items() if files and _is_image(Path(files[0]))}
     if wanted:
         images = {uid: files for uid, files in images.items() if uid == wanted}
@@ -212,7 +218,12 @@ def recognises(path: Path) -> bool:
     """A folder of slices, or one enhanced multi-frame file."""
     if path.is_dir():
         return True
-    return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
+    return path.suffix.lower() in {*SUFFIXES, ""} and frames_of(path) is not None
+
+
+def parts(_path: Path) -> tuple[Path, ...]:
+    """A file or a folder is all there is."""
+    return ()
 
 
 def read_header(source: Source, config: LoadConfig) -> Header:

@@ -110,7 +110,7 @@ def recognises(_path: Path) -> bool:
 def parts(path: Path) -> tuple[Path, ...]:
     """Other files that hold the voxels of a header: those that a MetaImage or NRRD names, and Analyze's other half.
 
-    Asked of every path that goes into a key: a change of theirs is a change of the scan. No other format has any.
+    Asked of every path that goes into a key: a change of theirs is a change of the scan.
     """
     if path.suffix.lower() in {".hdr", ".img"}:
         return tuple(p for p in (path.with_suffix(".img"), path.with_suffix(".hdr")) if p != path and p.is_file())

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.compare.pooled import intervals, is_pooled, pooled_rms
 from pipeline.model import Array
-from pipeline.run.results import Result, found_results, write_json
+from pipeline.run.results import Result, found_results, lost, write_json
 from reports import tables
 from reports.atomic import write_bytes
 from reports.schema import FAILURES, POINTS, SUMMARY
@@ -46,14 +46,14 @@ class Totals:
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
-    found = found_results(out)
+    readable = [_readable(out, result) for result in found_results(out)]
+    found, errors = [result for result, _ in readable], [mm for _, mm in readable]
     rows = [result.summary for result in found]
     failures = [row for result in found for row in result.failures]
     for table, given in ((SUMMARY, rows), (FAILURES, failures)):
         # result files may come from another version, with other columns
         known = [{name: row[name] for name in row.keys() & table.names} for row in given]
         tables.write(out / table.file, table, known)
-    errors = [_point_errors(out, result) for result in found]
     if run_info is not None:
         info = {"cases": [result.case for result in found], "overall": overall(found, errors)}
         write_json(out / name, run_info | info)
@@ -88,6 +88,14 @@ def overall(found: Sequence[Result], errors: Sequence[Array], draws: int = DRAWS
         "groups": len(units),
         "cases": len(used),
     }
+
+
+def _readable(out: Path, result: Result) -> tuple[Result, Array]:
+    """A result with its point errors; one whose points cannot be read is damaged, and hides no other."""
+    try:
+        return result, _point_errors(out, result)
+    except (OSError, EOFError, ValueError, KeyError) as error:
+        return lost(result.case, "damaged", f"{out / 'cases' / result.case / POINTS.file}: {error}"), np.zeros(0)
 
 
 def _point_errors(out: Path, result: Result) -> Array:

@@ -5,10 +5,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from pipeline.load import Scans
 from pipeline.register.frames import record
@@ -22,9 +22,24 @@ from reports.atomic import write_text
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
-    "damaged": "a result file cannot be read; run the case again",
+    "damaged": "a result file cannot be read; run the case again with --fresh",
 }
 """What may have become of a case that has no result of its own, and the sentences that say so."""
+
+
+Row = dict[str, Any]
+
+
+def has(*names: str) -> AfterValidator:
+    """Refuses a row that lacks one of these values."""
+
+    def checked(row: Row) -> Row:
+        lacking = [name for name in names if row.get(name) is None]
+        if lacking:
+            raise ValueError(f"a row lacks {', '.join(lacking)}")
+        return row
+
+    return AfterValidator(checked)
 
 
 @dataclass(frozen=True)
@@ -41,9 +56,9 @@ class Result:
     group: str
     status: str
     sentence: str
-    frames: list[dict[str, Any]]
-    failures: list[dict[str, Any]]
-    summary: dict[str, Any]
+    frames: list[Annotated[Row, has("frame", "status", "sentence", "message")]]
+    failures: list[Annotated[Row, has("case", "status", "sentence", "message")]]
+    summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
@@ -74,8 +89,9 @@ def found_results(out: Path) -> list[Result]:
 def _found(path: Path) -> Result:
     try:
         return read_result(path)
-    except ValidationError as error:
-        return lost(path.parent.name, "damaged", f"{path}: {error.errors()[0]['msg']}")
+    except (ValidationError, OSError) as error:
+        why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        return lost(path.parent.name, "damaged", f"{path}: {why}")
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:

@@ -16,11 +16,12 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
+from zipfile import BadZipFile
 
 import numpy as np
 from pydantic import BaseModel
 
-from pipeline.load.files import parts
+from pipeline.load import parts_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
@@ -31,8 +32,15 @@ _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
 def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
     """Key of what ``stage(*inputs)`` returns: its sources, and its inputs' contents."""
-    code = hash_of(Path(inspect.getfile(inspect.unwrap(stage))))
-    return hashlib.sha256(f"{stage.__qualname__} {code} {digest(inputs)}".encode()).hexdigest()
+    return hashlib.sha256(f"{stage.__qualname__} {code_of(stage)} {digest(inputs)}".encode()).hexdigest()
+
+
+def code_of(function: Callable[..., Any]) -> str:
+    """SHA-256 of the sources behind a function; of its own byte code where it stands in no file, as in a notebook."""
+    function = inspect.unwrap(function)
+    file = Path(inspect.getfile(function))
+    code = function.__code__
+    return hash_of(file) if file.is_file() else hashlib.sha256(code.co_code + repr(code.co_consts).encode()).hexdigest()
 
 
 def digest(value: Any) -> str:
@@ -84,7 +92,7 @@ def file_hash(path: Path) -> str:
         for item in sorted(p for p in path.rglob("*") if p.is_file()):
             hasher.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
         return hasher.hexdigest()
-    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts(path))]
+    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts_of(path))]
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 
@@ -119,13 +127,14 @@ class Store:
         if path is None or not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {name: read_only(data[name]) for name in data.files if name != "json"}
+            # a file that is opened here is closed here: numpy leaves a damaged one open
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+                arrays: dict[str, Any] = {name: read_only(data[name]) for name in data.files if name != "json"}
                 rest = json.loads(str(data["json"]))
             if stage == "segment":
                 return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
             return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
-        except (OSError, ValueError, KeyError, TypeError, EOFError):
+        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
             path.unlink(missing_ok=True)
             return None
 

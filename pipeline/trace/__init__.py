@@ -56,5 +56,6 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
         return curve
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
-    note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest"
+    note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
+    note += "trace.length_tolerance_mm"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

@@ -385,7 +385,21 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
     assert "1 crashed in the sweep" in said.out
 
 
-@pytest.mark.parametrize("content", ["{", "[]", '{"case": "other"}'])
+SOUND = {"case": "other", "role": "", "group": "", "status": "ok", "sentence": "", "failures": []}
+COUNTS = {"case": "other", "status": "ok", "frames": 1, "frames_ok": 1}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "{",
+        "[]",
+        '{"case": "other"}',
+        json.dumps(SOUND | {"frames": [], "summary": {}}),
+        json.dumps(SOUND | {"frames": [{}], "summary": COUNTS}),
+        json.dumps(SOUND | {"frames": [], "summary": COUNTS | {"frames": None}}),
+    ],
+)
 def test_a_damaged_result_hides_no_other(
     finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
 ) -> None:
@@ -403,6 +417,21 @@ def test_a_damaged_result_hides_no_other(
     assert (out / "index.html").read_text(encoding="utf-8").count("a result file cannot be read") <= 1
     damaged.rename(out / "cases" / "bifurcation" / "result.json")
     assert run(study, out) == 0  # a case of the manifest is computed again
+
+
+def test_points_cut_short_hide_no_other_case(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
+    result = out / "cases" / "other" / "result.json"
+    result.write_text(result.read_text().replace('"bifurcation"', '"other"'))
+    points = out / "cases" / "other" / "points.csv.gz"
+    points.write_bytes(points.read_bytes()[:-200])
+    assert main(["report", str(out)]) == 1
+    assert "other: its page cannot be drawn" in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
 
 
 @pytest.mark.parametrize(
