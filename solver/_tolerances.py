@@ -94,3 +94,17 @@ MOST_FORESEEN = 1.5
 """Longest step, over the one before, that starts with that step's change: further ahead it is a guess."""
 OVERSHOOT = 0.02
 """How much longer than allowed a step may be rather than leave a remainder: the limits are round numbers."""
+CREASE_BLOCK = 4
+"""Voxels along an edge of the blocks in which creases of the distance are marked."""
+CREASE = 0.3
+"""Fall of the distance's slope from one voxel to the next that counts as a crease: at a ridge between parallel walls it
+falls by 2, of which at least 0.58 is seen along an axis at one voxel; round an obstacle of r voxels it falls by 1/r."""
+FOOT_STEPS = 64
+"""Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
+RIDGE_VOXELS = 0.05
+"""Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
+that curves with two voxels of radius rises by a fifteenth of that."""
+DETOUR_MM = 1.5
+"""How far around two feet lumen may join them: a wire may cut a carina's edge by as much."""
+FLOOD_CELLS = 48
+"""Cells along the way of a flood at most, however fine the grid is."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver.errors import refuse
+from solver.grid import Array
 from solver.relax import Settings, base_frame, unit, vector
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
@@ -63,10 +64,7 @@ class Insertion:
         self._started = False
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
-        self._outside = False
-        if wall is not None:
-            margin = tol.ENTRY_MARGIN_VOXELS * float(np.linalg.norm(wall.distance.spacing_mm))
-            self._outside = bool(wall.look_up(entry)[0][0] > margin)
+        self._refused = None if wall is None else _refused(wall, entry)
 
     @property
     def depth_mm(self) -> float:
@@ -104,8 +102,20 @@ class Insertion:
             work.place["roll"], self._started = roll, True
         if depth >= self._too_long:
             status, iterations = Status.TOO_LONG, 0
-        elif self._outside:
-            status, iterations = Status.ENTRY_OUTSIDE, 0
+        elif self._refused is not None:
+            status, iterations = self._refused, 0
         else:
             status, iterations = work.advance(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+
+def _refused(wall: VesselWall, entry: Array) -> Status | None:
+    """Why no wire may start at an entry point (3,): too far outside the lumen, or with lumen on both sides of it."""
+    voxel = float(np.linalg.norm(wall.distance.spacing_mm))
+    outside = float(wall.look_up(entry)[0][0])
+    if outside > tol.ENTRY_MARGIN_VOXELS * voxel:
+        return Status.ENTRY_OUTSIDE
+    ways = np.array([way for way in np.ndindex(3, 3, 3) if way > (1, 1, 1)]) - 1.0
+    ways *= (outside + voxel) / np.linalg.norm(ways, axis=1, keepdims=True)
+    ahead, behind = (wall.look_up(entry + side * ways)[0] < 0.0 for side in (1, -1))
+    return Status.ENTRY_IN_SEPTUM if outside > 0.0 and bool(np.any(ahead & behind)) else None

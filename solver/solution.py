@@ -20,7 +20,14 @@ class Status(Enum):
     FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
+    THROUGH_WALL = (
+        "the wire would come through the wall into another vessel; check entry and lumen (vessels that touch), raise "
+        "the wall's stiffness or shorten solver.segment_mm"
+    )
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
+    ENTRY_IN_SEPTUM = (
+        "the entry point lies in a wall with lumen on both sides: which vessel is not known; move entry_mm into it"
+    )
     TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise max_joints"
     NON_FINITE = "the energy became infinite or undefined; check stiffnesses and loads"
 

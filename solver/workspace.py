@@ -39,7 +39,9 @@ def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> R
     return Rule(hull, reach, at, weight, TIP_ZONE if quadrature == "tip" else 2**62)
 
 
-NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
+NO_FIELD = data.Field(
+    np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0, np.zeros((1, 1, 1), np.uint8)
+)
 """A stand-in where there is no wall; it is never looked up."""
 
 

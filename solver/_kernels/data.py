@@ -10,8 +10,8 @@ import numpy as np
 from solver.skips import Skips
 
 # how a relaxation or a step ends, by the names of ``solution.Status``
-OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID")
-CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID = range(7)
+OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID", "THROUGH_WALL")
+CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
 UNFINISHED = -1
 """It goes on."""
 CURRENT, TRIAL, LAST_GOOD = range(3)
@@ -88,6 +88,7 @@ class Field(NamedTuple):
 
     coefficients : (nx + 2, ny + 2, nz + 2) float32.     to_index : (3, 3), index per mm.     origin : (3,) mm.
     gap : bound on |trilinear look-up - spline|, mm.     slope : bound on |gradient|.     spacing : the least, mm.
+    creases : uint8, for each block of the grid whether the distance has a crease near it, see ``wall.creases``.
     """
 
     coefficients: Any
@@ -96,6 +97,7 @@ class Field(NamedTuple):
     gap: float
     slope: float
     spacing: float
+    creases: Any
 
 
 class Profile(NamedTuple):

@@ -19,6 +19,7 @@ from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
 from solver._kernels.minimise import relax_with_friction
+from solver._kernels.septum import through_wall
 from solver._kernels.start import extrapolate_start, follow, note_change
 
 
@@ -131,9 +132,8 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
-    walled = laid == 0 and outcome == data.CONVERGED and problem.stiffness > 0.0
-    if walled and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin:
-        outcome = data.LEFT_GRID
+    if outcome == data.CONVERGED and problem.stiffness > 0.0:
+        outcome = where(problem, handle.introducer.margin, k, laid)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
@@ -141,6 +141,15 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         take_back(handle)
     return outcome, used
+
+
+@merged
+def where(problem: Problem, margin: float, k: int, laid: int) -> int:
+    """Judge the place of a wire at rest: out of the grid, through a wall, or CONVERGED where it may lie."""
+    field, x = problem.field, problem.state.x[data.CURRENT]
+    if laid == 0 and furthest_outside(field, x, k) > margin:
+        return data.LEFT_GRID
+    return data.THROUGH_WALL if through_wall(field, x, k, margin) else data.CONVERGED
 
 
 @merged
