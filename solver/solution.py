@@ -49,6 +49,7 @@ class Solution:
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
     counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
+    least_pivot : distance to instability, see ``_kernels.data.REPORT``: 1 for a free wire, 0 where it snaps.
     """
 
     joints_mm: Array
@@ -68,6 +69,7 @@ class Solution:
     roll_deg: float
     counts: tuple[int, ...]
     start_energy_N_mm: float
+    least_pivot: float
 
     @property
     def work(self) -> Mapping[str, float]:

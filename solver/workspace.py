@@ -178,7 +178,7 @@ class Workspace:
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        start, penetration, push, force, torque, *_ = self.report.item(0)
+        start, penetration, push, force, torque, *_, pivot = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
@@ -203,5 +203,6 @@ class Workspace:
             roll_deg=roll_deg,
             counts=self.counters.item(0),
             start_energy_N_mm=start,
+            least_pivot=pivot,
         )
         return solution

@@ -58,6 +58,7 @@ REPORT = record(
     ("bend", float, 2),
     ("curvature", float),
     ("twist", float),
+    ("pivot", float),
 )
 """What a relaxation found out.
 
@@ -66,6 +67,7 @@ force, torque : gradient of the energy with respect to the entry point, N, and t
 turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
 decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
 joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
+pivot : least of the joints' stiffnesses with all beyond them free to follow, over their own; 0 where the wire snaps.
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
