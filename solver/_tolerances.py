@@ -108,3 +108,20 @@ DETOUR_MM = 1.5
 """How far around two feet lumen may join them: a wire may cut a carina's edge by as much."""
 FLOOD_CELLS = 48
 """Cells along the way of a flood at most, however fine the grid is."""
+REFINE = 0.2
+"""Length of the steps tried next, over a rough one's: 1, 0.2 and 0.05 mm."""
+EASY = 6
+"""Iterations of a step that leads on along the same minimum: two to five, and no Levenberg term."""
+WORK_SHARE = 0.03
+"""Share of the hand's work in a hard step that may be missing from the wire's energy: the trapezium rule over 1 mm is
+right to that in nine of ten smooth steps, and what is released where the wire finds another minimum is more."""
+ENERGY_SHARE = 1e-3
+"""The same of the wire's energy, where the hand does hardly any work."""
+NEUTRAL = 0.005
+"""Pivot below which the wire is about to give way, in whichever direction rounding says."""
+SOFT = 0.5
+"""Pivot below which a wire is soft: moments that are nothing elsewhere move it far."""
+SOFT_TOLERANCE = 1e-4
+"""Tolerance of a soft wire, over the one asked for: at 1e-9 of the energy such wires lay up to 0.04 mm off."""
+CALM_MM = 5.0
+"""Way after a snap on which a wire may still lie otherwise than after shorter steps."""

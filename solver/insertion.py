@@ -26,6 +26,7 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
+    finest_mm : length of the steps down to which a step is taken again that released energy; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status.
@@ -45,6 +46,7 @@ class Insertion:
         max_iterations: int = 200,
         step_mm: float = 1.0,
         roll_step_deg: float = 15.0,
+        finest_mm: float = 0.05,
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
@@ -53,14 +55,14 @@ class Insertion:
         if initial not in ("slide", "translate"):
             refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
         positive = {"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}
-        for name, value in positive.items():
+        for name, value in (*positive.items(), ("finest_mm", min(finest_mm, step_mm))):
             if not (math.isfinite(value) and value > 0):
                 refuse("insertion", name, value, "a positive number", "leave it out for the default")
         self.wire, self.wall, self.max_joints = wire, wall, max_joints
         self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
         frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
         entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
+        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, finest_mm)
         self._started = False
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from solver._kernels.data import WORK
 from solver.grid import Array
@@ -37,6 +38,15 @@ class Status(Enum):
         return self.name.lower()
 
 
+class Snap(NamedTuple):
+    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint."""
+
+    from_mm: float
+    to_mm: float
+    released_N_mm: float
+    moved_mm: float
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A wire at one depth, at rest if ``converged``; otherwise the last good state, and ``sentence`` says why.
@@ -50,6 +60,8 @@ class Solution:
     counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
     least_pivot : distance to instability, see ``_kernels.data.REPORT``: 1 for a free wire, 0 where it snaps.
+    dissipated_N_mm : the hand's work on the way to this depth less the change of energy.     snaps : on that way.
+    uncertain : the wire snapped, or was about to, here or a few mm before: shorter steps may lead elsewhere.
     """
 
     joints_mm: Array
@@ -70,6 +82,9 @@ class Solution:
     counts: tuple[int, ...]
     start_energy_N_mm: float
     least_pivot: float
+    dissipated_N_mm: float
+    snaps: tuple[Snap, ...]
+    uncertain: bool
 
     @property
     def work(self) -> Mapping[str, float]:

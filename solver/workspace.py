@@ -12,7 +12,7 @@ from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
 from solver.errors import refuse
 from solver.grid import Array
-from solver.solution import Solution, Status
+from solver.solution import Snap, Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
@@ -44,6 +44,9 @@ NO_FIELD = data.Field(
 )
 """A stand-in where there is no wall; it is never looked up."""
 
+SNAPS_KEPT = 16
+"""Of one depth."""
+
 
 class Workspace:
     """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
@@ -67,7 +70,8 @@ class Workspace:
         self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
-        self.place["shrink"] = 1.0
+        self.place["shrink"], self.place["calm"] = 1.0, np.inf
+        self.snaps = np.zeros(SNAPS_KEPT, data.SNAP)
         self.report = np.zeros(2, data.REPORT)
         self._grow(16)
 
@@ -109,7 +113,7 @@ class Workspace:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
         start, change, keep = np.zeros((3, k, 3))
         descent = np.zeros(1, data.DESCENT)
-        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep)
+        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, self.snaps)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -125,6 +129,7 @@ class Workspace:
         translate: bool = False,
         step_mm: float = 1.0,
         roll_step_deg: float = 1.0,
+        finest_mm: float = 1.0,
     ) -> None:
         """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
         self.introducer = Introducer(
@@ -137,6 +142,7 @@ class Workspace:
             turn=float(roll_step_deg),
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
+            finest=min(float(finest_mm) / float(step_mm), 1.0),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()
@@ -180,6 +186,7 @@ class Workspace:
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_, pivot = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
+        *_, energy, _, _, _, _, dissipated, calm, snaps = self.place.item(0)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
@@ -188,7 +195,7 @@ class Workspace:
         vars(solution).update(
             joints_mm=arrays[0],
             frames=arrays[1],
-            energy_N_mm=self.place["energy"].item(0),
+            energy_N_mm=energy,
             bending_energy_N_mm=bending,
             wall_energy_N_mm=wall,
             friction_energy_N_mm=friction,
@@ -204,5 +211,8 @@ class Workspace:
             counts=self.counters.item(0),
             start_energy_N_mm=start,
             least_pivot=pivot,
+            dissipated_N_mm=dissipated,
+            snaps=tuple(Snap(*self.snaps.item(n)) for n in range(snaps)),
+            uncertain=calm < tol.CALM_MM,
         )
         return solution

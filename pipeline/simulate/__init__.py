@@ -119,4 +119,5 @@ def insertion_of(
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
         step_mm=solver.step_mm,
+        finest_mm=solver.finest_mm,
     )

@@ -12,8 +12,8 @@ from solver.skips import Skips
 # how a relaxation or a step ends, by the names of ``solution.Status``
 OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID", "THROUGH_WALL")
 CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
-UNFINISHED = -1
-"""It goes on."""
+UNFINISHED, ROUGH = -1, -2
+"""It goes on. And of a step: it is to be taken again in shorter ones."""
 CURRENT, TRIAL, LAST_GOOD = range(3)
 """Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes."""
 
@@ -80,9 +80,19 @@ Newton's method. first_free : joints before it are left alone.     damping : Lev
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
-PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")))
+PLACE = record(
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")),
+    *((name, float) for name in ("push", "torque", "dissipated", "calm")),
+    ("snaps", np.int64),
+)
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm (0 after a roll)."""
+step, mm (0 after a roll).
+
+push, torque : the hand's there, N and N mm.     dissipated : of its work on the way to this depth, N mm.     calm : way
+since the wire snapped or was about to, mm.     snaps : their number on the way to this depth.
+"""
+SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
+"""An event: depths before and after, energy released, the largest way of a joint."""
 
 
 class Field(NamedTuple):
@@ -183,7 +193,7 @@ class Scratch(NamedTuple):
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
     distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``COUNTERS`` and
     ``DESCENT``.     start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in
-    the last step, from the tip inwards.     keep : (k, 3) controls to come back to.
+    the last step, from the tip inwards.     keep : (k, 3) controls to come back to.     snaps : (n,) of ``SNAP``.
     """
 
     gain: Any
@@ -194,6 +204,7 @@ class Scratch(NamedTuple):
     start: Any
     change: Any
     keep: Any
+    snaps: Any
 
 
 class Friction(NamedTuple):
@@ -234,6 +245,7 @@ class Introducer(NamedTuple):
     load : (3,) dead force on the tip, N.     translate : the seed's start shape instead of sliding.
     idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : how much deeper in
     the wall a step may lead the tip, mm.     margin : how far a joint may leave the grid, mm.
+    finest : share of the longest step down to which a rough one is taken again.
     """
 
     entry: Any
@@ -245,6 +257,7 @@ class Introducer(NamedTuple):
     turn: float
     rise: float
     margin: float
+    finest: float
 
 
 class Limits(NamedTuple):

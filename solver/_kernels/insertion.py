@@ -20,6 +20,7 @@ from solver._kernels.forces import contact_forces, copy_state, forget_forces, fu
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
+from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, follow, note_change
 
 
@@ -78,7 +79,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     if k > 0 and problem.stiffness > 0.0:
         report.penetration = contact_forces(problem, k, force)
     if k > 0:
-        report.push = push_force(problem, handle.table, k, report)
+        report.push = push_force(problem, handle.table, k, report) if laid > 0 else handle.place[0].push
     return outcome, iterations, k
 
 
@@ -91,6 +92,7 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
     outcome, iterations = data.CONVERGED, 0
+    at.dissipated, at.snaps = 0.0, 0
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         counters.rolls_proven_idle += 1
@@ -104,6 +106,8 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
             break
         if outcome == data.CONVERGED:
             at.shrink = min(1.0, 2 * at.shrink)
+        elif outcome == data.ROUGH:
+            at.shrink = max(tol.REFINE * at.shrink, introducer.finest)
         elif at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE:
             at.shrink *= 0.5
         else:
@@ -126,7 +130,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, energy = data.CONVERGED, 0, 0.0
+    outcome, used, energy, held = data.CONVERGED, 0, 0.0, problem.scratch.counters[0].levenberg
     if k > 0:
         start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
@@ -134,6 +138,9 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
             copy_state(problem, start, data.CURRENT, k)
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
         outcome = where(problem, handle.introducer.margin, k, laid)
+    if outcome == data.CONVERGED and laid == 0:
+        hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
+        outcome = account(handle, k, (depth, roll, energy), hard)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0

@@ -10,6 +10,7 @@ from pipeline.model import Clamp
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
 from pipeline.status import FrameStatus, StageError
+from solver import Snap
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
@@ -28,6 +29,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
             work = dict(wire.work)
             levels = {name: work.pop(name) for name in LEVELS}
             log.count("simulate", work, levels)
+            log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
             done = replace(frame, simulated=wire)
             frames[frame.index] = done if wire.converged else done.failed("simulate", wire.status)
             said = f"{wire.status.identifier} {wire.depth_mm:.1f} mm"
@@ -36,6 +38,15 @@ def simulate_frames(run: Context, known: Known) -> Known:
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     return replace(known, frames=tuple(frames), entry=clamp)
+
+
+def _told(frame: int, snap: Snap) -> str:
+    """An event in words."""
+    return (
+        f"frame {frame}: the simulated wire gave way between {snap.from_mm:.2f} and {snap.to_mm:.2f} mm "
+        f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); what is seen here and "
+        "shortly after hangs on small causes"
+    )
 
 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
