@@ -112,10 +112,10 @@ REFINE = 0.2
 """Length of the steps tried next, over a rough one's: 1, 0.2 and 0.05 mm."""
 EASY = 6
 """Iterations of a step that leads on along the same minimum: two to five, and no Levenberg term."""
-WORK_SHARE = 0.03
+WORK_SHARE = 0.01
 """Share of the hand's work in a hard step that may be missing from the wire's energy: the trapezium rule over 1 mm is
-right to that in nine of ten smooth steps, and what is released where the wire finds another minimum is more."""
-ENERGY_SHARE = 1e-3
+right to that in most smooth steps, and where the wire found another minimum 0.016 and more were missing."""
+ENERGY_SHARE = 5e-4
 """The same of the wire's energy, where the hand does hardly any work."""
 NEUTRAL = 0.005
 """Pivot below which the wire is about to give way, in whichever direction rounding says."""
@@ -123,5 +123,8 @@ SOFT = 0.5
 """Pivot below which a wire is soft: moments that are nothing elsewhere move it far."""
 SOFT_TOLERANCE = 1e-4
 """Tolerance of a soft wire, over the one asked for: at 1e-9 of the energy such wires lay up to 0.04 mm off."""
+STIFF = 0.2
+"""Pivot above which a wire that was about to give way comes back to calm: in a round vessel it stays free to turn about
+the axis, and lies on the side that rounding chose."""
 CALM_MM = 5.0
 """Way after a snap on which a wire may still lie otherwise than after shorter steps."""

@@ -32,7 +32,8 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool
     share = max(abs(ahead) / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
     if judged and abs(lost) > large and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
         return ROUGH
-    at.calm += abs(ahead)
+    if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
+        at.calm += abs(ahead)
     if judged and lost > large:
         note_snap(problem, at, k, segments_at(at.inserted, handle.table.segment)[0], (reached[0], lost))
     if report.pivot < tol.NEUTRAL:
@@ -55,10 +56,6 @@ def note_snap(problem: Problem, at: Any, k: int, was: int, reached: tuple[float,
         # joints are counted from the tip: there they stay with the material
         way = minus(load3(x[CURRENT], k - m), load3(x[LAST_GOOD], was - m))
         farthest = max(farthest, dot(way, way))
-    snap.from_mm, snap.to_mm, snap.released_N_mm, snap.moved_mm = (
-        at.inserted,
-        reached[0],
-        reached[1],
-        math.sqrt(farthest),
-    )
+    snap.from_mm, snap.to_mm = at.inserted, reached[0]
+    snap.released_N_mm, snap.moved_mm = reached[1], math.sqrt(farthest)
     at.calm = 0.0
