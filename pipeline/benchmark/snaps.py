@@ -1,6 +1,6 @@
 """Do shorter steps lead elsewhere? Random insertions in the default's steps, held against steps of 0.05 mm."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -19,10 +19,15 @@ ROUNDS = 3
 Scene = tuple[ScenePlan, GuideWire, VesselWall | None]
 
 
-def against_short_steps(seed: int, count: int) -> Iterator[Claim]:
+def study_of_steps(seed: int, *, quick: bool = False) -> Callable[[], Iterator[Claim]]:
+    """The whole study, to be called later."""
+    return partial(against_short_steps, seed, QUICK_SCENES if quick else SCENES)
+
+
+def against_short_steps(seed: int, count: int, first: int = 0) -> Iterator[Claim]:
     """``count`` scenes of the stress study before anything in them is made extreme, every millimetre of depth."""
     apart, flagged, plain_apart, seconds = [], [], [], []
-    for index in range(count):
+    for index in range(first, first + count):
         plan = moderate(np.random.default_rng([seed, index]), seed, index)
         scene = (plan, *build(plan))
         short = _pushed(scene, step_mm=SHORT_MM)

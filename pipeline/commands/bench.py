@@ -1,7 +1,6 @@
 """``wireval bench [MANIFEST] -o OUT``: run time against error; --peers the rivals, --stress the stress study."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from pipeline.commands import complain, say
@@ -30,16 +29,14 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.benchmark.cost import measure_cost
     from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
-    from pipeline.benchmark.snaps import QUICK_SCENES as QUICK_SNAPS
-    from pipeline.benchmark.snaps import SCENES as SNAPS
-    from pipeline.benchmark.snaps import against_short_steps
+    from pipeline.benchmark.snaps import study_of_steps
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
     from pipeline.load import LoadError
     from pipeline.study.manifest import ManifestError, read_manifest
     from pipeline.study.settings import Config
 
     plain = not (args.stress or args.peers or args.snaps)
-    snaps = partial(against_short_steps, args.seed, QUICK_SNAPS if args.quick else SNAPS)
+    snaps = study_of_steps(args.seed, quick=args.quick)
     try:
         cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
