@@ -123,8 +123,10 @@ SOFT = 0.5
 """Pivot below which a wire is soft: moments that are nothing elsewhere move it far."""
 SOFT_TOLERANCE = 1e-4
 """Tolerance of a soft wire, over the one asked for: at 1e-9 of the energy such wires lay up to 0.04 mm off."""
+TURNED = 0.02
+"""Pivot below which a wire may have given way in a hard step without a loss: in a round vessel, to any side."""
 STIFF = 0.2
 """Pivot above which a wire that was about to give way comes back to calm: in a round vessel it stays free to turn about
 the axis, and lies on the side that rounding chose."""
-CALM_MM = 5.0
+CALM_MM = 2.5
 """Way after a snap on which a wire may still lie otherwise than after shorter steps."""

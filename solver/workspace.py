@@ -186,7 +186,7 @@ class Workspace:
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_, pivot = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
-        *_, energy, _, _, _, _, dissipated, calm, snaps = self.place.item(0)
+        _, _, energy, *_, dissipated, calm, snaps = self.place.item(0)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)

@@ -36,7 +36,8 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool
         at.calm += abs(ahead)
     if judged and lost > large:
         note_snap(problem, at, k, segments_at(at.inserted, handle.table.segment)[0], (reached[0], lost))
-    if report.pivot < tol.NEUTRAL:
+    # a wire that is soft after a hard step may have given way without a loss, to a side that rounding chose
+    if report.pivot < (tol.TURNED if hard else tol.NEUTRAL):
         at.calm = 0.0
     at.push, at.torque, at.dissipated = push, torque, at.dissipated + lost
     return CONVERGED
