@@ -33,9 +33,9 @@ fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.relax import relax
-from solver.solution import Solution, Status
+from solver.solution import Snap, Solution, Status
 from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Grid", "GuideWire", "Insertion", "Solution", "Status", "VesselWall", "relax", "warm_up"]
+__all__ = ["Grid", "GuideWire", "Insertion", "Snap", "Solution", "Status", "VesselWall", "relax", "warm_up"]

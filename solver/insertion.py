@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
-from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Range, choice, number, numbers, unit, vector, whole
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
 from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
@@ -32,6 +32,7 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
+    finest_mm : length of the steps down to which a step is taken again that released energy; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
@@ -52,6 +53,7 @@ class Insertion:
         max_iterations: int = 200,
         step_mm: float = 1.0,
         roll_step_deg: float = 15.0,
+        finest_mm: float = 0.05,
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
@@ -61,6 +63,7 @@ class Insertion:
         check_scene("insertion", wire, wall)
         choice("insertion", "initial", initial, ("slide", "translate"))
         number("insertion", "step_mm", step_mm, LENGTH_MM)
+        number("insertion", "finest_mm", min(finest_mm, step_mm), LENGTH_MM)
         number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
         self.wire, self.wall = wire, wall
         self.max_joints = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
@@ -68,14 +71,11 @@ class Insertion:
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
         self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
         weight = weight_of("insertion", wire, down)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight)
+        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight, finest_mm)
         self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (self.max_joints + 0.5 - 1e-12) * wire.segment_mm
-        self._outside = False
-        if wall is not None:
-            margin = tol.ENTRY_MARGIN_VOXELS * float(np.linalg.norm(wall.distance.spacing_mm))
-            self._outside = bool(wall.look_up(entry)[0][0] > margin)
+        self._refused = None if wall is None else _refused(wall, entry)
 
     @property
     def depth_mm(self) -> float:
@@ -156,8 +156,8 @@ class Insertion:
             work.place["roll"], self._started = roll, True
         if depth >= self._too_long:
             status, iterations = Status.TOO_LONG, 0
-        elif self._outside:
-            status, iterations = Status.ENTRY_OUTSIDE, 0
+        elif self._refused is not None:
+            status, iterations = self._refused, 0
         else:
             status, iterations = work.advance(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
@@ -168,3 +168,15 @@ def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
     if isinstance(values, np.ndarray):
         return [float(v) for v in numbers("insertion", name, values, (None,), allowed)]
     return [number("insertion", name, value, allowed) for value in values]
+
+
+def _refused(wall: VesselWall, entry: Array) -> Status | None:
+    """Why no wire may start at an entry point (3,): too far outside the lumen, or with lumen on both sides of it."""
+    voxel = float(np.linalg.norm(wall.distance.spacing_mm))
+    outside = float(wall.look_up(entry)[0][0])
+    if outside > tol.ENTRY_MARGIN_VOXELS * voxel:
+        return Status.ENTRY_OUTSIDE
+    ways = np.array([way for way in np.ndindex(3, 3, 3) if way > (1, 1, 1)]) - 1.0
+    ways *= (outside + voxel) / np.linalg.norm(ways, axis=1, keepdims=True)
+    ahead, behind = (wall.look_up(entry + side * ways)[0] < 0.0 for side in (1, -1))
+    return Status.ENTRY_IN_SEPTUM if outside > 0.0 and bool(np.any(ahead & behind)) else None

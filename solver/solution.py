@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,14 @@ class Status(Enum):
     FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
+    THROUGH_WALL = (
+        "the wire would come through the wall into another vessel; check entry and lumen (vessels that touch), raise "
+        "the wall's stiffness or shorten solver.segment_mm"
+    )
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
+    ENTRY_IN_SEPTUM = (
+        "the entry point lies in a wall with lumen on both sides: which vessel is not known; move entry_mm into it"
+    )
     TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise max_joints"
     NON_FINITE = "the energy became infinite or undefined; check stiffnesses and loads"
 
@@ -30,6 +38,15 @@ class Status(Enum):
     def identifier(self) -> str:
         """The short name used in tables."""
         return self.name.lower()
+
+
+class Snap(NamedTuple):
+    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint."""
+
+    from_mm: float
+    to_mm: float
+    released_N_mm: float
+    moved_mm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +62,9 @@ class Solution:
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
     counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
+    least_pivot : distance to instability, see ``_kernels.data.REPORT``: 1 for a free wire, 0 where it snaps.
+    dissipated_N_mm : the hand's work on the way to this depth less the change of energy.     snaps : on that way.
+    uncertain : the wire snapped, or was about to, here or a few mm before: shorter steps may lead elsewhere.
     """
 
     joints_mm: Array
@@ -64,6 +84,10 @@ class Solution:
     roll_deg: float
     counts: tuple[int, ...]
     start_energy_N_mm: float
+    least_pivot: float
+    dissipated_N_mm: float
+    snaps: tuple[Snap, ...]
+    uncertain: bool
 
     @property
     def work(self) -> Mapping[str, float]:

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from solver import _tolerances as tol
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
 from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
@@ -37,6 +39,23 @@ def _checked(grid: Grid) -> Array:
     return values
 
 
+def creases(values: Array, spacing_mm: Array) -> NDArray[np.uint8]:
+    """Blocks of the grid, ``tol.CREASE_BLOCK`` voxels wide, within two voxels of a crease.
+
+    There, as between two vessels, the distance stops to rise and falls again; elsewhere no wire can change lumens.
+    """
+    found = [np.zeros((0, 3), dtype=np.int64)]
+    for axis, spacing in enumerate(spacing_mm):
+        if values.shape[axis] > 2:
+            found.append(np.argwhere(np.diff(values, 2, axis) < -tol.CREASE * spacing) + np.eye(3, dtype=int)[axis])
+    where = np.concatenate(found)
+    marks = np.zeros([-(-n // tol.CREASE_BLOCK) for n in values.shape], dtype=np.uint8)
+    for corner in product((-2, 2), repeat=3):
+        block = np.clip(where + corner, 0, np.array(values.shape) - 1) // tol.CREASE_BLOCK
+        marks[tuple(block.T)] = 1
+    return marks
+
+
 @dataclass(frozen=True, eq=False)
 class VesselWall:
     """The lumen's wall as a signed distance in mm, negative inside; its law is in ``_kernels.wall_law``.
@@ -58,6 +77,7 @@ class VesselWall:
         number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
         _ = self.samples
         values = _checked(instance("wall", "distance", self.distance, Grid))
+        marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
         # the ghost layers: c[-1] = 2 c[0] - c[1]
         padded = np.pad(values, 1, mode="reflect", reflect_type="odd")
@@ -65,7 +85,7 @@ class VesselWall:
         coefficients = padded.astype(np.float32)
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
-        object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing))
+        object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
 
     @cached_property
     def samples(self) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.insertion import lay_along
+from solver._kernels.septum import through_wall
 from solver.doors import instance
 from solver.grid import Grid
 from solver.relax import Settings, relax
@@ -57,7 +58,7 @@ def warm_up(*, beside: bool = False) -> None:
 def compile_beside() -> None:
     """Compile what is kept on disk and can wait there for ``advance``, then what only a wall needs."""
     with no_collection():
-        _compile(closed_form.iterate, lay_along, contact_forces, push_force)
+        _compile(closed_form.iterate, lay_along, contact_forces, push_force, through_wall)
         _wall()
 
 
@@ -67,6 +68,8 @@ def _compile(*kernels: Any) -> None:
     work.clamp(np.zeros(3), np.eye(3))
     known = {
         "problem": work.problem,
+        "field": work.field,
+        "x": work.problem.state.x[0],
         "table": work.table,
         "introducer": work.introducer,
         "limits": work.limits,
@@ -75,7 +78,7 @@ def _compile(*kernels: Any) -> None:
         "force": work.force,
         "weight": np.zeros(3),
         **dict.fromkeys(("slot", "k", "was"), 1),
-        **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
+        **dict.fromkeys(("first", "ahead", "tolerance", "margin"), 1.0),
     }
     for kernel in kernels:
         names = inspect.signature(kernel.py_func).parameters

@@ -16,7 +16,7 @@ from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
 from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
-from solver.solution import Solution, Status
+from solver.solution import Snap, Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
@@ -44,8 +44,13 @@ def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> R
 
 
 _VERSION = hash_of(Path(__file__))
-NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
+NO_FIELD = data.Field(
+    np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0, np.zeros((1, 1, 1), np.uint8)
+)
 """A stand-in where there is no wall; it is never looked up."""
+
+SNAPS_KEPT = 16
+"""Of one depth."""
 
 
 class Workspace:
@@ -70,7 +75,8 @@ class Workspace:
         self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
-        self.place["shrink"] = 1.0
+        self.place["shrink"], self.place["calm"] = 1.0, np.inf
+        self.snaps = np.zeros(SNAPS_KEPT, data.SNAP)
         self.report = np.zeros(2, data.REPORT)
         self._grow(16)
 
@@ -112,7 +118,7 @@ class Workspace:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
         start, change, keep = np.zeros((3, k, 3))
         descent = np.zeros(1, data.DESCENT)
-        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep)
+        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, self.snaps)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -129,6 +135,7 @@ class Workspace:
         step_mm: float = 1.0,
         roll_step_deg: float = 1.0,
         weight: ArrayLike = (0.0, 0.0, 0.0),
+        finest_mm: float = 1.0,
     ) -> None:
         """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
         self.introducer = Introducer(
@@ -142,6 +149,7 @@ class Workspace:
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
             weight=np.array(weight, dtype=np.float64),
+            finest=min(float(finest_mm) / float(step_mm), 1.0),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()
@@ -200,11 +208,12 @@ class Workspace:
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        start, penetration, push, force, torque, *_ = self.report.item(0)
+        start, penetration, push, force, torque, *_, pivot = self.report.item(0)
         bending, wall, _, friction = state.energies.item(CURRENT)
         if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
             # half of the first segment's weight hangs at the entry, where no joint can move
             force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
+        _, _, energy, *_, dissipated, calm, snaps = self.place.item(0)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
@@ -213,7 +222,7 @@ class Workspace:
         vars(solution).update(
             joints_mm=arrays[0],
             frames=arrays[1],
-            energy_N_mm=self.place["energy"].item(0),
+            energy_N_mm=energy,
             bending_energy_N_mm=bending,
             wall_energy_N_mm=wall,
             friction_energy_N_mm=friction,
@@ -228,5 +237,9 @@ class Workspace:
             roll_deg=roll_deg,
             counts=self.counters.item(0),
             start_energy_N_mm=start,
+            least_pivot=pivot,
+            dissipated_N_mm=dissipated,
+            snaps=tuple(Snap(*self.snaps.item(n)) for n in range(snaps)),
+            uncertain=calm < tol.CALM_MM,
         )
         return solution

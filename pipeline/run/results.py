@@ -99,6 +99,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     frames = [
         {name: getattr(f, name) for name in ("status", "sentence", "stage", "message")}
         | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
+        | _events(f)
         for f in known.frames
     ]
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
@@ -132,6 +133,14 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "inputs": _inputs(known.scans),
         "counters": log.counters,
     }
+
+
+def _events(frame: Frame) -> dict[str, Any]:
+    """Where the simulated wire gave way since the frame before, and the hand's work that is not in wire and wall."""
+    wire = frame.simulated
+    if wire is None:
+        return {}
+    return {"snaps": [snap._asdict() for snap in wire.snaps], "dissipated_N_mm": wire.dissipated_N_mm}
 
 
 def _marked(frame: Frame) -> dict[str, float]:

@@ -115,4 +115,5 @@ def insertion_of(
         max_iterations=solver.max_iterations,
         step_mm=solver.step_mm,
         down=clamp.down,
+        finest_mm=solver.finest_mm,
     )

@@ -35,6 +35,8 @@ class SolverConfig:
     """Iterations allowed for one relaxation."""
     step_mm: Positive = 1.0
     """Longest insertion step; shortened where the scene asks for it."""
+    finest_mm: Positive = 0.05
+    """Steps in which the wire gives way are taken again, down to this length; step_mm or more: never."""
     initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
 

@@ -209,6 +209,13 @@ def note_direction(q: Six, j: int, least: float, report: Any) -> None:
 
 
 @inlined
+def note_pivot(lowest: float, first_free: int, damping: float, report: Any) -> None:
+    """Keep the least pivot of a sweep; one that left joints near the base out knows only of the others."""
+    if damping == 0.0:
+        report.pivot = lowest if first_free == 0 else min(lowest, report.pivot)
+
+
+@inlined
 def store_gains(gain: Any, j: int, gains: Gains) -> None:
     """Write joint j's gains, (3, 7): column 0 its step, 1-3 the answer to δp, 4-6 to δr."""
     feed, p, r = gains

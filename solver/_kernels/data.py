@@ -10,10 +10,10 @@ import numpy as np
 from solver.skips import Skips
 
 # how a relaxation or a step ends, by the names of ``solution.Status``
-OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID")
-CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID = range(7)
-UNFINISHED = -1
-"""It goes on."""
+OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID", "THROUGH_WALL")
+CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
+UNFINISHED, ROUGH = -1, -2
+"""It goes on. And of a step: it is to be taken again in shorter ones."""
 CURRENT, TRIAL, LAST_GOOD = range(3)
 """Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes."""
 
@@ -58,6 +58,7 @@ REPORT = record(
     ("bend", float, 2),
     ("curvature", float),
     ("twist", float),
+    ("pivot", float),
 )
 """What a relaxation found out.
 
@@ -66,6 +67,7 @@ force, torque : gradient of the energy with respect to the entry point, N, and t
 turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
 decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
 joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
+pivot : least of the joints' stiffnesses with all beyond them free to follow, over their own; 0 where the wire snaps.
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
@@ -78,9 +80,19 @@ Newton's method. first_free : joints before it are left alone.     damping : Lev
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
-PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")))
+PLACE = record(
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")),
+    *((name, float) for name in ("push", "torque", "dissipated", "calm")),
+    ("snaps", np.int64),
+)
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm (0 after a roll)."""
+step, mm (0 after a roll).
+
+push, torque : the hand's there, N and N mm.     dissipated : of its work on the way to this depth, N mm.     calm : way
+since the wire snapped or was about to, mm.     snaps : their number on the way to this depth.
+"""
+SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
+"""An event: depths before and after, energy released, the largest way of a joint."""
 
 
 class Field(NamedTuple):
@@ -88,6 +100,7 @@ class Field(NamedTuple):
 
     coefficients : (nx + 2, ny + 2, nz + 2) float32.     to_index : (3, 3), index per mm.     origin : (3,) mm.
     gap : bound on |trilinear look-up - spline|, mm.     slope : bound on |gradient|.     spacing : the least, mm.
+    creases : uint8, for each block of the grid whether the distance has a crease near it, see ``wall.creases``.
     """
 
     coefficients: Any
@@ -96,6 +109,7 @@ class Field(NamedTuple):
     gap: float
     slope: float
     spacing: float
+    creases: Any
 
 
 class Profile(NamedTuple):
@@ -179,7 +193,7 @@ class Scratch(NamedTuple):
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
     distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``COUNTERS`` and
     ``DESCENT``.     start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in
-    the last step, from the tip inwards.     keep : (k, 3) controls to come back to.
+    the last step, from the tip inwards.     keep : (k, 3) controls to come back to.     snaps : (n,) of ``SNAP``.
     """
 
     gain: Any
@@ -190,6 +204,7 @@ class Scratch(NamedTuple):
     start: Any
     change: Any
     keep: Any
+    snaps: Any
 
 
 class Friction(NamedTuple):
@@ -231,6 +246,7 @@ class Introducer(NamedTuple):
     idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : how much deeper in
     the wall a step may lead the tip, mm.     margin : how far a joint may leave the grid, mm.
     weight : (3,) of the wire, N per mm of it.
+    finest : share of the longest step down to which a rough one is taken again.
     """
 
     entry: Any
@@ -243,6 +259,7 @@ class Introducer(NamedTuple):
     rise: float
     margin: float
     weight: Any
+    finest: float
 
 
 class Limits(NamedTuple):

@@ -19,6 +19,8 @@ from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
 from solver._kernels.minimise import relax_with_friction
+from solver._kernels.septum import through_wall
+from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, follow, note_change
 
 
@@ -77,7 +79,8 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     if k > 0 and problem.stiffness > 0.0:
         report.penetration = contact_forces(problem, k, force)
     if k > 0:
-        report.push = push_force(problem, handle.table, handle.introducer.weight, k, report)
+        weight = handle.introducer.weight
+        report.push = push_force(problem, handle.table, weight, k, report) if laid > 0 else handle.place[0].push
     return outcome, iterations, k
 
 
@@ -90,6 +93,7 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
     outcome, iterations = data.CONVERGED, 0
+    at.dissipated, at.snaps = 0.0, 0
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         counters.rolls_proven_idle += 1
@@ -103,6 +107,8 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
             break
         if outcome == data.CONVERGED:
             at.shrink = min(1.0, 2 * at.shrink)
+        elif outcome == data.ROUGH:
+            at.shrink = max(tol.REFINE * at.shrink, introducer.finest)
         elif at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE:
             at.shrink *= 0.5
         else:
@@ -125,16 +131,18 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, energy = data.CONVERGED, 0, 0.0
+    outcome, used, energy, held = data.CONVERGED, 0, 0.0, problem.scratch.counters[0].levenberg
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
-    walled = laid == 0 and outcome == data.CONVERGED and problem.stiffness > 0.0
-    if walled and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin:
-        outcome = data.LEFT_GRID
+    if outcome == data.CONVERGED and problem.stiffness > 0.0:
+        outcome = where(problem, handle.introducer.margin, k, laid)
+    if outcome == data.CONVERGED and laid == 0:
+        hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
+        outcome = account(handle, k, (depth, roll, energy), hard)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
@@ -142,6 +150,15 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         take_back(handle)
     return outcome, used
+
+
+@merged
+def where(problem: Problem, margin: float, k: int, laid: int) -> int:
+    """Judge the place of a wire at rest: out of the grid, through a wall, or CONVERGED where it may lie."""
+    field, x = problem.field, problem.state.x[data.CURRENT]
+    if laid == 0 and furthest_outside(field, x, k) > margin:
+        return data.LEFT_GRID
+    return data.THROUGH_WALL if through_wall(field, x, k, margin) else data.CONVERGED
 
 
 @merged

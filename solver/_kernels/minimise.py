@@ -28,7 +28,7 @@ def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -
     """
     now = problem.scratch.descent[0]
     begin(now, slot, energy_of(problem, slot))
-    report.start = now.energy
+    report.start, report.pivot = now.energy, 1.0
     if limits.method == NEWTON and newton_method.rests(problem, k, now):
         forget_forces(report)
         return CONVERGED, 0, now.slot, now.energy

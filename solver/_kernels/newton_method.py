@@ -15,7 +15,7 @@ from solver._kernels.algebra import ZERO3, load3, store3
 from solver._kernels.crossing import admissible
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
 from solver._kernels.energy import energy_of, noise_of, scale_of, stiffest, total_energy
-from solver._kernels.flags import cached, kernel, merged
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import at_rest, rounding_moment, unloaded
 from solver._kernels.newton import costate, sweep
 from solver._kernels.rollout import copy_base, place
@@ -169,6 +169,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     definite = sweep(problem, now.slot, now.first_free, k, now.damping, report)
     counters.sweeps += 1
     counters.joints_left_still += now.first_free
+    tolerance *= tol.SOFT_TOLERANCE if report.pivot < tol.SOFT else 1.0
     scale = scale_of(problem, now.slot, k)
     noise = noise_of(problem, now.slot, scale)
     if now.first_free > 0 and not definite:
@@ -212,7 +213,7 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
     last_step(problem, k, now, report)
     if now.iterations == 0 and not problem.skips.rest:
         return UNFINISHED
-    if at_rest(problem, now.slot, k, report):
+    if whole(now, report) and at_rest(problem, now.slot, k, report):
         problem.scratch.counters[0].starts_at_rest += now.iterations == 0
         return CONVERGED
     if now.first_free > 0:
@@ -226,13 +227,19 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
     return UNFINISHED if now.energy < before else UNDECIDED
 
 
+@inlined
+def whole(now: Any, report: Any) -> bool:
+    """Whether the last sweep says enough of the whole wire: of all joints, or of a wire that is not soft."""
+    return bool(now.first_free == 0 or report.pivot > tol.SOFT)
+
+
 @merged
 def take(problem: Problem, k: int, now: Any, trial: float, free: bool, tolerance: float, report: Any) -> int:
     """Take the step to the trial state, of energy ``trial``. free : Newton's own step, not held back."""
     missed = now.energy - trial - report.decrement
     foretold = tol.FORETOLD * missed * missed <= tolerance * scale_of(problem, now.slot, k) * report.decrement
     now.slot, now.energy = 1 - now.slot, trial
-    if foretold and free:
+    if foretold and free and whole(now, report):
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):
             now.iterations += 1

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.model import Clamp, Lumen
+from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import rolls
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
@@ -109,3 +110,22 @@ def test_scales_reach_the_wire(case: Case) -> None:
 def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:
     assert rolls(15.0, 2) == (15.0, 15.0)
     assert rolls((10.0, 20.0), 2) == (10.0, 20.0)
+
+
+def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:
+    """Two vessels with 0.6 mm between them, and a tip that is bent towards the other one."""
+    axes = [np.arange(a, b, 0.3) for a, b in ((-4, 7), (-4, 4), (-3, 20))]
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    distance = np.minimum(np.hypot(x, y), np.hypot(x - 3.0, y)) - 1.2
+    grid = Grid(distance.astype(np.float32), np.full(3, 0.3), np.array([-4.0, -4.0, -3.0]))
+    lumen = Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+    bent = replace(case.wire, rest_curvature_per_mm=[(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)])
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    wall = replace(case.wall, stiffness_N_mm2=1.0)
+    *_, last = simulate(
+        insertion_of(bent, wall, lumen, clamp, SolverConfig(segment_mm=0.5)), [4.0, 8.0, 15.0], [0.0] * 3
+    )
+    frame = Frame(0, depth_mm=15.0, simulated=last).failed("simulate", last.status)
+    assert frame.status == "through_wall"
+    assert "through the wall" in frame.sentence
+    assert not frame.ok

@@ -12,7 +12,7 @@ from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
-from solver import Solution
+from solver import Snap, Solution
 from solver.self_contact import self_overlap_mm
 
 MOST_OVERLAP_RADII = 0.1
@@ -40,6 +40,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
+        log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
     return replace(known, frames=tuple(frames), clamp=clamp)
@@ -68,6 +69,15 @@ def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: 
         log.progress("simulate", frame.index + 1, total, f"{wire.status.identifier} {wire.depth_mm:.1f} mm")
         yield wire
         clock = perf_counter()
+
+
+def _told(frame: int, snap: Snap) -> str:
+    """An event in words."""
+    return (
+        f"frame {frame}: the simulated wire gave way between {snap.from_mm:.2f} and {snap.to_mm:.2f} mm "
+        f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); what is seen here and "
+        "shortly after hangs on small causes"
+    )
 
 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
