@@ -59,8 +59,8 @@ class Workspace:
         self.wire, self.wall, self.limits, self.skips = wire, wall, limits, skips.current()
         self.rule = look_up_rule(wire, wall, quadrature)
         self.field = wall.field if wall is not None else NO_FIELD
-        # rolling a straight wire with one bending stiffness and a round hull changes nothing
-        self.round = wire.straight and (wall is None or wall.samples == 0)
+        # rolling a straight wire with one bending stiffness and a round, smooth hull changes nothing
+        self.round = wire.straight and (wall is None or (wall.samples == 0 and wall.friction == 0))
         self.k, self.capacity = 0, 0
         self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
@@ -70,21 +70,20 @@ class Workspace:
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
-        """Make room for more segments, keeping joints, frames and controls of the current state."""
+        """Make room for more segments, keeping the wire that lies there."""
         points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
         state, scratch = self._empty_state(capacity, points), self._empty_scratch(capacity, points)
+        friction, chain = self._empty_friction(capacity, points), self._empty_chain(capacity, points)
         if self.capacity:
             old = self.problem
-            for new, was in zip(state[:3], old.state[:3], strict=True):
-                new[:, : was.shape[1]] = was
-            scratch.change[: self.capacity] = old.scratch.change
-        friction = float(self.wall.friction) if self.wall is not None else 0.0
-        rubbing = points if friction else 0
+            news, olds = (*state, *chain[:-1], *friction[2:]), (*old.state, *old.chain[:-1], *old.friction[2:])
+            for new, was in zip((*news, scratch.change), (*olds, old.scratch.change), strict=True):
+                new[tuple(slice(0, size) for size in was.shape)] = was
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
-            friction=data.Friction(friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)),
-            chain=self._empty_chain(capacity, points),
+            friction=friction,
+            chain=chain,
             state=state,
             scratch=scratch,
             skips=self.skips,
@@ -108,6 +107,14 @@ class Workspace:
         start, change, keep = np.zeros((3, k, 3))
         descent = np.zeros(1, data.DESCENT)
         return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep)
+
+    def _empty_friction(self, k: int, points: int) -> data.Friction:
+        coefficient = float(self.wall.friction) if self.wall is not None else 0.0
+        k, points = (k, points) if coefficient else (-1, 0)
+        held, arm, start, normal, stretch = np.zeros((5, points, 3))
+        load, pressed = np.zeros((2, points))
+        frame = np.zeros((k + 1, 3, 3))
+        return data.Friction(coefficient, self.rule.reach, held, frame, arm, start, normal, load, stretch, pressed)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -177,7 +184,7 @@ class Workspace:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_ = self.report.item(0)
-        bending, wall, _, friction = state.energies.item(CURRENT)
+        bending, wall, *_ = state.energies.item(CURRENT)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
@@ -189,7 +196,7 @@ class Workspace:
             energy_N_mm=self.place["energy"].item(0),
             bending_energy_N_mm=bending,
             wall_energy_N_mm=wall,
-            friction_energy_N_mm=friction,
+            friction_energy_N_mm=self.place["rubbed"].item(0),
             status=status,
             iterations=iterations,
             contact_force_N=arrays[2],

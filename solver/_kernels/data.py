@@ -78,9 +78,9 @@ Newton's method. first_free : joints before it are left alone.     damping : Lev
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
-PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")))
+PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "rubbed")))
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm (0 after a roll)."""
+step, mm (0 after a roll); what friction took on the way to this depth, N mm."""
 
 
 class Field(NamedTuple):
@@ -195,21 +195,30 @@ class Scratch(NamedTuple):
 class Friction(NamedTuple):
     """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
 
-    coefficient : 0 is no friction at all.
-    start : (p, 3) where each point was before the step, mm.     normal : (p, 3).     load : (p,) N.
+    coefficient : 0 is no friction at all.     radius : of a smooth hull, mm, else 0.
+    Before the step: held : (p, 3), what each point holds on to, moved to the axis, mm.     frame : (k + 1, 3, 3).
+    In the step: arm : (p, 3), where it rubs, mm from the point, in the frame of its node.     start : (p, 3), what it
+    holds on to.     normal : (p, 3).     load : (p,) N.
+    After the step, counted from the tip's last point: stretch : (p, 3) of the spring, mm.     pressed : (p,) load, N.
     """
 
     coefficient: float
+    radius: float
+    held: Any
+    frame: Any
+    arm: Any
     start: Any
     normal: Any
     load: Any
+    stretch: Any
+    pressed: Any
 
 
 class Problem(NamedTuple):
     """A wire in a wall.
 
     stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     twisting : the torsional stiffness is finite.
-    straight : no rest bend, one bending stiffness, a round hull and no twist: a direction is all of a frame.
+    straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: a direction is all of a frame.
     """
 
     field: Field

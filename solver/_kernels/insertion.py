@@ -14,10 +14,10 @@ from solver import _tolerances as tol
 from solver._kernels import data
 from solver._kernels.chain import lay_out, segments_at
 from solver._kernels.crossing import free_way
-from solver._kernels.data import Introducer, Problem, WireTable
+from solver._kernels.data import Chain, Introducer, Problem, WireTable
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
-from solver._kernels.friction import anchor_friction, anchor_friction_behind
+from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.start import extrapolate_start, follow, note_change
 
@@ -85,6 +85,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
 def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
     at, introducer, limits = handle.place[0], handle.introducer, handle.limits
+    at.rubbed = 0.0
     counters = handle.problem.scratch.counters[0]
     # a cap on the time that a hopeless scene can take
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
@@ -121,7 +122,9 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     problem, at = handle.problem, handle.place[0]
     depth, roll, k = to_depth, to_roll, laid
     if laid > 0:
-        anchor_friction(problem, k)
+        if problem.friction.coefficient > 0.0:
+            copy_state(problem, data.CURRENT, data.LAST_GOOD, k)
+            anchor_friction(problem, k, k, 0.0)
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
@@ -137,7 +140,9 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
-        at.inserted, at.roll, at.energy = depth, roll, energy
+        at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
+        if problem.friction.coefficient > 0.0:
+            at.rubbed += settle_friction(problem, k)
     else:
         take_back(handle)
     return outcome, used
@@ -209,6 +214,7 @@ def take_back(handle: Any) -> None:
     was, first = segments_at(handle.place[0].inserted, handle.table.segment)
     if was > 0:
         lay_out(handle.problem.chain, handle.table, was, first)
+        put_load(handle.problem.chain, handle.introducer, was)
     copy_state(handle.problem, data.LAST_GOOD, data.CURRENT, was)
     handle.report[0] = handle.report[1]
 
@@ -238,9 +244,7 @@ def lay_along(
         for j in range(k):
             common = j >= k - min(was, k)
             state.u[data.CURRENT, j, 2] = state.u[data.LAST_GOOD, was - k + j, 2] if common else 0.0
-    for n in range(k + 1):
-        for a in range(3):
-            chain.load[n, a] = introducer.load[a] if n == k else 0.0
+    put_load(chain, introducer, k)
     source, count = data.LAST_GOOD, was + 1
     if was == 0:
         source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
@@ -248,7 +252,15 @@ def lay_along(
         source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
     follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
     if problem.friction.coefficient > 0.0:
-        anchor_friction_behind(problem, state.x[data.LAST_GOOD], was, k, ahead)
+        anchor_friction(problem, was, k, ahead)
+
+
+@kernel
+def put_load(chain: Chain, introducer: Introducer, k: int) -> None:
+    """Put the dead load on the tip and none elsewhere."""
+    for n in range(k + 1):
+        for a in range(3):
+            chain.load[n, a] = introducer.load[a] if n == k else 0.0
 
 
 @merged
