@@ -18,6 +18,13 @@ from solver.wire import GuideWire
 from solver.workspace import Workspace
 
 
+def _check(numbers: dict[str, float], allowed: str, zero: bool = False) -> None:
+    """Refuse the first number that is negative or not finite, or 0 unless ``zero`` is allowed."""
+    for name, value in numbers.items():
+        if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+            refuse("insertion", name, value, allowed, "leave it out for the default")
+
+
 class Insertion:
     """A wire, clamped at the entry and tangent to entry_direction, pushed into a lumen step after step.
 
@@ -27,6 +34,8 @@ class Insertion:
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.
+    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is
+    behind the hand.     shaft_friction_N : what it takes to slide or turn that shaft, force at its surface.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status.
     """
 
@@ -47,16 +56,16 @@ class Insertion:
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
+        shaft_mm: float = 0.0,
+        shaft_friction_N: float = 0.0,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
         if initial not in ("slide", "translate"):
             refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
-        positive = {"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}
-        for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0):
-                refuse("insertion", name, value, "a positive number", "leave it out for the default")
+        _check({"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}, "a positive number")
+        _check({"shaft_mm": shaft_mm, "shaft_friction_N": shaft_friction_N}, "0 or more", zero=True)
         self.wire, self.wall, self.max_joints = wire, wall, max_joints
-        self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft_mm, shaft_friction_N)
         frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
         entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
         self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)

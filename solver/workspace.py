@@ -10,6 +10,7 @@ from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
 from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
+from solver._kernels.shaft import shaft_forces
 from solver.errors import refuse
 from solver.grid import Array
 from solver.solution import Solution, Status
@@ -52,15 +53,27 @@ class Workspace:
     problem: Problem
     introducer: Introducer | None = None
 
-    def __init__(self, wire: GuideWire, wall: VesselWall | None, quadrature: str, limits: Limits) -> None:
+    def __init__(
+        self,
+        wire: GuideWire,
+        wall: VesselWall | None,
+        quadrature: str,
+        limits: Limits,
+        shaft_mm: float = 0.0,
+        drag_N: float = 0.0,
+    ) -> None:
         if limits.method == CLOSED_FORM and wire.twists:
             name, got = "torsional_stiffness_N_mm2", wire.torsional_stiffness_N_mm2
             refuse("solver", name, got, "inf with method closed_form", "use method newton")
         self.wire, self.wall, self.limits, self.skips = wire, wall, limits, skips.current()
+        self.shaft_mm = float(shaft_mm)
+        springs = np.zeros((1, 3, 3)), np.zeros(2), np.zeros((2, 2))
+        self.shaft = data.Shaft(float(drag_N), float(wire.radius_mm), *springs)
         self.rule = look_up_rule(wire, wall, quadrature)
         self.field = wall.field if wall is not None else NO_FIELD
         # rolling a straight wire with one bending stiffness and a round, smooth hull changes nothing
-        self.round = wire.straight and (wall is None or (wall.samples == 0 and wall.friction == 0))
+        smooth = wall is None or (wall.samples == 0 and wall.friction == 0)
+        self.round = wire.straight and smooth and drag_N == 0
         self.k, self.capacity = 0, 0
         self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
@@ -83,6 +96,7 @@ class Workspace:
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
             friction=friction,
+            shaft=self.shaft,
             chain=chain,
             state=state,
             scratch=scratch,
@@ -93,7 +107,7 @@ class Workspace:
         segment = float(self.wire.segment_mm)
         cells = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, segment, cells)
-        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile)
+        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile, self.shaft_mm)
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
@@ -184,6 +198,7 @@ class Workspace:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_ = self.report.item(0)
+        sliding, turning = shaft_forces(self.shaft) if self.shaft.drag else (0.0, 0.0)
         bending, wall, *_ = state.energies.item(CURRENT)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
@@ -201,8 +216,8 @@ class Workspace:
             iterations=iterations,
             contact_force_N=arrays[2],
             reaction_force_N=arrays[3],
-            reaction_torque_N_mm=float(torque[2]),
-            push_force_N=push,
+            reaction_torque_N_mm=float(torque[2]) + turning,
+            push_force_N=push + sliding,
             max_penetration_mm=penetration,
             depth_mm=depth_mm,
             roll_deg=roll_deg,

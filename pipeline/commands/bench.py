@@ -24,8 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
     from pipeline.benchmark import page, scenes
-    from pipeline.benchmark.claims import measure_claims
+    from pipeline.benchmark.claims import STUDIES, measure_claims
     from pipeline.benchmark.cost import measure_cost
+    from pipeline.benchmark.friction import friction
     from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
@@ -53,6 +54,6 @@ def main(args: argparse.Namespace) -> int:
             chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
         if args.manifest is None:
-            sound &= measure_claims(args.out, say)
+            sound &= measure_claims(args.out, say, (*STUDIES, friction))
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

@@ -128,6 +128,7 @@ class WireTable(NamedTuple):
     """What a wire of any depth is cut from.
 
     cells : (m, 2), see ``chain.tabulate``.     segment : length of one, mm.     tabled : whether ``cells`` is used.
+    shaft : length of the wire between hand and entry, mm: it twists with the first joint.
     """
 
     profile: Profile
@@ -135,6 +136,7 @@ class WireTable(NamedTuple):
     cells: Any
     segment: float
     tabled: bool
+    shaft: float
 
 
 class Chain(NamedTuple):
@@ -214,6 +216,22 @@ class Friction(NamedTuple):
     pressed: Any
 
 
+class Shaft(NamedTuple):
+    """The wire between the hand and the entry, straight and guided; its length is in ``WireTable``.
+
+    drag : what it takes to slide or turn it, N, half of it at the entry, half in the hand.     radius : mm.
+    frame : (1, 3, 3) of the wire at the entry before the step.     step : (2,), mm that the hand pushes it in the step
+    and turns its surface.     stretch : (2, 2) of the springs that hold it after the step, mm: at the entry and in the
+    hand, along and around it.
+    """
+
+    drag: float
+    radius: float
+    frame: Any
+    step: Any
+    stretch: Any
+
+
 class Problem(NamedTuple):
     """A wire in a wall.
 
@@ -224,6 +242,7 @@ class Problem(NamedTuple):
     field: Field
     stiffness: float
     friction: Friction
+    shaft: Shaft
     chain: Chain
     state: State
     scratch: Scratch

@@ -18,6 +18,7 @@ from solver._kernels.algebra import (
     add3,
     apply,
     apply_transposed,
+    cross,
     dot,
     load3,
     load9,
@@ -29,6 +30,7 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import CURRENT, LAST_GOOD, Problem
 from solver._kernels.flags import inlined, kernel, merged
+from solver._kernels.rollout import relative
 
 
 @inlined
@@ -133,23 +135,24 @@ def store_start(problem: Problem, n: int) -> None:
 
 
 @kernel
-def anchor_friction(problem: Problem, was: int, k: int, ahead: float) -> None:
+def anchor_friction(problem: Problem, was: int, k: int, ahead: float, shaft_mm: float) -> None:
     """Measure the ways slid from where the same material was before a step: in LAST_GOOD, of ``was`` segments.
 
     Joints are fixed to the wire and counted from the tip. What was ``ahead`` mm back or more is in the introducer.
     """
     chain, friction = problem.chain, problem.friction
     x, r = problem.state.x[LAST_GOOD], problem.state.r[LAST_GOOD]
-    end, arc = chain.first[k + 1] - 1, 0.0
+    base, arc, end = load9(problem.state.r[CURRENT], 0), 0.0, chain.first[k + 1] - 1
     for n in range(1, k + 1):
         arc += chain.length[n - 1]
         m = n - k + was
-        frame = load9(problem.state.r[CURRENT], 0)
+        frame, at = base, load3(x, max(m, 0))
         if was > 0:
-            frame = load9(r, m if m > 0 else (1 if arc > ahead else 0))
-        at = load3(x, m if m > 0 else 0)
+            # a shaft that is twisted outside comes in as it is turned at the entry, not in the hand
+            frame = load9(r, m if m > 0 else (1 if arc > ahead or shaft_mm > 0.0 else 0))
         if m <= 0:
-            at = mix(1.0, at, arc - ahead, (frame[2], frame[5], frame[8]))
+            along = frame if arc > ahead else base
+            at = mix(1.0, at, arc - ahead, (along[2], along[5], along[8]))
         store9(friction.frame, n, frame)
         for p in range(chain.first[n], chain.first[n + 1]):
             store3(friction.held, p, minus(at, load3(friction.stretch, end - p)))
@@ -164,23 +167,36 @@ def settle_friction(problem: Problem, k: int) -> float:
     end, work = chain.first[k + 1] - 1, 0.0
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
-            load, before = friction.load[p], friction.pressed[end - p]
+            back = end - p
+            load, before = friction.load[p], friction.pressed[back]
             way = ZERO3
             if load > 0.0:
                 way = way_of(problem, CURRENT, n, p)
             elif before > 0.0:
                 at = add3(load3(state.x[CURRENT], n), apply(load9(state.r[CURRENT], n), lever_of(problem, p)))
                 way = minus(at, load3(friction.start, p))
-            size = math.sqrt(dot(way, way))
+            arc = arc_of(problem, n, p, way)
+            size, slid = math.sqrt(dot(way, way)), math.sqrt(dot(arc, arc)) - tol.SLIP_MM
             # the load of the step is the mean of its two ends: with the last one alone the error is of first order
-            work += 0.5 * friction.coefficient * (load + before) * max(size - tol.SLIP_MM, 0.0)
+            work += 0.5 * friction.coefficient * (load + before) * max(slid, 0.0)
             kept = tol.SLIP_MM / size if size > tol.SLIP_MM else 1.0
-            store3(friction.stretch, end - p, scaled(kept if load > 0.0 else 0.0, way))
-            friction.pressed[end - p] = load
-    for p in range(end + 1, friction.pressed.size):
-        store3(friction.stretch, p, ZERO3)
-        friction.pressed[p] = 0.0
+            store3(friction.stretch, back, scaled(kept if load > 0.0 else 0.0, way))
+            friction.pressed[back] = load
+    for back in range(end + 1, friction.pressed.size):
+        store3(friction.stretch, back, ZERO3)
+        friction.pressed[back] = 0.0
     return work
+
+
+@inlined
+def arc_of(problem: Problem, n: int, p: int, way: Three) -> Three:
+    """A way slid with the arc that the hull rolled in place of its sine, 1.1 % less in a step of 15 degrees."""
+    friction, frame = problem.friction, load9(problem.state.r[CURRENT], n)
+    along = (frame[2], frame[5], frame[8])
+    sine = dot(relative(load9(friction.frame, n), frame), along)
+    more = math.asin(min(max(sine, -1.0), 1.0)) - sine
+    arm = apply(frame, load3(friction.arm, p))
+    return add3(way, scaled(more, cross(along, arm)))
 
 
 @merged

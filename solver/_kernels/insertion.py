@@ -19,6 +19,7 @@ from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
+from solver._kernels.shaft import anchor_shaft, settle_shaft
 from solver._kernels.start import extrapolate_start, follow, note_change
 
 
@@ -124,7 +125,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     if laid > 0:
         if problem.friction.coefficient > 0.0:
             copy_state(problem, data.CURRENT, data.LAST_GOOD, k)
-            anchor_friction(problem, k, k, 0.0)
+            anchor_friction(problem, k, k, 0.0, 0.0)
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
@@ -143,6 +144,8 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
         if problem.friction.coefficient > 0.0:
             at.rubbed += settle_friction(problem, k)
+        if problem.shaft.drag > 0.0:
+            at.rubbed += settle_shaft(problem, k)
     else:
         take_back(handle)
     return outcome, used
@@ -196,6 +199,8 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
     handle.report[1] = report
     k, first = segments_at(depth, table.segment)
     clamp(problem, introducer, roll)
+    if problem.shaft.drag > 0.0:
+        anchor_shaft(problem, was, depth - inserted, math.radians(roll - handle.place[0].roll))
     if k > 2 and table.tabled:
         problem.scratch.counters[0].joints_without_profile_look_up += k - 2
     if k > 0:
@@ -242,8 +247,11 @@ def lay_along(
     if problem.twisting:
         # twist stays with the material, which is counted from the tip
         for j in range(k):
-            common = j >= k - min(was, k)
+            # the first joint twists with the shaft outside, wherever the material is
+            common = j >= k - min(was, k) and (table.shaft == 0.0 or (j > 0 and was - k + j > 0))
             state.u[data.CURRENT, j, 2] = state.u[data.LAST_GOOD, was - k + j, 2] if common else 0.0
+        if table.shaft > 0.0 and was > 0:
+            state.u[data.CURRENT, 0, 2] = state.u[data.LAST_GOOD, 0, 2]
     put_load(chain, introducer, k)
     source, count = data.LAST_GOOD, was + 1
     if was == 0:
@@ -252,7 +260,7 @@ def lay_along(
         source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
     follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
     if problem.friction.coefficient > 0.0:
-        anchor_friction(problem, was, k, ahead)
+        anchor_friction(problem, was, k, ahead, table.shaft)
 
 
 @kernel
