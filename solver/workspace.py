@@ -114,7 +114,7 @@ class Workspace:
     def _empty_state(self, k: int, points: int) -> data.State:
         u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
         penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
-        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES))
+        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES), np.zeros((3, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))

@@ -35,7 +35,6 @@ from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.friction import friction_derivatives, lever_of
 from solver._kernels.rotation import jacobian_curvature
-from solver._kernels.shaft import shaft_derivatives
 
 
 @inlined
@@ -111,8 +110,8 @@ def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Thr
         if problem.friction.coefficient > 0.0 and problem.friction.load[p] > 0.0:
             force, _ = friction_derivatives(problem, slot, n, p, frame)
             f, g = add3(f, force), add3(g, cross(lever_of(problem, p), force))
-    if n == 1 and problem.shaft.drag > 0.0:
-        g = add3(g, shaft_derivatives(problem, frame)[0])
+    if n == 1:
+        g = add3(g, load3(state.held[slot], 0))
     return f, g
 
 
@@ -140,8 +139,8 @@ def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool
             rub, stiffer = friction_derivatives(problem, slot, n, i, frame)
             dc, dh = lever(lever_of(problem, i), rub, stiffer)
             p, c, h = add6(p, stiffer), add9(c, dc), add6(h, dh)
-    if n == 1 and problem.shaft.drag > 0.0:
-        h = add6(h, shaft_derivatives(problem, frame)[1])
+    if n == 1:
+        h = add6(h, load3(state.held[slot], 1) + load3(state.held[slot], 2))
     return p, c, h
 
 

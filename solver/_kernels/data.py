@@ -164,7 +164,7 @@ class State(NamedTuple):
 
     u : (3, k, 3) controls, rad.   x : (3, k + 1, 3) joints, mm.   r : (3, k + 1, 3, 3) frames, whose columns are
     material axes 1, 2 and the direction.   penetration : (3, p) mm.   jet : (3, p, 10), see ``field``, per mm.
-    energies : (3,) of ``ENERGIES``.
+    energies : (3,) of ``ENERGIES``.   held : (3, 3, 3), see ``shaft.shaft_energy``; 0 without friction of the shaft.
     """
 
     u: Any
@@ -173,6 +173,7 @@ class State(NamedTuple):
     penetration: Any
     jet: Any
     energies: Any
+    held: Any
 
 
 class Scratch(NamedTuple):

@@ -8,7 +8,7 @@ spring that slips, as at the wall, holds it against sliding and turning together
 import math
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import Nine, Six, Three, dot, dyad, load9, scaled, store9
+from solver._kernels.algebra import Nine, Three, dot, dyad, load9, scaled, store3, store9
 from solver._kernels.data import CURRENT, LAST_GOOD, Problem, Shaft
 from solver._kernels.flags import inlined, kernel
 
@@ -44,25 +44,26 @@ def ways(problem: Problem, turn: float) -> tuple[float, float]:
     return shaft.stretch[ENTRY, 0] + shaft.step[0], shaft.stretch[ENTRY, 1] + shaft.radius * turn
 
 
-@inlined
+@kernel
 def shaft_energy(problem: Problem, slot: int) -> float:
-    """Energy of the spring at the entry, N mm."""
-    along, around = ways(problem, turned(problem, load9(problem.state.r[slot], 1))[0])
-    size = math.sqrt(along * along + around * around)
-    if size <= tol.SLIP_MM:
-        return 0.25 * problem.shaft.drag * size * size / tol.SLIP_MM
-    return 0.5 * problem.shaft.drag * (size - 0.5 * tol.SLIP_MM)
+    """Energy of the spring at the entry, N mm; its derivatives by turning the first segment go to the state.
 
-
-@inlined
-def shaft_derivatives(problem: Problem, frame: Nine) -> tuple[Three, Six]:
-    """Gradient and Hessian of that energy with respect to turning the first segment, in its frame."""
-    turn, slope = turned(problem, frame)
+    held[slot] : its gradient and the six numbers of its Hessian, in the frame of that segment. They wait there because
+    asking for the shaft in the loop over the joints, by its arrays' reference counts, takes four times all the rest.
+    """
+    shaft, held = problem.shaft, problem.state.held[slot]
+    turn, slope = turned(problem, load9(problem.state.r[slot], 1))
     along, around = ways(problem, turn)
-    size, radius = math.sqrt(along * along + around * around), problem.shaft.radius
-    force = 0.5 * problem.shaft.drag / max(size, tol.SLIP_MM)
+    size, radius = math.sqrt(along * along + around * around), shaft.radius
+    force = 0.5 * shaft.drag / max(size, tol.SLIP_MM)
     stiffness = force if size <= tol.SLIP_MM else force * along * along / (size * size)
-    return scaled(force * around * radius, slope), dyad(scaled(stiffness * radius * radius, slope), slope)
+    h = dyad(scaled(stiffness * radius * radius, slope), slope)
+    store3(held, 0, scaled(force * around * radius, slope))
+    store3(held, 1, h[:3])
+    store3(held, 2, h[3:])
+    if size <= tol.SLIP_MM:
+        return 0.25 * shaft.drag * size * size / tol.SLIP_MM
+    return 0.5 * shaft.drag * (size - 0.5 * tol.SLIP_MM)
 
 
 def shaft_forces(shaft: Shaft) -> tuple[float, float]:
