@@ -22,6 +22,7 @@ from solver.workspace import Workspace
 
 ROLL_STEP_DEG = Range(1e-6, 1e6)
 DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
+SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
@@ -35,6 +36,8 @@ class Insertion:
     finest_mm : length of the steps down to which a step is taken again that released energy; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
+    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is
+    behind the hand.     shaft_friction_N : what it takes to slide or turn that shaft, force at its surface.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
     where it is: ``clone`` makes branches, ``pickle`` checkpoints, and it goes one way at a time (see ``to_depths``).
     """
@@ -58,18 +61,22 @@ class Insertion:
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
         down: ArrayLike | None = None,
+        shaft_mm: float = 0.0,
+        shaft_friction_N: float = 0.0,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
         check_scene("insertion", wire, wall)
         choice("insertion", "initial", initial, ("slide", "translate"))
         number("insertion", "step_mm", step_mm, LENGTH_MM)
         number("insertion", "finest_mm", min(finest_mm, step_mm), LENGTH_MM)
+        number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
+        number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
         number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
         self.wire, self.wall = wire, wall
         self.max_joints = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
-        self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft_mm, shaft_friction_N)
         weight = weight_of("insertion", wire, down)
         self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight, finest_mm)
         self._started, self._way, self._lock = False, object(), threading.Lock()

@@ -14,6 +14,7 @@ from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
 from solver._kernels.insertion import Contents, advance, handle_of
 from solver._kernels.minimise import CLOSED_FORM
+from solver._kernels.shaft import shaft_forces
 from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
 from solver.solution import Snap, Solution, Status
@@ -62,15 +63,27 @@ class Workspace:
     problem: Problem
     introducer: Introducer | None = None
 
-    def __init__(self, wire: GuideWire, wall: VesselWall | None, quadrature: str, limits: Limits) -> None:
+    def __init__(
+        self,
+        wire: GuideWire,
+        wall: VesselWall | None,
+        quadrature: str,
+        limits: Limits,
+        shaft_mm: float = 0.0,
+        drag_N: float = 0.0,
+    ) -> None:
         if limits.method == CLOSED_FORM and wire.twists:
             name, got = "torsional_stiffness_N_mm2", wire.torsional_stiffness_N_mm2
             refuse("solver", name, got, "inf with method closed_form", "use method newton")
         self.wire, self.wall, self.limits, self.skips = wire, wall, limits, skips.current()
+        self.shaft_mm = float(shaft_mm)
+        springs = np.zeros((1, 3, 3)), np.zeros(2), np.zeros((2, 2))
+        self.shaft = data.Shaft(float(drag_N), float(wire.radius_mm), *springs)
         self.rule = look_up_rule(wire, wall, quadrature)
         self.field = wall.field if wall is not None else NO_FIELD
-        # rolling a straight wire with one bending stiffness and a round hull changes nothing
-        self.round = wire.straight and (wall is None or wall.samples == 0)
+        # rolling a straight wire with one bending stiffness and a round, smooth hull changes nothing
+        smooth = wall is None or (wall.samples == 0 and wall.friction == 0)
+        self.round = wire.straight and smooth and drag_N == 0
         self.k, self.capacity = 0, 0
         self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
@@ -81,21 +94,21 @@ class Workspace:
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
-        """Make room for more segments, keeping joints, frames and controls of the current state."""
+        """Make room for more segments, keeping the wire that lies there."""
         points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
         state, scratch = self._empty_state(capacity, points), self._empty_scratch(capacity, points)
+        friction, chain = self._empty_friction(capacity, points), self._empty_chain(capacity, points)
         if self.capacity:
             old = self.problem
-            for new, was in zip(state[:3], old.state[:3], strict=True):
-                new[:, : was.shape[1]] = was
-            scratch.change[: self.capacity] = old.scratch.change
-        friction = float(self.wall.friction) if self.wall is not None else 0.0
-        rubbing = points if friction else 0
+            news, olds = (*state, *chain[:-1], *friction[2:]), (*old.state, *old.chain[:-1], *old.friction[2:])
+            for new, was in zip((*news, scratch.change), (*olds, old.scratch.change), strict=True):
+                new[tuple(slice(0, size) for size in was.shape)] = was
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
-            friction=data.Friction(friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)),
-            chain=self._empty_chain(capacity, points),
+            friction=friction,
+            shaft=self.shaft,
+            chain=chain,
             state=state,
             scratch=scratch,
             skips=self.skips,
@@ -105,20 +118,28 @@ class Workspace:
         segment = float(self.wire.segment_mm)
         cells = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, segment, cells)
-        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile)
+        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile, self.shaft_mm)
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
     def _empty_state(self, k: int, points: int) -> data.State:
         u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
         penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
-        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES))
+        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES), np.zeros((3, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
         start, change, keep = np.zeros((3, k, 3))
         descent = np.zeros(1, data.DESCENT)
         return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, self.snaps)
+
+    def _empty_friction(self, k: int, points: int) -> data.Friction:
+        coefficient = float(self.wall.friction) if self.wall is not None else 0.0
+        k, points = (k, points) if coefficient else (-1, 0)
+        held, arm, start, normal, stretch = np.zeros((5, points, 3))
+        load, pressed = np.zeros((2, points))
+        frame = np.zeros((k + 1, 3, 3))
+        return data.Friction(coefficient, self.rule.reach, held, frame, arm, start, normal, load, stretch, pressed)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -209,11 +230,12 @@ class Workspace:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         start, penetration, push, force, torque, *_, pivot = self.report.item(0)
-        bending, wall, _, friction = state.energies.item(CURRENT)
+        sliding, turning = shaft_forces(self.shaft) if self.shaft.drag else (0.0, 0.0)
+        bending, wall, *_ = state.energies.item(CURRENT)
         if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
             # half of the first segment's weight hangs at the entry, where no joint can move
             force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
-        _, _, energy, *_, dissipated, calm, snaps = self.place.item(0)
+        _, _, energy, *_, dissipated, calm, _, snaps = self.place.item(0)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
@@ -225,13 +247,13 @@ class Workspace:
             energy_N_mm=energy,
             bending_energy_N_mm=bending,
             wall_energy_N_mm=wall,
-            friction_energy_N_mm=friction,
+            friction_energy_N_mm=self.place["rubbed"].item(0),
             status=status,
             iterations=iterations,
             contact_force_N=arrays[2],
             reaction_force_N=arrays[3],
-            reaction_torque_N_mm=float(torque[2]),
-            push_force_N=push,
+            reaction_torque_N_mm=float(torque[2]) + turning,
+            push_force_N=push + sliding,
             max_penetration_mm=penetration,
             depth_mm=depth_mm,
             roll_deg=roll_deg,

@@ -27,6 +27,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.benchmark import page, scenes
     from pipeline.benchmark.claims import STUDIES, measure_claims
     from pipeline.benchmark.cost import measure_cost
+    from pipeline.benchmark.friction import friction
     from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
     from pipeline.benchmark.snaps import study_of_steps
@@ -58,6 +59,6 @@ def main(args: argparse.Namespace) -> int:
             chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
         if args.manifest is None:
-            sound &= measure_claims(args.out, say, (*STUDIES, snaps))
+            sound &= measure_claims(args.out, say, (*STUDIES, friction, snaps))
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

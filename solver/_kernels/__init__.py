@@ -10,4 +10,5 @@ newton           the step, by a Riccati recursion       newton_straight  the sam
 newton_method    one iteration of Newton's method       closed_form      one sweep of the seed's eq. 8-10
 minimise         the loop around either method          crossing         whether a way passes through a wall
 start            the wire laid along a curve            insertion        the steps to a depth, behind one pointer
+shaft            the wire between hand and entry
 """

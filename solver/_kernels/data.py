@@ -82,14 +82,15 @@ Closed form. share : of its own step.     next_check : iteration at which it is 
 """
 PLACE = record(
     *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")),
-    *((name, float) for name in ("push", "torque", "dissipated", "calm")),
+    *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
     ("snaps", np.int64),
 )
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
 step, mm (0 after a roll).
 
-push, torque : the hand's there, N and N mm.     dissipated : of its work on the way to this depth, N mm.     calm : way
-since the wire snapped or was about to, mm.     snaps : their number on the way to this depth.
+push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
+by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on the way to this
+depth.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
 """An event: depths before and after, energy released, the largest way of a joint."""
@@ -142,6 +143,7 @@ class WireTable(NamedTuple):
     """What a wire of any depth is cut from.
 
     cells : (m, 2), see ``chain.tabulate``.     segment : length of one, mm.     tabled : whether ``cells`` is used.
+    shaft : length of the wire between hand and entry, mm: it twists with the first joint.
     """
 
     profile: Profile
@@ -149,6 +151,7 @@ class WireTable(NamedTuple):
     cells: Any
     segment: float
     tabled: bool
+    shaft: float
 
 
 class Chain(NamedTuple):
@@ -176,7 +179,7 @@ class State(NamedTuple):
 
     u : (3, k, 3) controls, rad.   x : (3, k + 1, 3) joints, mm.   r : (3, k + 1, 3, 3) frames, whose columns are
     material axes 1, 2 and the direction.   penetration : (3, p) mm.   jet : (3, p, 10), see ``field``, per mm.
-    energies : (3,) of ``ENERGIES``.
+    energies : (3,) of ``ENERGIES``.   held : (3, 3, 3), see ``shaft.shaft_energy``; 0 without friction of the shaft.
     """
 
     u: Any
@@ -185,6 +188,7 @@ class State(NamedTuple):
     penetration: Any
     jet: Any
     energies: Any
+    held: Any
 
 
 class Scratch(NamedTuple):
@@ -210,26 +214,52 @@ class Scratch(NamedTuple):
 class Friction(NamedTuple):
     """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
 
-    coefficient : 0 is no friction at all.
-    start : (p, 3) where each point was before the step, mm.     normal : (p, 3).     load : (p,) N.
+    coefficient : 0 is no friction at all.     radius : of a smooth hull, mm, else 0.
+    Before the step: held : (p, 3), what each point holds on to, moved to the axis, mm.     frame : (k + 1, 3, 3).
+    In the step: arm : (p, 3), where it rubs, mm from the point, in the frame of its node.     start : (p, 3), what it
+    holds on to.     normal : (p, 3).     load : (p,) N.
+    After the step, counted from the tip's last point: stretch : (p, 3) of the spring, mm.     pressed : (p,) load, N.
     """
 
     coefficient: float
+    radius: float
+    held: Any
+    frame: Any
+    arm: Any
     start: Any
     normal: Any
     load: Any
+    stretch: Any
+    pressed: Any
+
+
+class Shaft(NamedTuple):
+    """The wire between the hand and the entry, straight and guided; its length is in ``WireTable``.
+
+    drag : what it takes to slide or turn it, N, half of it at the entry, half in the hand.     radius : mm.
+    frame : (1, 3, 3) of the wire at the entry before the step.     step : (2,), mm that the hand pushes it in the step
+    and turns its surface.     stretch : (2, 2) of the springs that hold it after the step, mm: at the entry and in the
+    hand, along and around it.
+    """
+
+    drag: float
+    radius: float
+    frame: Any
+    step: Any
+    stretch: Any
 
 
 class Problem(NamedTuple):
     """A wire in a wall.
 
     stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     twisting : the torsional stiffness is finite.
-    straight : no rest bend, one bending stiffness, a round hull and no twist: a direction is all of a frame.
+    straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: a direction is all of a frame.
     """
 
     field: Field
     stiffness: float
     friction: Friction
+    shaft: Shaft
     chain: Chain
     state: State
     scratch: Scratch

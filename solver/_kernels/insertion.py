@@ -14,12 +14,13 @@ from solver import _tolerances as tol
 from solver._kernels import data
 from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
-from solver._kernels.data import Introducer, Problem, WireTable
+from solver._kernels.data import Chain, Introducer, Problem, WireTable
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
-from solver._kernels.friction import anchor_friction, anchor_friction_behind
+from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
+from solver._kernels.shaft import anchor_shaft, settle_shaft
 from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, follow, note_change
 
@@ -88,6 +89,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
 def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
     at, introducer, limits = handle.place[0], handle.introducer, handle.limits
+    at.rubbed = 0.0
     counters = handle.problem.scratch.counters[0]
     # a cap on the time that a hopeless scene can take
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
@@ -127,7 +129,9 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     problem, at = handle.problem, handle.place[0]
     depth, roll, k = to_depth, to_roll, laid
     if laid > 0:
-        anchor_friction(problem, k)
+        if problem.friction.coefficient > 0.0:
+            copy_state(problem, data.CURRENT, data.LAST_GOOD, k)
+            anchor_friction(problem, k, k, 0.0, 0.0)
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
@@ -142,11 +146,15 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         outcome = where(problem, handle.introducer.margin, k, laid)
     if outcome == data.CONVERGED and laid == 0:
         hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
-        outcome = account(handle, k, (depth, roll, energy), hard)
+        outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), hard)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
-        at.inserted, at.roll, at.energy = depth, roll, energy
+        at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
+        if problem.friction.coefficient > 0.0:
+            at.rubbed += settle_friction(problem, k)
+        if problem.shaft.drag > 0.0:
+            at.rubbed += settle_shaft(problem, k)
     else:
         take_back(handle)
     return outcome, used
@@ -209,6 +217,8 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
     handle.report[1] = report
     k, first = segments_at(depth, table.segment)
     clamp(problem, introducer, roll)
+    if problem.shaft.drag > 0.0:
+        anchor_shaft(problem, was, depth - inserted, math.radians(roll - handle.place[0].roll))
     if k > 2 and table.tabled:
         problem.scratch.counters[0].joints_without_profile_look_up += k - 2
     if k > 0:
@@ -227,6 +237,7 @@ def take_back(handle: Any) -> None:
     was, first = segments_at(handle.place[0].inserted, handle.table.segment)
     if was > 0:
         lay_out(handle.problem.chain, handle.table, was, first)
+        put_load(handle.problem.chain, handle.introducer, was)
     copy_state(handle.problem, data.LAST_GOOD, data.CURRENT, was)
     handle.report[0] = handle.report[1]
 
@@ -254,11 +265,12 @@ def lay_along(
     if problem.twisting:
         # twist stays with the material, which is counted from the tip
         for j in range(k):
-            common = j >= k - min(was, k)
+            # the first joint twists with the shaft outside, wherever the material is
+            common = j >= k - min(was, k) and (table.shaft == 0.0 or (j > 0 and was - k + j > 0))
             state.u[data.CURRENT, j, 2] = state.u[data.LAST_GOOD, was - k + j, 2] if common else 0.0
-    for n in range(k + 1):
-        for a in range(3):
-            chain.load[n, a] = introducer.load[a] if n == k else 0.0
+        if table.shaft > 0.0 and was > 0:
+            state.u[data.CURRENT, 0, 2] = state.u[data.LAST_GOOD, 0, 2]
+    put_load(chain, introducer, k)
     source, count = data.LAST_GOOD, was + 1
     if was == 0:
         source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
@@ -266,7 +278,15 @@ def lay_along(
         source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
     follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
     if problem.friction.coefficient > 0.0:
-        anchor_friction_behind(problem, state.x[data.LAST_GOOD], was, k, ahead)
+        anchor_friction(problem, was, k, ahead, table.shaft)
+
+
+@kernel
+def put_load(chain: Chain, introducer: Introducer, k: int) -> None:
+    """Put the dead load on the tip and none elsewhere."""
+    for n in range(k + 1):
+        for a in range(3):
+            chain.load[n, a] = introducer.load[a] if n == k else 0.0
 
 
 @merged

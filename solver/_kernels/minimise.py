@@ -65,8 +65,6 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
     counters.relaxations_without_friction += not rubs
     counters.relaxations_without_twist += not problem.twisting
     if rubs:
-        for p in range(problem.friction.load.size):
-            problem.friction.load[p] = 0.0
         take_loads(problem, slot, k)
     outcome, iterations, energy = FRICTION, 0, 0.0
     cost = k + problem.chain.first[k + 1]
