@@ -89,8 +89,7 @@ PLACE = record(
 step, mm (0 after a roll).
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
-by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on the way to this
-depth.
+by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
 """An event: depths before and after, energy released, the largest way of a joint."""
