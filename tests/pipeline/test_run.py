@@ -14,11 +14,14 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.model import Curve
+from pipeline.run.aggregate import aggregate
 from pipeline.run.case import Job, run_case
+from pipeline.run.results import found_results
 from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
+from reports.html import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY
 from solver import Status
 
@@ -385,29 +388,14 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
     assert "1 crashed in the sweep" in said.out
 
 
-SOUND = {"case": "other", "role": "", "group": "", "status": "ok", "sentence": "", "failures": []}
-COUNTS = {"case": "other", "status": "ok", "frames": 1, "frames_ok": 1}
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        "{",
-        "[]",
-        '{"case": "other"}',
-        json.dumps(SOUND | {"frames": [], "summary": {}}),
-        json.dumps(SOUND | {"frames": [{}], "summary": COUNTS}),
-        json.dumps(SOUND | {"frames": [], "summary": COUNTS | {"frames": None}}),
-    ],
-)
 def test_a_damaged_result_hides_no_other(
-    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str
+    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     (out / "cases" / "other").mkdir()
     damaged = out / "cases" / "other" / "result.json"
-    damaged.write_text(content)
+    damaged.write_text("{")
     for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
         assert main(words) == 1
         said = capsys.readouterr()
@@ -417,6 +405,31 @@ def test_a_damaged_result_hides_no_other(
     assert (out / "index.html").read_text(encoding="utf-8").count("a result file cannot be read") <= 1
     damaged.rename(out / "cases" / "bifurcation" / "result.json")
     assert run(study, out) == 0  # a case of the manifest is computed again
+
+
+SOUND = {"case": "other", "role": "", "group": "", "status": "ok", "sentence": "", "failures": []}
+COUNTS = {"case": "other", "status": "ok", "frames": 1, "frames_ok": 1}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[]",
+        '{"case": "other"}',
+        json.dumps(SOUND | {"frames": [], "summary": {}}),
+        json.dumps(SOUND | {"frames": [{}], "summary": COUNTS}),
+        json.dumps(SOUND | {"frames": [], "summary": COUNTS | {"frames": None}}),
+    ],
+)
+def test_a_result_with_other_contents_is_damaged(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "cases" / "other" / "result.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(content)
+    (found,) = found_results(tmp_path)
+    assert found.status == "damaged"
+    assert str(path) in found.failures[0]["message"]
+    assert aggregate(tmp_path).cases_ok == 0
+    assert "other" in render_index(tmp_path).read_text(encoding="utf-8")
 
 
 def test_points_cut_short_hide_no_other_case(
