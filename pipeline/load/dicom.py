@@ -123,7 +123,8 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
     known = {Path(name).name for files in sizes.values() for name in files}
-    lost = [p.name for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
+    strangers = [p for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
+    lost = [p.name for p in strangers if _may_be_a_slice(p)]
     if lost:
         which = f"{len(lost)} of its files cannot be read as DICOM: {', '.join(lost[:5])}. "
         raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
@@ -137,6 +138,21 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
         found = f"found {len(images)} DICOM image series, expected one:\n{groups}\n{hint}"
         raise unusable(folder, f"{found}  Keep one series a folder, or name one as FOLDER#SERIES_UID.")
     return [Path(name) for name in next(iter(images.values()))]
+
+
+def _may_be_a_slice(path: Path) -> bool:
+    """Whether a file that GDCM puts in no series may be a damaged slice: it is not whole, or of a class of images.
+
+    Contours, plans and reports (RTSTRUCT, SR) lie beside the slices that they were made from.
+    """
+    from pydicom import dcmread
+    from pydicom.errors import InvalidDicomError
+
+    try:
+        kind = dcmread(path, stop_before_pixels=True).SOPClassUID
+    except (InvalidDicomError, AttributeError, ValueError, TypeError, EOFError, struct.error):
+        return True
+    return kind.is_private or "Image Storage" in kind.name
 
 
 def _is_image(path: Path) -> bool:

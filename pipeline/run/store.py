@@ -37,9 +37,11 @@ def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
 
 def code_of(function: Callable[..., Any]) -> str:
     """SHA-256 of the sources behind a function; of its own byte code where it stands in no file, as in a notebook."""
-    function = inspect.unwrap(function)
-    file = Path(inspect.getfile(function))
-    code = function.__code__
+    function = inspect.unwrap(getattr(function, "func", function))  # a partial is what it calls
+    code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
+    if code is None:  # a function of C
+        return repr(function)
+    file = Path(code.co_filename)
     return hash_of(file) if file.is_file() else hashlib.sha256(code.co_code + repr(code.co_consts).encode()).hexdigest()
 
 

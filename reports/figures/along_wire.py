@@ -49,7 +49,7 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
         at = np.arange(int(samples["arc_mm"].max() / step + 0.5) + 1) * step
         nearest = interp1d(samples["arc_mm"], samples[column], kind="nearest", fill_value="extrapolate")
         grid[int(str(frame)) - frames[0], : len(at)] = nearest(at)
-    figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
+    figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
     heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, bar={}, rasterized=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pydicom
 import pytest
 import SimpleITK as sitk
 
@@ -251,6 +252,17 @@ def test_a_damaged_slice_is_named_wherever_it_lies(tmp_path: Path, content: byte
     last.write_bytes(last.read_bytes()[:200] if content is None else content)
     with pytest.raises(LoadError, match=rf"1 of its files cannot be read as DICOM: {last.name}"):
         read_header(tmp_path / "series")
+
+
+def test_contours_beside_the_slices_are_no_damaged_slice(tmp_path: Path) -> None:
+    """The archive of a planning system holds an RTSTRUCT in the folder of its slices; GDCM lists it in no series."""
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    contours = pydicom.Dataset()
+    contours.SOPClassUID, contours.SOPInstanceUID = "1.2.840.10008.5.1.4.1.1.481.3", "1.2.3.4"
+    contours.file_meta = pydicom.dataset.FileMetaDataset()
+    contours.file_meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+    contours.save_as(tmp_path / "series" / "RS.dcm", enforce_file_format=True)
+    np.testing.assert_array_equal(load(read_header(tmp_path / "series")).values, numbered())
 
 
 def test_a_missing_slice_is_named(tmp_path: Path) -> None:

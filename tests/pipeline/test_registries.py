@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from pipeline.arrays.polyline import to_length
 from pipeline.cli import main
 from pipeline.compare import metrics, nulls
+from pipeline.compare.metrics import Pair
 from pipeline.compare.nulls import Clues
 from pipeline.model import Array
 from pipeline.run.case import Job
@@ -54,6 +56,19 @@ def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path)
         keys.add(job_key(tmp_path))
     assert len(keys) == 2
     assert job_key(tmp_path) in keys
+
+
+class Scaled:
+    """A metric that is no function."""
+
+    def __call__(self, pair: Pair) -> float:
+        return 2.0 * float(pair.error_mm.max())
+
+
+@pytest.mark.parametrize("metric", [partial(lambda factor, _: factor, 2.0), Scaled(), len])
+def test_whatever_can_be_called_may_be_a_metric(as_before: None, tmp_path: Path, metric: Any) -> None:
+    metrics.METRICS["own_mm"] = metric
+    assert job_key(tmp_path) == job_key(tmp_path)
 
 
 def job_key(folder: Path) -> str:
