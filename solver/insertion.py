@@ -4,6 +4,7 @@ Several minima exist, so a depth is reached by replaying its history, never by j
 """
 
 import copy
+import math
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from typing import Any, Self
@@ -22,6 +23,7 @@ from solver.workspace import Workspace
 
 ROLL_STEP_DEG = Range(1e-6, 1e6)
 DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
+FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
 SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
@@ -67,21 +69,19 @@ class Insertion:
         settings = Settings(method, tolerance, max_iterations, quadrature)
         check_scene("insertion", wire, wall)
         choice("insertion", "initial", initial, ("slide", "translate"))
-        number("insertion", "step_mm", step_mm, LENGTH_MM)
-        number("insertion", "finest_mm", min(finest_mm, step_mm), LENGTH_MM)
-        number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
-        number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
-        number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
+        steps = _steps(step_mm, roll_step_deg, finest_mm)
+        shaft = number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
+        drag = number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
         self.wire, self.wall = wire, wall
-        self.max_joints = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
+        self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
-        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft_mm, shaft_friction_N)
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft, drag)
         weight = weight_of("insertion", wire, down)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg, weight, finest_mm)
+        self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
-        self._too_long = (self.max_joints + 0.5 - 1e-12) * wire.segment_mm
+        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
         self._refused = None if wall is None else _refused(wall, entry)
 
     @property
@@ -168,6 +168,13 @@ class Insertion:
         else:
             status, iterations = work.advance(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+
+def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:
+    """The longest step and roll, and the finest step, each a number that can be used."""
+    step = number("insertion", "step_mm", step_mm, LENGTH_MM)
+    turn = number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
+    return step, turn, number("insertion", "finest_mm", finest_mm, FINEST_MM)
 
 
 def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver._kernels.data import WORK
+from solver._kernels.records import WORK
 from solver.grid import Array
 
 
@@ -61,9 +61,9 @@ class Solution:
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
-    counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
+    counts : in the order of ``_kernels.records.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
-    least_pivot : distance to instability, see ``_kernels.data.REPORT``: 1 for a free wire, 0 where it snaps.
+    least_pivot : distance to instability, see ``_kernels.records.REPORT``: 1 for a free wire, 0 where it snaps.
     dissipated_N_mm : the hand's work on the way to this depth less the change of energy.     snaps : on that way.
     uncertain : the wire snapped, or was about to, here or a few mm before: shorter steps may lead elsewhere.
     """

@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike
 from solver import _tolerances as tol
 from solver import skips
 from solver._compile import hash_of
-from solver._kernels import data
+from solver._kernels import data, records
 from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
-from solver._kernels.insertion import Contents, advance, handle_of
+from solver._kernels.handle import Contents, handle_of
+from solver._kernels.insertion import advance
 from solver._kernels.minimise import CLOSED_FORM
 from solver._kernels.shaft import shaft_forces
 from solver.doors import FORCE_N, Array, numbers
@@ -57,7 +58,7 @@ SNAPS_KEPT = 16
 class Workspace:
     """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
 
-    problem, table, limits, place, report, force : see ``_kernels.insertion.Contents``.
+    problem, table, limits, place, report, force : see ``_kernels.handle.Contents``.
     """
 
     problem: Problem
@@ -85,12 +86,12 @@ class Workspace:
         smooth = wall is None or (wall.samples == 0 and wall.friction == 0)
         self.round = wire.straight and smooth and drag_N == 0
         self.k, self.capacity = 0, 0
-        self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
+        self.counters, self.place = np.zeros(1, records.COUNTERS), np.zeros(1, records.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
         self.place["shrink"], self.place["calm"] = 1.0, np.inf
-        self.snaps = np.zeros(SNAPS_KEPT, data.SNAP)
-        self.report = np.zeros(2, data.REPORT)
+        self.snaps = np.zeros(SNAPS_KEPT, records.SNAP)
+        self.report = np.zeros(2, records.REPORT)
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
@@ -125,12 +126,12 @@ class Workspace:
     def _empty_state(self, k: int, points: int) -> data.State:
         u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
         penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
-        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES), np.zeros((3, 3, 3)))
+        return data.State(u, x, r, penetration, jet, np.zeros(3, records.ENERGIES), np.zeros((3, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
         start, change, keep = np.zeros((3, k, 3))
-        descent = np.zeros(1, data.DESCENT)
+        descent = np.zeros(1, records.DESCENT)
         return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, self.snaps)
 
     def _empty_friction(self, k: int, points: int) -> data.Friction:
@@ -153,24 +154,26 @@ class Workspace:
         frame: Array,
         tip_load: ArrayLike = (0.0, 0.0, 0.0),
         translate: bool = False,
-        step_mm: float = 1.0,
-        roll_step_deg: float = 1.0,
+        steps: tuple[float, float, float] = (1.0, 1.0, 1.0),
         weight: ArrayLike = (0.0, 0.0, 0.0),
-        finest_mm: float = 1.0,
     ) -> None:
-        """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
+        """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``.
+
+        steps : longest step, mm, and roll, degrees; the finest step, mm.
+        """
+        step, turn, finest = map(float, steps)
         self.introducer = Introducer(
             entry=entry,
             frame=np.ascontiguousarray(frame),
             load=np.array(tip_load, dtype=np.float64),
             translate=translate,
             idle_roll=self.round and self.skips.roll,
-            step=float(step_mm),
-            turn=float(roll_step_deg),
+            step=step,
+            turn=turn,
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
             weight=np.array(weight, dtype=np.float64),
-            finest=min(float(finest_mm) / float(step_mm), 1.0),
+            finest=min(finest / step, 1.0),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()

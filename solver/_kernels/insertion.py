@@ -1,14 +1,10 @@
 """The way to a depth: steps of the base, each laid along the wire's own curve, relaxed, and taken back if it fails.
 
-One compiled loop, because a step costs a few microseconds per joint. All that it works on is behind one pointer, a
-handle: handing forty arrays to a kernel costs 11 µs, a handle 0.6.
+One compiled loop, because a step costs a few microseconds per joint.
 """
 
 import math
-from typing import Any, NamedTuple
-
-from numba import types
-from numba.experimental import structref
+from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import data
@@ -23,45 +19,6 @@ from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, settle_shaft
 from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, follow, note_change
-
-
-class Contents(NamedTuple):
-    """What is behind a handle.
-
-    problem, table, introducer, limits : see ``data``.     place, report : (1,), (2,) records of ``data.PLACE`` and
-    ``data.REPORT``; the second report is that of the last good state.     force : (k + 1, 3) contact forces, N.
-    """
-
-    problem: Any
-    table: Any
-    introducer: Any
-    limits: Any
-    place: Any
-    report: Any
-    force: Any
-
-
-@structref.register
-class HandleType(types.StructRef):
-    """Numba's type of a handle; it keeps the arrays alive."""
-
-
-class Handle(structref.StructRefProxy):
-    """The contents as compiled code sees them: their fields are read there alone."""
-
-
-structref.define_proxy(Handle, HandleType, list(Contents._fields))  # type: ignore[no-untyped-call]
-
-
-@entry_point
-def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, report: Any, force: Any) -> Any:
-    """The handle of the contents."""
-    return Handle(problem, table, introducer, limits, place, report, force)  # type: ignore[no-untyped-call]
-
-
-def handle_of(contents: Contents) -> Any:
-    """The handle of the contents; where nothing is compiled (NUMBA_DISABLE_JIT) the contents themselves."""
-    return bound(*contents) if hasattr(bound, "py_func") else contents
 
 
 @entry_point

@@ -3,7 +3,7 @@
 The step comes from ``newton``, and the total energy decides whether it is taken, in part, or after a few whole ones.
 
 Where it does not help, Levenberg's term holds the wire back; where the Hessian is not positive and no force is left,
-the wire is led out of its saddle. now is the record ``data.DESCENT``: the current state and its
+the wire is led out of its saddle. now is the record ``records.DESCENT``: the current state and its
 energy; a trial is in the other slot.
 """
 
@@ -180,11 +180,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         if outcome != UNDECIDED:
             return outcome
     if definite and now.damping > 0.0 and report.decrement <= noise and now.released < tol.SEARCHES:
-        # nothing left to gain with the wire held back: look at it free, then held less, before it is judged
-        damped_polish(problem, k, now, noise, report)
-        now.damping, now.patience, now.released = 0.0, 0, now.released + 1
-        now.last_damping *= tol.SOFTER
-        return UNFINISHED
+        return release(problem, k, now, noise, report)
     trial = math.inf
     if definite:
         trial = search(problem, k, now, 1.0, noise, report)
@@ -204,6 +200,15 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     if trial <= now.energy:
         return take(problem, k, now, trial, definite and now.damping == 0.0, tolerance, report)
     return hold_back(problem, k, now, report)
+
+
+@merged
+def release(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int:
+    """Nothing is left to gain with the wire held back: look at it free, then held less, before it is judged."""
+    damped_polish(problem, k, now, noise, report)
+    now.damping, now.patience, now.released = 0.0, 0, now.released + 1
+    now.last_damping *= tol.SOFTER
+    return UNFINISHED
 
 
 @merged
