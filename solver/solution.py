@@ -85,10 +85,10 @@ class Solution:
     roll_deg: float
     counts: tuple[int, ...]
     start_energy_N_mm: float
-    least_pivot: float
-    dissipated_N_mm: float
-    snaps: tuple[Snap, ...]
-    uncertain: bool
+    least_pivot: float = 1.0
+    dissipated_N_mm: float = 0.0
+    snaps: tuple[Snap, ...] = ()
+    uncertain: bool = False
 
     @property
     def work(self) -> Mapping[str, float]:

@@ -145,13 +145,19 @@ REACH_MM = np.array([[12.0, 34.0, 8.0], [24.0, 10.0, 62.0]])
 """Of the box about the entry of the carotid, downwards and upwards along each axis: what 80 mm of wire can see."""
 
 
-def _of_catalogue(name: str, depth_mm: float, setup: Setup) -> BenchScene:
+def of_setup(name: str, setup: Setup) -> BenchScene:
+    """A scene of the synthetic catalogue to its largest depth: its vessels as they are, not as they are scanned."""
+    everything = np.full((2, 3), np.inf)
+    return replace(_of_catalogue(name, max(setup.depths_mm), setup, everything), friction=setup.friction)
+
+
+def _of_catalogue(name: str, depth_mm: float, setup: Setup, reach_mm: Array = REACH_MM) -> BenchScene:
     """A scene of the synthetic catalogue, its wall sampled in a box about what the wire can reach."""
     entry, wire = setup.entry_mm, setup.wire
     points = np.concatenate([t.points_mm for t in setup.anatomy.tubes])
     near = points[np.linalg.norm(points - entry, axis=1) < depth_mm + 2.0]
-    low = np.maximum(near.min(axis=0) - 6.0, entry - REACH_MM[0])
-    high = np.minimum(near.max(axis=0) + 6.0, entry + REACH_MM[1])
+    low = np.maximum(near.min(axis=0) - 6.0, entry - reach_mm[0])
+    high = np.minimum(near.max(axis=0) + 6.0, entry + reach_mm[1])
     bending, rest = np.array(wire.bending_N_mm2), np.array(wire.rest_curvature_per_mm)
     return BenchScene(
         name,

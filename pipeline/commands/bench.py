@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--peers", action="store_true", help="other simulators from PyPI on the same work (extra [peers])")
     add("--stress", action="store_true", help="thousands of random scenes, each outcome judged")
     add("--snaps", action="store_true", help="200 random insertions against steps of 0.05 mm")
+    add("--resolution", action="store_true", help="segments chosen by themselves against much shorter ones")
     add("--quick", action="store_true", help="few settings, one repeat, 200 stress scenes")
     add("--seed", type=int, default=100, metavar="S", help="of the random scenes (default 100)")
     add("--scenes", type=int, default=0, metavar="N", help="number of stress scenes (default 5000)")
@@ -30,14 +31,16 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.benchmark.friction import friction
     from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
+    from pipeline.benchmark.resolution import study_of_resolution
     from pipeline.benchmark.snaps import study_of_steps
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
     from pipeline.load import LoadError
     from pipeline.study.manifest import ManifestError, read_manifest
     from pipeline.study.settings import Config
 
-    plain = not (args.stress or args.peers or args.snaps)
+    plain = not (args.stress or args.peers or args.snaps or args.resolution)
     snaps = study_of_steps(args.seed, quick=args.quick)
+    resolution = study_of_resolution(args.seed, quick=args.quick)
     try:
         cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
@@ -53,12 +56,14 @@ def main(args: argparse.Namespace) -> int:
         measure_peers(args.out, say, quick=args.quick)
     if args.snaps:
         sound &= measure_claims(args.out, say, [snaps])
+    if args.resolution:
+        sound &= measure_claims(args.out, say, [resolution])
     if plain:
         if args.manifest is None:
             chosen = [scenes.bend(), scenes.siphon()]
             chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
         if args.manifest is None:
-            sound &= measure_claims(args.out, say, (*STUDIES, friction, snaps))
+            sound &= measure_claims(args.out, say, (*STUDIES, friction, snaps, resolution))
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

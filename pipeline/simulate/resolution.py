@@ -9,9 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.arrays.polyline import at_arc
-from pipeline.model import Array, Wire, arc_length
+from pipeline.model import Array, arc_length
 from pipeline.simulate.config import COARSEST_MM, Segment
 from solver import Solution
 
@@ -45,10 +46,10 @@ class Resolved:
     reason: str
 
 
-def lengths_mm(asked: Segment, wire: Wire) -> list[float]:
-    """Segment lengths in the order in which they are tried, each half of the one before."""
-    rest = wire.rest_curvature_per_mm
-    curvature = abs(rest) if isinstance(rest, (int, float)) else max(abs(value) for _, value in rest)
+def lengths_mm(asked: Segment, rest_curvature_per_mm: ArrayLike) -> list[float]:
+    """Segment lengths in the order in which they are tried, each half of the one before. rest_... : as of a wire."""
+    rest = np.asarray(rest_curvature_per_mm, dtype=float)
+    curvature = float(np.abs(rest if rest.ndim == 0 else rest[:, 1]).max())
     if asked != "auto":
         # GuideWire takes no segment that turns by more than a right angle at rest
         return [2 * asked, asked] if 2 * asked * curvature < np.pi / 2 else [asked]

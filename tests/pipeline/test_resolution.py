@@ -10,17 +10,12 @@ import pytest
 from pipeline.benchmark.scenes import BenchScene, bend
 from pipeline.benchmark.vessels import lumen_distance
 from pipeline.compare.metrics import point_to_curve, rms
-from pipeline.model import Wire
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.simulate import judged
 from pipeline.simulate.resolution import FINEST_MM, Resolved, lengths_mm, resolve
 from solver import GuideWire, Insertion, Solution, Status
 
 CURVED = [(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)]
-
-
-def wire(rest: float | list[tuple[float, float]] = 0.0) -> Wire:
-    return Wire("w", radius_mm=0.18, bending_stiffness_N_mm2=10.0, rest_curvature_per_mm=rest)
 
 
 @cache
@@ -44,19 +39,19 @@ def resolved(name: str) -> tuple[Resolved, np.ndarray]:
     """A scene at the length chosen, and its true errors against half of the shortest length."""
     scene = {"bend": bend, "siphon": siphon}[name]()
     rest = CURVED if name == "siphon" else 0.0
-    found = resolve(partial(insert, scene), lengths_mm("auto", wire(rest)))
+    found = resolve(partial(insert, scene), lengths_mm("auto", rest))
     limit = insert(scene, FINEST_MM / 2)
     errors = [rms(point_to_curve(a.joints_mm, b.joints_mm)[0]) for a, b in zip(found.wires, limit, strict=True)]
     return found, np.array(errors)
 
 
 def test_lengths_are_halved_from_what_the_rest_curvature_allows() -> None:
-    assert lengths_mm("auto", wire()) == [1.0, 0.5, 0.25, 0.125, 0.0625]
-    assert lengths_mm("auto", wire(CURVED)) == [0.25, 0.125, 0.0625]
-    assert lengths_mm("auto", wire(-100.0)) == [0.125, 0.0625]
-    assert lengths_mm(0.4, wire(CURVED)) == [0.8, 0.4]
+    assert lengths_mm("auto", 0.0) == [1.0, 0.5, 0.25, 0.125, 0.0625]
+    assert lengths_mm("auto", CURVED) == [0.25, 0.125, 0.0625]
+    assert lengths_mm("auto", -100.0) == [0.125, 0.0625]
+    assert lengths_mm(0.4, CURVED) == [0.8, 0.4]
     # twice the length would turn by more than a right angle at rest
-    assert lengths_mm(1.0, wire(1.2)) == [1.0]
+    assert lengths_mm(1.0, 1.2) == [1.0]
 
 
 @pytest.mark.parametrize("name", ["bend", "siphon"])
@@ -74,7 +69,7 @@ def test_a_straight_wire_in_a_wide_bend_needs_no_short_segments() -> None:
 def test_the_bound_is_no_idle_one() -> None:
     """With segments of 1 mm the curved tip is off by more than with the length chosen, and the bound says so."""
     found, _ = resolved("siphon")
-    coarse = resolve(partial(insert, siphon()), lengths_mm(1.0, wire(CURVED)))
+    coarse = resolve(partial(insert, siphon()), lengths_mm(1.0, CURVED))
     assert coarse.segment_mm == 1.0
     assert np.nanmax(coarse.num_mm) > 3 * np.nanmax(found.num_mm)
 
@@ -84,7 +79,7 @@ def test_a_length_that_loses_depths_is_not_taken() -> None:
         wires = insert(bend(20.0), segment_mm)
         return wires if segment_mm > 0.3 else [*wires[:-1], replace(wires[-1], status=Status.STALLED)]
 
-    apart = resolve(lambda mm: [replace(w, joints_mm=w.joints_mm + mm) for w in one(mm)], lengths_mm("auto", wire()))
+    apart = resolve(lambda mm: [replace(w, joints_mm=w.joints_mm + mm) for w in one(mm)], lengths_mm("auto", 0.0))
     assert apart.segment_mm == 0.5
     assert "fewer depths" in apart.reason
 

@@ -21,7 +21,7 @@ ERRORS_HEADER = (
     "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,back_rms_mm,hausdorff_mm,arc_rms_mm,"
     "arc_max_mm,tip_mm,tip_angle_deg,branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,"
     "null_min_bending_rms_mm,null_previous_rms_mm,skill,coverage,trace_sigma_mm,max_penetration_mm,"
-    "push_force_N,joints,iterations,snaps,uncertain,least_pivot,"
+    "push_force_N,joints,iterations,num_mm,snaps,uncertain,least_pivot,"
     "load_s,segment_s,trace_s,simulate_s,compare_s,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
@@ -30,7 +30,7 @@ SUMMARY_HEADER = (
     "case,group,role,status,frames,frames_ok,frames_failed,rms_mm,rms_low_mm,rms_high_mm,mean_mm,p95_mm,"
     "max_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,"
     "null_min_bending_rms_mm,null_previous_rms_mm,skill,skill_low,skill_high,branch_ok_fraction,coverage,"
-    "trace_mean_median_mm,trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,load_s,"
+    "trace_mean_median_mm,trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,num_mm,load_s,"
     "segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 )
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log"

@@ -139,6 +139,9 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "initial": NOT_WORDS,
             "step_mm": NOT_NUMBERS + HUGE + BELOW + [1e-12],
             "roll_step_deg": NOT_NUMBERS + HUGE + BELOW + [1e-12],
+            "finest_mm": [n for n in NOT_NUMBERS if n is not np.inf] + BELOW + [1e-12],
+            "shaft_mm": NOT_NUMBERS + HUGE + [-1.0],
+            "shaft_friction_N": NOT_NUMBERS + HUGE + [-1.0],
             "max_joints": NOT_NUMBERS + HUGE + BELOW + [0.5, 10.5],
             "tip_load_N": [*NOT_VECTORS, [0, 0, 1e9]],
         },
@@ -234,7 +237,8 @@ def test_no_public_argument_is_left_out() -> None:
     for kind in classes.values():
         calls |= {n: f for n, f in vars(kind).items() if inspect.isfunction(f) and not n.startswith("_")}
     # results, and what takes nothing
-    assert set(solver.__all__) - {"Solution", "Status"} == {c.__name__ for c in classes.values()} | {"relax", "warm_up"}
+    results = {"Snap", "Solution", "Status"}
+    assert set(solver.__all__) - results == {c.__name__ for c in classes.values()} | {"relax", "warm_up"}
     for name, call in calls.items():
         arguments = set(inspect.signature(call).parameters) - {"self"}
         assert arguments == listed.get(name, set()), name

@@ -35,7 +35,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         return list(_noted(log, replay, found, len(frames)))
 
     try:
-        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire))
+        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire.rest_curvature_per_mm))
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
