@@ -60,7 +60,7 @@ def lengths_mm(asked: Segment, rest_curvature_per_mm: ArrayLike) -> list[float]:
 
 
 def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
-    """Insert with shorter and shorter segments until halving them changes nothing.
+    """Insert with shorter and shorter segments until halving them changes no wire that is not about to snap.
 
     A length that loses depths which a longer one reached is not taken.
     """
@@ -72,11 +72,13 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = f"with {shorter:g} mm fewer depths are reached"
             break
+        # a wire that is about to snap goes one way or the other by a trifle, with segments of any length
+        away = ~(moved <= AGREED_MM) & [not wire.uncertain for wire in finer]
         segment, wires, num = shorter, finer, moved
-        if np.all(num <= AGREED_MM):
-            reason = f"halving them moved no wire by more than {AGREED_MM} mm"
+        if not away.any():
+            reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
             break
-        reason = f"at {int(np.sum(~(num <= AGREED_MM)))} of {len(num)} depths the wire still depends on it"
+        reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on it"
     return Resolved(segment, wires, num if num.size else np.full(len(wires), np.nan), reason)
 
 
