@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -13,10 +14,11 @@ import pytest
 import SimpleITK as sitk
 
 from pipeline.cli import main
-from pipeline.model import Curve
+from pipeline.model import Clamp, Curve
 from pipeline.run.aggregate import aggregate
 from pipeline.run.case import Job, run_case
 from pipeline.run.results import found_results
+from pipeline.run.stages import simulate
 from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
@@ -324,6 +326,21 @@ def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> 
     failures = pd.read_csv(out / "failures.csv")
     assert list(failures["case"]) == ["second"]
     assert "cut short" in failures["message"][0] or "cannot be read" in failures["message"][0]
+
+
+def test_a_wire_that_cannot_enter_is_a_failed_frame(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No point of it is there to be compared with; the case must not end as crashed."""
+    clamp = simulate._clamp
+    monkeypatch.setattr(simulate, "_clamp", lambda run, frames: aside(clamp(run, frames)))
+    assert run(study, tmp_path, "--until", "compare") == 1
+    assert set(errors_of(tmp_path)["status"]) == {"entry_outside"}
+
+
+def aside(clamp: Clamp) -> Clamp:
+    """A clamp outside the vessel, as a wrong entry of the manifest or a thin lumen makes it."""
+    return replace(clamp, entry_mm=clamp.entry_mm + np.array([6.0, 6.0, 0.0]))
 
 
 def test_an_unexpected_error_costs_one_case(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,7 +49,7 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, pre
     if frame.ok and not known.scans.frames:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)
-    if frame.curve is None or not frame.traced or frame.simulated is None:
+    if frame.curve is None or not frame.traced or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
         return frame
     assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
