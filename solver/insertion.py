@@ -25,6 +25,8 @@ ROLL_STEP_DEG = Range(1e-6, 1e6)
 DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
 FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
 SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
+SEPTUM_SAMPLES = 17
+"""Places on a way through a septum, which is at most two voxels' diagonals long."""
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
@@ -185,12 +187,22 @@ def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
 
 
 def _refused(wall: VesselWall, entry: Array) -> Status | None:
-    """Why no wire may start at an entry point (3,): too far outside the lumen, or with lumen on both sides of it."""
+    """Why no wire may start at an entry point (3,): too far outside the lumen, or between two lumens."""
     voxel = float(np.linalg.norm(wall.distance.spacing_mm))
     outside = float(wall.look_up(entry)[0][0])
     if outside > tol.ENTRY_MARGIN_VOXELS * voxel:
         return Status.ENTRY_OUTSIDE
-    ways = np.array([way for way in np.ndindex(3, 3, 3) if way > (1, 1, 1)]) - 1.0
-    ways *= (outside + voxel) / np.linalg.norm(ways, axis=1, keepdims=True)
-    ahead, behind = (wall.look_up(entry + side * ways)[0] < 0.0 for side in (1, -1))
-    return Status.ENTRY_IN_SEPTUM if outside > 0.0 and bool(np.any(ahead & behind)) else None
+    return Status.ENTRY_IN_SEPTUM if outside > 0.0 and _in_septum(wall, entry, outside, outside + voxel) else None
+
+
+def _in_septum(wall: VesselWall, entry: Array, outside: float, reach: float) -> bool:
+    """Whether a point that lies ``outside`` mm in the wall has lumen on several sides that is not one and the same.
+
+    Beside the inner wall of a bend it is the same: the ways through it do not rise to where the point lies.
+    """
+    ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)]) - 1.0
+    ends = entry + reach * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    depths = wall.look_up(ends)[0]
+    between = np.linspace(0.0, 1.0, SEPTUM_SAMPLES)[:, None, None]
+    chords = ends[depths.argmin()] + between * (ends[depths < 0.0] - ends[depths.argmin()])
+    return bool(np.any(wall.look_up(chords.reshape(-1, 3))[0] > 0.5 * outside))

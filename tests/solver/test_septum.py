@@ -153,3 +153,17 @@ def test_an_entry_between_two_vessels_is_refused() -> None:
         assert next(Insertion(wire, wall, [x, 0, 0], [0, 0, 1]).to_depths([3.0])).status is status
     # outside, but with lumen on one side alone
     assert next(Insertion(wire, wall, [-1.4, 0, 0], [0, 0, 1]).to_depths([3.0])).converged
+
+
+@pytest.mark.parametrize("voxel", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("outside", [0.01, 0.1, 0.25])
+def test_an_entry_beside_the_inner_wall_of_a_bend_is_between_no_two(voxel: float, outside: float) -> None:
+    """Seen from there the one vessel lies on two sides."""
+    bend = 4.0
+
+    def ring(p: Array) -> Array:
+        return np.hypot(np.hypot(p[..., 0] + bend, p[..., 2]) - bend, p[..., 1]) - 1.2
+
+    wall = VesselWall(sampled(ring, voxel, (-12, -4, -8), (4, 4, 8), "float32"), 1.0)
+    insertion = Insertion(GuideWire(0.5, 0.18, 0.5), wall, [-1.2 - outside, 0, 0], [0, 0, 1])
+    assert next(insertion.to_depths([2.0])).status is Status.CONVERGED
