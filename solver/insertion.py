@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse.csgraph import connected_components
 
 from solver import _tolerances as tol
 from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
@@ -196,13 +197,15 @@ def _refused(wall: VesselWall, entry: Array) -> Status | None:
 
 
 def _in_septum(wall: VesselWall, entry: Array, outside: float, reach: float) -> bool:
-    """Whether a point that lies ``outside`` mm in the wall has lumen on several sides that is not one and the same.
+    """Whether a point that lies ``outside`` mm in the wall has lumens on its sides that are not one and the same.
 
-    Beside the inner wall of a bend it is the same: the ways through it do not rise to where the point lies.
+    One and the same are those between which the straight ways do not rise to where the point lies, from one to the
+    next: so it is around a hole of a voxel, at the parting of two vessels, and beside the inner wall of a bend.
     """
     ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)]) - 1.0
     ends = entry + reach * ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    depths = wall.look_up(ends)[0]
-    between = np.linspace(0.0, 1.0, SEPTUM_SAMPLES)[:, None, None]
-    chords = ends[depths.argmin()] + between * (ends[depths < 0.0] - ends[depths.argmin()])
-    return bool(np.any(wall.look_up(chords.reshape(-1, 3))[0] > 0.5 * outside))
+    ends = ends[wall.look_up(ends)[0] < 0.0]
+    share = np.linspace(0.0, 1.0, SEPTUM_SAMPLES)[:, None, None, None]
+    between = ends[:, None] + share * (ends - ends[:, None])
+    highest = wall.look_up(between.reshape(-1, 3))[0].reshape(SEPTUM_SAMPLES, len(ends), len(ends)).max(axis=0)
+    return connected_components(highest <= 0.5 * outside)[0] > 1

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
+from solver import Grid, GuideWire, Insertion, Solution, Status, VesselWall, relax
 from tests.solver.scenes import Array, Distance, fork_distance, sampled
 
 CURVED = [[0, 0.3], [6, 0.3], [6, 0.0]]
@@ -167,3 +167,15 @@ def test_an_entry_beside_the_inner_wall_of_a_bend_is_between_no_two(voxel: float
     wall = VesselWall(sampled(ring, voxel, (-12, -4, -8), (4, 4, 8), "float32"), 1.0)
     insertion = Insertion(GuideWire(0.5, 0.18, 0.5), wall, [-1.2 - outside, 0, 0], [0, 0, 1])
     assert next(insertion.to_depths([2.0])).status is Status.CONVERGED
+
+
+def test_a_hole_in_the_lumen_is_no_septum() -> None:
+    """Noise leaves single voxels out of a thin lumen; there is one and the same vessel on all sides of them."""
+    wall = wall_of(HERE, voxel=0.6)
+    values = wall.distance.values.copy()
+    middle = np.rint((np.zeros(3) - wall.distance.origin_mm) / 0.6).astype(int)
+    values[tuple(middle)] = 0.3
+    entry = wall.distance.origin_mm + 0.6 * middle
+    holed = VesselWall(Grid(values, wall.distance.spacing_mm, wall.distance.origin_mm), 1.0)
+    assert holed.look_up(entry)[0][0] > 0.05
+    assert next(Insertion(GuideWire(0.5, 0.18, 0.5), holed, entry, [0, 0, 1]).to_depths([3.0])).converged
