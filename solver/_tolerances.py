@@ -129,12 +129,17 @@ ENERGY_SHARE = 5e-4
 CHANGE_SHARE = 0.08
 """The same of the change of the hand's force in a step of step_mm, times its way: that rule leaves 0.5 of it where a
 contact closes at once. Of 2,000 hard steps that short ones confirmed it lets 1,600 pass, of those that hopped none."""
+GAINED = 10.0
+"""What a stiff wire may gain over what it may lose: no hop of 1,100 hard steps showed by a gain, but one of a tip that
+catches on a ring gained fifty times as much."""
 TOIL = 20
 """Iterations of a step that a soft wire takes without hopping, mostly; what it loses in a hop may be nothing."""
 SOFT_SHARE = 0.2
 """Share of what a stiff wire may miss that is too much for a soft one, whichever sign it has."""
 CRITICAL = 0.001
 """Pivot below which the wire is about to give way, in whichever direction rounding says."""
+FREE = 0.05
+"""Pivot below which a wire is free to turn about the axis of a round vessel, or nearly so."""
 LOOSE = 0.006
 """Pivot below which long and short steps may agree by chance: in a sphere the grid alone holds a straight wire."""
 SAME_MM = 1e-3

@@ -35,10 +35,10 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
         doubtful = used > tol.TOIL or (used > tol.EASY and abs(lost) > tol.SOFT_SHARE * large)
     else:
         large += tol.CHANGE_SHARE * share * (abs((push - at.push) * ahead) + abs((torque - at.torque) * turn))
-        doubtful = used > tol.EASY and lost > large
+        doubtful = used > tol.EASY and (lost > large or lost < -tol.GAINED * large)
     doubtful = doubtful and handle.limits.method == NEWTON and problem.friction.coefficient == 0.0
-    # shorter steps do not make a soft wire any more certain that is in doubt already
-    told = soft and (at.seen_calm if pending else at.calm) < tol.CALM_MM
+    # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
+    told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
     if doubtful and not told and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
         if not pending:
             remember(problem, at, k, reached)
