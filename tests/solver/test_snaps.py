@@ -110,3 +110,7 @@ def test_the_least_pivot_falls_to_zero_at_eulers_load() -> None:
     assert pivots[0] == 1.0
     assert all(a > b for a, b in pairwise(pivots))
     assert 0.0 < pivots[-1] < 0.05
+    # beyond it by less than shows in the energy the wire stays straight, and is as good as unstable
+    beyond = relax(GuideWire(length, 0.18, bending), depth_mm=n * length, load_N=[0.0, 0.0, -(1 + 1e-7) * critical])
+    assert beyond.converged
+    assert beyond.least_pivot == 0.0
