@@ -38,7 +38,8 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
-    finest_mm : length of the steps down to which a step is taken again that released energy; step_mm or more: never.
+    finest_mm : length of the steps down to which a step is taken again that the hand's work does not account for;
+    step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
     shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is

@@ -65,7 +65,8 @@ class Solution:
     start_energy_N_mm : total energy that the last relaxation began with.
     least_pivot : distance to instability, see ``_kernels.records.REPORT``: 1 for a free wire, 0 where it snaps.
     dissipated_N_mm : the hand's work on the way to this depth less the change of energy.     snaps : on that way.
-    uncertain : the wire snapped, or was about to, here or a few mm before: shorter steps may lead elsewhere.
+    uncertain : the wire snapped, was about to, or lay elsewhere after long steps than after short ones, here or a few
+    mm before (as long as it stays soft): shorter steps may lead elsewhere.
     """
 
     joints_mm: Array

@@ -90,6 +90,7 @@ class Workspace:
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
         self.place["shrink"], self.place["calm"] = 1.0, np.inf
+        self.place["seen_depth"] = np.nan
         self.snaps = np.zeros(SNAPS_KEPT, records.SNAP)
         self.report = np.zeros(2, records.REPORT)
         self._grow(16)
@@ -131,8 +132,8 @@ class Workspace:
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
         start, change, keep = np.zeros((3, k, 3))
-        descent = np.zeros(1, records.DESCENT)
-        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, self.snaps)
+        descent, seen = np.zeros(1, records.DESCENT), np.zeros((k + 1, 3))
+        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, seen, self.snaps)
 
     def _empty_friction(self, k: int, points: int) -> data.Friction:
         coefficient = float(self.wall.friction) if self.wall is not None else 0.0

@@ -118,7 +118,8 @@ class Scratch(NamedTuple):
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
     distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``records``.
     start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in the last step,
-    from the tip inwards.     keep : (k, 3) controls to come back to.     snaps : (n,) of ``records.SNAP``.
+    from the tip inwards.     keep : (k, 3) controls to come back to.     seen : (k + 1, 3) joints after a rough step,
+    mm.     snaps : (n,) of ``records.SNAP``.
     """
 
     gain: Any
@@ -129,6 +130,7 @@ class Scratch(NamedTuple):
     start: Any
     change: Any
     keep: Any
+    seen: Any
     snaps: Any
 
 

@@ -52,7 +52,7 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
     outcome, iterations = data.CONVERGED, 0
-    at.dissipated, at.snaps = 0.0, 0
+    at.dissipated, at.snaps, at.seen_depth = 0.0, 0, math.nan
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         counters.rolls_proven_idle += 1
@@ -92,7 +92,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, energy, held = data.CONVERGED, 0, 0.0, problem.scratch.counters[0].levenberg
+    outcome, used, energy = data.CONVERGED, 0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
@@ -102,8 +102,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
         outcome = where(problem, handle.introducer.margin, k, laid)
     if outcome == data.CONVERGED and laid == 0:
-        hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
-        outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), hard)
+        outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), used)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
@@ -130,6 +129,9 @@ def where(problem: Problem, margin: float, k: int, laid: int) -> int:
 def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
     """Depth, mm, and roll, degrees, that the next step leads to."""
     at = handle.place[0]
+    if not math.isnan(at.seen_depth):
+        # to where a rough step led, for the two ways to be compared there
+        to_depth, to_roll = at.seen_depth, at.seen_roll
     ahead, turn = to_depth - at.inserted, to_roll - at.roll
     longest = at.shrink * allowed(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
     # the way in equal steps, none longer than that but for a small overshoot

@@ -196,6 +196,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
             trial = off_saddle(problem, k, now, noise, report)
             if trial == math.inf:
                 # the way down is shorter than rounding can tell, unless it is steep, or the sweep overflowed
+                report.pivot = 0.0
                 return CONVERGED if nearly else STALLED
     if trial <= now.energy:
         return take(problem, k, now, trial, definite and now.damping == 0.0, tolerance, report)

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import dot, load3, minus
+from solver._kernels.algebra import dot, load3, minus, store3
 from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import merged
@@ -17,10 +17,10 @@ from solver._kernels.minimise import NEWTON
 
 
 @merged
-def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool) -> int:
+def account(handle: Any, k: int, reached: tuple[float, float, float], used: int) -> int:
     """Hold the hand's work in a step against the wire's energy; ROUGH where a shorter step may lead elsewhere.
 
-    reached : depth, mm, roll, degrees, and energy, N mm.     hard : the wire did not come to rest in a few iterations.
+    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations.
     """
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     ahead, turn = reached[0] - at.inserted, math.radians(reached[1] - at.roll)
@@ -29,19 +29,62 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool
     lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn) - (reached[2] - at.energy)
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy))
-    judged = hard and handle.limits.method == NEWTON and problem.friction.coefficient == 0.0
     share = max(abs(ahead) / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
-    if judged and abs(lost) > large and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
+    soft, pending = report.pivot < tol.SOFT, not math.isnan(at.seen_depth)
+    if soft:
+        doubtful = used > tol.TOIL or (used > tol.EASY and abs(lost) > tol.SOFT_SHARE * large)
+    else:
+        large += tol.CHANGE_SHARE * share * (abs((push - at.push) * ahead) + abs((torque - at.torque) * turn))
+        doubtful = used > tol.EASY and (lost > large or lost < -tol.GAINED * large)
+    doubtful = doubtful and handle.limits.method == NEWTON and problem.friction.coefficient == 0.0
+    # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
+    told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
+    if doubtful and not told and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
+        if not pending:
+            remember(problem, at, k, reached)
         return ROUGH
-    if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
-        at.calm += abs(ahead)
-    if judged and lost > large:
+    if doubtful and lost > large:
         note_snap(problem, at, k, segments_at(at.inserted, handle.table.segment)[0], (reached[0], lost))
-    # a wire that is soft after a hard step may have given way without a loss, to a side that rounding chose
-    if report.pivot < (tol.TURNED if hard else tol.NEUTRAL):
-        at.calm = 0.0
+    trust(handle, k, reached, doubtful)
     at.push, at.torque, at.dissipated = push, torque, at.dissipated + lost
     return CONVERGED
+
+
+@merged
+def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, float]) -> None:
+    """Keep the wire that a rough step led to, for that of shorter steps to be held against it."""
+    at.seen_depth, at.seen_roll, at.seen_calm = reached[0], reached[1], at.calm
+    for n in range(k + 1):
+        store3(problem.scratch.seen, n, load3(problem.state.x[CURRENT], n))
+
+
+@merged
+def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bool) -> None:
+    """Keep count of the way since the wire gave way, or could have: until then it may lie otherwise elsewhere.
+
+    A rough step is forgotten where shorter ones lead to the same wire without a snap, unless it is about to give way:
+    to which side such a wire turns may have been decided before, by less than anyone can tell.
+    """
+    problem, at, report = handle.problem, handle.place[0], handle.report[0]
+    ahead = abs(reached[0] - at.inserted)
+    if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
+        at.calm += ahead
+    if doubtful or report.pivot < tol.CRITICAL:
+        at.calm = 0.0
+    if abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) < tol.MATCH_DEPTH_MM:
+        same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
+        at.calm = at.seen_calm + ahead if same and report.pivot > tol.LOOSE else 0.0
+        at.seen_depth = math.nan
+
+
+@merged
+def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
+    """Largest distance of ``count`` joints of two wires, mm, from joint ``at`` of one and ``to`` of the other on."""
+    most = 0.0
+    for m in range(count):
+        way = minus(load3(a, at + m), load3(b, to + m))
+        most = max(most, dot(way, way))
+    return math.sqrt(most)
 
 
 @merged
@@ -53,11 +96,8 @@ def note_snap(problem: Problem, at: Any, k: int, was: int, reached: tuple[float,
     snaps, x = problem.scratch.snaps, problem.state.x
     snap = snaps[min(at.snaps, snaps.size - 1)]
     at.snaps = min(at.snaps + 1, snaps.size)
-    farthest = 0.0
-    for m in range(min(k, was)):
-        # joints are counted from the tip: there they stay with the material
-        way = minus(load3(x[CURRENT], k - m), load3(x[LAST_GOOD], was - m))
-        farthest = max(farthest, dot(way, way))
-    snap.from_mm, snap.to_mm = at.inserted, reached[0]
-    snap.released_N_mm, snap.moved_mm = reached[1], math.sqrt(farthest)
-    at.calm = 0.0
+    common = min(k, was)
+    at.seen_calm = 0.0
+    snap.from_mm, snap.to_mm, snap.released_N_mm = at.inserted, reached[0], reached[1]
+    # joints are counted from the tip: there they stay with the material
+    snap.moved_mm = farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)

@@ -35,9 +35,39 @@ def test_a_snap_is_bracketed_and_told() -> None:
     # all that the hand's work does not find again in wire and wall was released there
     assert snap.released_N_mm == pytest.approx(last.dissipated_N_mm, rel=0.02)
     assert last.uncertain
-    assert not any(s.uncertain for s in found[:-1])
+    # caught, it is where short steps lead; that long ones would have led elsewhere is said, and nothing before
+    for mine, short in zip(found[:-1], caught(step_mm=0.05), strict=False):
+        np.testing.assert_allclose(mine.joints_mm, short.joints_mm, atol=1e-4)
+    assert not any(s.uncertain for s in found[:20])
     # without shorter steps it is seen as well, but not where
     assert coarse[-1].snaps[0].to_mm - coarse[-1].snaps[0].from_mm > 0.3
+
+
+def sphere(p: Array) -> Array:
+    """A neck of 2 mm and a sphere of 9.5 mm: a straight wire meets its far wall head on, and turns to any side."""
+    x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    neck = np.hypot(np.hypot(x, y), np.maximum(z - 4.0, 0.0)) - 2.0
+    return np.asarray(np.minimum(neck, np.sqrt(x**2 + y**2 + (z - 12.0) ** 2) - 9.5))
+
+
+def turned(segment: float, stiffness: float, **how: float) -> list[Solution]:
+    wall = VesselWall(sampled(sphere, 0.7, (-14, -14, -6), (14, 14, 24), "float32"), stiffness)
+    wire = GuideWire(segment, 0.18, [[0, 1.0], [30, 10.0]])
+    insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], **how)  # type: ignore[arg-type]
+    return list(insertion.to_depths(np.arange(1.0, 28.0)))
+
+
+def test_only_what_long_and_short_steps_agree_on_is_certain() -> None:
+    """In one sphere they turn the wire to the same side, in a harder one 4 mm away from the shortest ones."""
+    for mine, short in zip(turned(1.0, 1.0), turned(1.0, 1.0, step_mm=0.05), strict=True):
+        np.testing.assert_allclose(mine.joints_mm, short.joints_mm, atol=1e-4)
+        assert not mine.uncertain
+    assert turned(1.0, 1.0, finest_mm=1.0)[-1].uncertain
+    apart = []
+    for mine, short in zip(turned(0.8, 10.0), turned(0.8, 10.0, step_mm=0.05), strict=True):
+        apart.append(np.abs(mine.joints_mm - short.joints_mm).max())
+        assert mine.uncertain or apart[-1] < 1e-4
+    assert max(apart) > 1.0
 
 
 def test_a_smooth_insertion_is_left_alone() -> None:
@@ -80,3 +110,7 @@ def test_the_least_pivot_falls_to_zero_at_eulers_load() -> None:
     assert pivots[0] == 1.0
     assert all(a > b for a, b in pairwise(pivots))
     assert 0.0 < pivots[-1] < 0.05
+    # beyond it by less than shows in the energy the wire stays straight, and is as good as unstable
+    beyond = relax(GuideWire(length, 0.18, bending), depth_mm=n * length, load_N=[0.0, 0.0, -(1 + 1e-7) * critical])
+    assert beyond.converged
+    assert beyond.least_pivot == 0.0
