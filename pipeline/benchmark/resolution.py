@@ -16,12 +16,14 @@ from pipeline.benchmark.scenes import BenchScene, of_setup
 from pipeline.benchmark.stress.axes import moderate
 from pipeline.benchmark.stress.plan import entry, lumen_grid
 from pipeline.model import Array
+from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import FINEST_MM, lengths_mm, moved_mm, resolve
 from solver import GuideWire, Insertion, Solution, warm_up
 
 LARGEST_MM, COVERED = 0.03, 0.95
 COST = 1.6
 EVERY_MM = 2.0
+FINEST_STEP_MM = SolverConfig().finest_mm
 RANDOM, QUICK_SCENES = 100, 8
 TREES = ("brava_swc/BG*.swc", "aorta_to_cranial/Centrelines_comb/*RCCA.mrk.json")
 """Real anatomies, where ``$WIREVAL_DATA`` is."""
@@ -64,11 +66,12 @@ def _measured(scene: BenchScene) -> tuple[Array, Array]:
     """
     wall, seconds = scene.wall(), {}
 
-    def insert(segment_mm: float) -> list[Solution]:
-        clock = process_time()
+    def insert(segment_mm: float, refined: bool = True) -> list[Solution]:
+        clock, finest_mm = process_time(), FINEST_STEP_MM if refined else np.inf
         insertion = Insertion(
-            scene.wire(segment_mm), wall, scene.entry_mm, scene.direction, material_axis=scene.material_axis
-        )
+            scene.wire(segment_mm), wall, scene.entry_mm, scene.direction, material_axis=scene.material_axis,
+            finest_mm=finest_mm,
+        )  # fmt: skip
         found = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
         seconds[segment_mm] = process_time() - clock
         return found

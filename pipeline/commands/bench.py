@@ -39,8 +39,8 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.study.settings import Config
 
     plain = not (args.stress or args.peers or args.snaps or args.resolution)
-    snaps = study_of_steps(args.seed, quick=args.quick)
-    resolution = study_of_resolution(args.seed, quick=args.quick)
+    random = {"snaps": study_of_steps, "resolution": study_of_resolution}
+    studies = [make(args.seed, quick=args.quick) for name, make in random.items() if plain or getattr(args, name)]
     try:
         cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
@@ -54,16 +54,12 @@ def main(args: argparse.Namespace) -> int:
         sound &= measure_stress(args.out, say, args.seed, count)
     if args.peers:
         measure_peers(args.out, say, quick=args.quick)
-    if args.snaps:
-        sound &= measure_claims(args.out, say, [snaps])
-    if args.resolution:
-        sound &= measure_claims(args.out, say, [resolution])
     if plain:
         if args.manifest is None:
             chosen = [scenes.bend(), scenes.siphon()]
             chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
-        if args.manifest is None:
-            sound &= measure_claims(args.out, say, (*STUDIES, friction, snaps, resolution))
+    if args.manifest is None and (plain or studies):
+        sound &= measure_claims(args.out, say, [*STUDIES, friction, *studies] if plain else studies)
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

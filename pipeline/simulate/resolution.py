@@ -27,8 +27,8 @@ SMALLEST_MM = 0.001
 LARGEST_JOINT_TURN_DEG = 30.0
 """Beyond it the chain's bending energy, quadratic in the angle, is off by 2 % and more."""
 
-Insert = Callable[[float], Sequence[Solution]]
-"""The insertion with segments of a length, mm: the wire at every depth."""
+Insert = Callable[[float, bool], Sequence[Solution]]
+"""The insertion with segments of a length, mm: the wire at every depth. Whether rough steps are taken again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,13 +64,15 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
 
     A length that loses depths which a longer one reached is not taken.
     """
-    segment, wires, num = lengths[0], insert(lengths[0]), np.full(0, np.nan)
+    # the first length is there to be compared with: where it snaps aside, the next pair of lengths is needed, too
+    segment, wires, num = lengths[0], insert(lengths[0], len(lengths) == 1), np.full(0, np.nan)
     reason = "no coarser segments can follow the wire's rest curvature: no estimate of their error"
     for shorter in lengths[1:]:
-        finer = insert(shorter)
+        finer = insert(shorter, True)
         moved = np.array([moved_mm(a, b) for a, b in zip(wires, finer, strict=True)])
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = f"with {shorter:g} mm fewer depths are reached"
+            wires = insert(segment, True) if segment == lengths[0] else wires
             break
         # a wire that is about to snap goes one way or the other by a trifle, with segments of any length
         away = ~(moved <= AGREED_MM) & [not wire.uncertain for wire in finer]

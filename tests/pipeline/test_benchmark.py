@@ -141,7 +141,14 @@ def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.Capture
     assert any("for 0.01 mm" in line or "reaches 0.01" in line for line in lines)
     assert "cores" in page.machine()
     missing = Namespace(
-        manifest=tmp_path / "none.toml", stress=False, peers=False, snaps=False, quick=True, seed=0, out=tmp_path
+        manifest=tmp_path / "none.toml",
+        stress=False,
+        peers=False,
+        snaps=False,
+        resolution=False,
+        quick=True,
+        seed=0,
+        out=tmp_path,
     )
     assert command.main(missing) == 2
     assert "none.toml" in capsys.readouterr().err

@@ -27,10 +27,11 @@ def siphon() -> BenchScene:
     return BenchScene("siphon", 34.0, guide_wire=soft, distance=distance, box=box, material_axis=(1.0, 0.0, 0.0))
 
 
-def insert(scene: BenchScene, segment_mm: float) -> Sequence[Solution]:
+def insert(scene: BenchScene, segment_mm: float, refined: bool = True) -> Sequence[Solution]:
     insertion = Insertion(
-        scene.wire(segment_mm), scene.wall(), scene.entry_mm, scene.direction, material_axis=scene.material_axis
-    )
+        scene.wire(segment_mm), scene.wall(), scene.entry_mm, scene.direction, material_axis=scene.material_axis,
+        finest_mm=0.05 if refined else 1.0,
+    )  # fmt: skip
     return list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
 
 
@@ -79,7 +80,7 @@ def test_a_length_that_loses_depths_is_not_taken() -> None:
         wires = insert(bend(20.0), segment_mm)
         return wires if segment_mm > 0.3 else [*wires[:-1], replace(wires[-1], status=Status.STALLED)]
 
-    apart = resolve(lambda mm: [replace(w, joints_mm=w.joints_mm + mm) for w in one(mm)], lengths_mm("auto", 0.0))
+    apart = resolve(lambda mm, _: [replace(w, joints_mm=w.joints_mm + mm) for w in one(mm)], lengths_mm("auto", 0.0))
     assert apart.segment_mm == 0.5
     assert "fewer depths" in apart.reason
 

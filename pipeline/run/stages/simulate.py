@@ -27,9 +27,10 @@ def simulate_frames(run: Context, known: Known) -> Known:
     frames = [_with_depth(frame, config.simulate.depth) for frame in known.frames]
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
 
-    def insert(segment_mm: float) -> list[Solution]:
+    def insert(segment_mm: float, refined: bool) -> list[Solution]:
         """The wire of every frame with segments of one length."""
-        settings = replace(config.solver, segment_mm=segment_mm)
+        finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
+        settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
         insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate)
         found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay])
         return list(_noted(log, replay, found, len(frames)))
