@@ -16,9 +16,12 @@ STRETCH = 1e-12
 RESIDUAL = 1e-4
 """Largest moment left at a joint of a wire called converged, relative to the largest moment in it: ten times
 what the solver itself asks for, because the last place of a stiff wall is lost in a second assembly."""
-RUBBED, SETTLED = 1e-2, 1e-3
+RUBBED, SETTLED = 1e-2, 5e-4
 """The same with friction; and the share of the largest contact force, with the whole wire as its lever, that loads
 settled to 1e-4 and their directions leave."""
+TURNED = 0.01
+"""Share of mu N, per mm of the wire's radius, that contacts which still stick may be off, with the same lever: settled
+directions may have turned by 1e-4 rad, and a spring slips at 1e-3 mm, so one alone may be off by ten times as much."""
 ENERGY_PLACE = 1e-12
 """Fraction of the energy that nobody can lower: a residual is nothing if even a wire free of wall would gain less."""
 MOMENT_FLOOR_RAD = 1e-6
@@ -107,7 +110,8 @@ def _rubs(plan: ScenePlan, chain: StaticChain, solution: Solution) -> SceneVerdi
     gradient, elastic = chain.moments(*state, np.asarray(solution.contact_force_N), held)
     scale = max(float(np.abs(elastic).max()), MOMENT_FLOOR_RAD * float(chain.bend.max()))
     residual = float(np.abs(gradient).max()) / scale
-    unsettled = SETTLED * float(np.abs(solution.contact_force_N).max()) * float(chain.length.sum())
+    unsettled = SETTLED + TURNED * plan.friction * plan.radius_mm
+    unsettled *= float(np.abs(solution.contact_force_N).max() * chain.length.sum())
     if residual > RUBBED + (_noise(chain, solution) + unsettled) / scale:
         return SceneVerdict("not_at_rest", f"moment {residual:.3g} of the largest, friction held", residual)
     return SceneVerdict(residual=residual)
