@@ -17,13 +17,13 @@ import pytest
 from pipeline.benchmark.stress import run as study
 from pipeline.benchmark.stress.axes import AXES, draw
 from pipeline.benchmark.stress.lumens import NEAR, changes_vessel, near_vessels
-from pipeline.benchmark.stress.plan import ScenePlan, lumen_grid, placement
+from pipeline.benchmark.stress.plan import ScenePlan, placement
 from pipeline.benchmark.stress.rubbing import RUBBING_MM, made_energy
 from pipeline.benchmark.stress.run import run_isolated, run_stress, stress_table
 from pipeline.benchmark.stress.scene_run import SceneOutcome, build, run_plan, run_scene, solve
 from pipeline.benchmark.stress.statics import assemble
 from pipeline.benchmark.stress.verdict import judge
-from solver import Grid, VesselWall, relax
+from solver import relax
 
 SEED = 400
 SAMPLE = 100
@@ -49,12 +49,12 @@ def test_all_scenes_end_as_they_may(tmp_path: Path) -> None:
 
 # called converged with a moment left (closed form, and Newton on a wall of 7e5 N/mm²), or without an end
 ONCE_WRONG = [(200, 181), (200, 199), (200, 277), (200, 390), (100, 149), (100, 474), (100, 887), (100, 86), (100, 124)]
-# held off the wall by friction that was gone with the load
-ONCE_WRONG_WITH_FRICTION = [(11, 269)]
+# held off the wall by friction that was gone with the load; past the ridge of a septum, where rounding hid the lumen
+ONCE_WRONG_OF_27 = [(11, 269), (400, 241)]
 
 
 @pytest.mark.parametrize(
-    ("seed", "index", "axes"), [(*s, 25) for s in ONCE_WRONG] + [(*s, 27) for s in ONCE_WRONG_WITH_FRICTION]
+    ("seed", "index", "axes"), [(*s, 25) for s in ONCE_WRONG] + [(*s, 27) for s in ONCE_WRONG_OF_27]
 )
 def test_scenes_that_were_once_wrong(seed: int, index: int, axes: int) -> None:
     """axes : how many there were then; a seed stands for their order, too."""
@@ -124,17 +124,16 @@ def test_friction_that_keeps_its_law_passes() -> None:
     assert 0.0 < max(v.residual for v in verdicts) < 1e-4
     assert max(float(np.abs(s.contact_force_N).sum()) for s in found) > 0.01
     assert not made_energy(plan, found)
+    # friction acts a radius from the axis: without that lever the moments do not balance
+    chain, solution = assemble(wire, wall, found[6].depth_mm), found[6]
+    gradient, elastic = chain.moments(solution.joints_mm, solution.frames, solution.contact_force_N)
+    assert np.abs(gradient).max() > 1e-3 * np.abs(elastic).max()
 
 
 def test_the_judge_sees_friction_that_breaks_its_law() -> None:
     plan, wire, wall, found = _rubbing()
     # a coefficient that is a tenth less than the wire's own
     assert judge(replace(plan, friction=0.27), wire, wall, found[6], math.nan, False).fault == "friction"
-    # no moment about the axis, which is 0.18 mm from where the wall holds the wire
-    thin = replace(wire, radius_mm=0.0)
-    grid = lumen_grid(plan)
-    deeper = VesselWall(Grid(grid.values + np.float32(0.18), grid.spacing_mm, grid.origin_mm), 1.0, 0.3)  # noqa: PD011
-    assert judge(plan, thin, deeper, found[6], math.nan, False).fault == "not_at_rest"
     cheap = [replace(s, push_force_N=s.push_force_N - 0.3 * np.sign(b - a) * abs(s.push_force_N))
              for s, a, b in zip(found, [0.0, *plan.depths], plan.depths, strict=False)]  # fmt: skip
     assert made_energy(plan, cheap)
@@ -173,7 +172,7 @@ def test_round_a_u_turn_is_no_other_vessel() -> None:
 
 def test_scenes_with_a_septum_tempt_the_wire() -> None:
     """Some wires try the wall, most do not, and the walls are of 0 to 4 voxels."""
-    chosen = [plan for plan in (draw(SEED, i) for i in range(600)) if plan.axes == ("septum",)]
+    chosen = [plan for plan in (draw(SEED, i) for i in range(2000)) if plan.axes == ("septum",)]
     share = [plan.septum_mm / plan.voxel_mm[0] for plan in chosen]
     assert {plan.lumen for plan in chosen} == set(NEAR)
     assert min(share) < 1.0

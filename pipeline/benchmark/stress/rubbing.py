@@ -56,7 +56,7 @@ def made_energy(plan: ScenePlan, solutions: Sequence[Solution]) -> str:
         return f"friction took {rubs.min():.3g} N mm"
     if not all(s.converged for s in solutions[1:]):
         return ""
-    work, error, size, spent, largest, load = np.zeros(6)
+    work, error, size, spent, largest, load = [0.0] * 6
     for way in (taken[: len(taken) // 2], taken[len(taken) // 2 :]):
         s, push, energy = np.array([(w.depth_mm, w.push_force_N, w.energy_N_mm) for w in way]).T
         fine = float(np.trapezoid(push, s))
