@@ -14,6 +14,7 @@ from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import merged
 from solver._kernels.forces import push_force
 from solver._kernels.minimise import NEWTON
+from solver._kernels.sleeve import tip_force
 
 
 @merged
@@ -26,11 +27,19 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool
     ahead, turn = reached[0] - at.inserted, math.radians(reached[1] - at.roll)
     push = push_force(problem, handle.table, introducer.weight, k, report) if k > 0 else 0.0
     torque = report.torque[2] if k > 0 else 0.0
-    lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn) - (reached[2] - at.energy)
+    pull, onwards = 0.0, at.next - at.catheter
+    if handle.table.sleeve.there and k > 0:
+        pull = tip_force(problem, handle.table, k)
+        # the wire's hand pushes it through a catheter that stays
+        push -= pull
+    lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn + (pull + at.pull) * onwards)
+    lost -= reached[2] - at.energy
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
+    work += max(abs(pull), abs(at.pull)) * abs(onwards)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy))
     judged = hard and handle.limits.method == NEWTON and problem.friction.coefficient == 0.0
-    share = max(abs(ahead) / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
+    share = max(abs(ahead), abs(onwards)) / introducer.step
+    share = max(share, abs(reached[1] - at.roll) / introducer.turn)
     if judged and abs(lost) > large and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
         return ROUGH
     if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
@@ -40,7 +49,7 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], hard: bool
     # a wire that is soft after a hard step may have given way without a loss, to a side that rounding chose
     if report.pivot < (tol.TURNED if hard else tol.NEUTRAL):
         at.calm = 0.0
-    at.push, at.torque, at.dissipated = push, torque, at.dissipated + lost
+    at.push, at.torque, at.pull, at.dissipated = push, torque, pull, at.dissipated + lost
     return CONVERGED
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.load import rolls
+from pipeline.run.stages.load import each_frame
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
@@ -108,8 +108,8 @@ def test_scales_reach_the_wire(case: Case) -> None:
 
 
 def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:
-    assert rolls(15.0, 2) == (15.0, 15.0)
-    assert rolls((10.0, 20.0), 2) == (10.0, 20.0)
+    assert each_frame(15.0, 2) == (15.0, 15.0)
+    assert each_frame((10.0, 20.0), 2) == (10.0, 20.0)
 
 
 def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:
