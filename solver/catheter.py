@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from solver._kernels.data import Profile, Sleeve
-from solver.doors import Array, Range, number
+from solver.doors import Array, Range, instance, number
 from solver.errors import refuse
 from solver.grid import read_only
 from solver.wire import GuideWire
@@ -40,9 +40,9 @@ def sleeve_of(wire: GuideWire, catheter: Catheter | None) -> Sleeve:
     tip, cells = np.zeros(1), np.zeros((1, 2))
     if catheter is None:
         nothing = read_only(np.zeros(1))
-        return Sleeve(False, tip, 0.0, wire.profile, cells, nothing, nothing)
-    wider = catheter.radius_mm - wire.radius_mm
-    if not wider > 0.0:
+        return Sleeve(False, tip, wire.profile, cells, nothing, nothing)
+    instance("insertion", "catheter", catheter, Catheter)
+    if not catheter.radius_mm > wire.radius_mm:
         advice = "a catheter goes over the wire"
         refuse("catheter", "radius_mm", catheter.radius_mm, f"more than the wire's {wire.radius_mm:g}", advice)
     own, more = wire.profile, float(catheter.bending_stiffness_N_mm2)
@@ -50,7 +50,7 @@ def sleeve_of(wire: GuideWire, catheter: Catheter | None) -> Sleeve:
     share = stiffness / (stiffness + more)
     profile = Profile(own.stiffness_at, read_only(own.stiffness + more), at, read_only(share * curvature), own.twist)
     stored = 0.5 * more * share * curvature**2
-    return Sleeve(True, tip, wider, profile, cells, at, read_only(stored))
+    return Sleeve(True, tip, profile, cells, at, read_only(stored))
 
 
 def _both(own: Profile) -> tuple[Array, Array, Array]:

@@ -14,20 +14,7 @@ from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver.catheter import Catheter
-from solver.doors import (
-    ANGLE_DEG,
-    FORCE_N,
-    LENGTH_MM,
-    Array,
-    Range,
-    choice,
-    instance,
-    number,
-    numbers,
-    unit,
-    vector,
-    whole,
-)
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
 from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
@@ -92,8 +79,6 @@ class Insertion:
         self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
-        if catheter is not None:
-            instance("insertion", "catheter", catheter, Catheter)
         self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft, drag, catheter)
         weight = weight_of("insertion", wire, down)
         self._work.clamp(entry, frame, load, initial == "translate", steps, weight)

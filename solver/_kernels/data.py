@@ -62,14 +62,13 @@ class Rule(NamedTuple):
 class Sleeve(NamedTuple):
     """A catheter over the wire, see ``sleeve``.
 
-    there : whether there is one.     tip : (1,), mm beyond the entry.     wider : than the wire, mm.
+    there : whether there is one.     tip : (1,), mm beyond the entry.
     profile, cells : as in ``WireTable``, of the pair.
     stored_at, stored : (n,) energy of the pair at its rest, N mm per mm, by the distance from the wire's tip.
     """
 
     there: bool
     tip: Any
-    wider: float
     profile: Profile
     cells: Any
     stored_at: Any

@@ -80,14 +80,21 @@ def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: 
             force -= 0.25 * (chain.twist[j] * u[j, 2]) ** 2 / table.profile.twist
         e = turn(0.0, load3(u, j))
         force += bend * dot(load3(report.turned, j), e[3:6])
+    return float(force + wall_gained(problem, table))
+
+
+@kernel
+def wall_gained(problem: Problem, table: WireTable) -> float:
+    """What the wall under the first segment adds to the push force, N: more wire lies there, and moves less."""
+    chain, state, force = problem.chain, problem.state, 0.0
     for p in range(chain.first[1], chain.first[2]):
-        d, back = problem.state.penetration[CURRENT, p], -chain.offset[p, 2] / chain.length[0]
+        d, back = state.penetration[CURRENT, p], -chain.offset[p, 2] / chain.length[0]
         if d == 0.0:
             continue
         # half of node 1's cell lies on the first segment, and all that a point inside it stands for
         gains = chain.weight[p] / chain.length[0] if back != 0.0 else 0.5 / table.rule.hull.shape[0]
         force += gains * wall_law.energy_per_mm(problem.stiffness, d)
-        jet = problem.state.jet[CURRENT, p]
+        jet, ahead = state.jet[CURRENT, p], state.r[CURRENT, 1]
         slope = jet[1] * ahead[0, 2] + jet[2] * ahead[1, 2] + jet[3] * ahead[2, 2]
         # such a point stays behind, in proportion
         force -= back * wall_law.force(problem.stiffness, chain.weight[p], d) * slope

@@ -109,8 +109,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
             copy_state(problem, start, data.CURRENT, k)
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
         outcome = where(problem, handle.introducer.margin, k, laid)
-    if handle.table.sleeve.there:
-        energy += stored_energy(handle.table, depth)
+    energy += stored_energy(handle.table, depth)
     if outcome == data.CONVERGED and laid == 0:
         hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
         outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), hard)
@@ -118,8 +117,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
         at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
-        if handle.table.sleeve.there:
-            at.catheter, at.stored = at.next, stored_energy(handle.table, depth)
+        at.catheter, at.stored = at.next, stored_energy(handle.table, depth)
         if problem.friction.coefficient > 0.0:
             at.rubbed += settle_friction(problem, k)
         if problem.shaft.drag > 0.0:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
+from pipeline.cli import main
 from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
@@ -60,6 +62,28 @@ def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
     insertion = insertion_of(heavy, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
     last = list(simulate(insertion, [12.0], [0.0]))[-1]
     assert last.joints_mm[-1, 1] == pytest.approx(1e-5 * 12.0**4 / (8 * 0.6), rel=0.01)
+
+
+STUDY = MANIFEST.replace("none.stl", "tube.swc").replace("6.0, 12.0", "10.0, 10.0, 14.0")
+CATHETER = "catheter = {bending_stiffness_N_mm2 = 50.0, radius_mm = 0.9, insertion_mm = [0.0, 9.0, 4.0]}\n"
+
+
+def test_a_catheter_is_a_key_of_the_case(tmp_path: Path) -> None:
+    """From the manifest through check and run: it straightens the second frame and, drawn back, lets the third bend."""
+    (tmp_path / "tube.swc").write_text("1 0 0 0 -5 6 -1\n2 0 0 0 25 6 1\n")
+    path, tips = tmp_path / "manifest.toml", {}
+    for name, text in (("bare", STUDY), ("over", STUDY + CATHETER)):
+        path.write_text(text)
+        assert main(["check", str(path)]) == 0
+        assert main(["run", str(path), "-o", str(tmp_path / name), "--set", "solver.segment_mm=0.5"]) == 0
+        with h5py.File(next((tmp_path / name).rglob("frames.h5"))) as file:
+            tips[name] = [np.asarray(file[f"frames/{n:03d}/simulated_mm"])[-1] for n in range(3)]
+    np.testing.assert_allclose(tips["over"][0], tips["bare"][0], atol=1e-6)
+    assert np.hypot(*tips["over"][1][:2]) < 0.2 * np.hypot(*tips["bare"][1][:2])
+    # 8 mm of hook are 10 mm beyond the catheter: only where it is clamped, nothing changes
+    np.testing.assert_allclose(tips["over"][2], tips["bare"][2], atol=1e-3)
+    path.write_text(STUDY + CATHETER.replace("9.0", "10.5"))
+    assert main(["check", str(path)]) == 2
 
 
 def test_a_weight_without_down_is_a_problem_of_the_manifest(tmp_path: Path) -> None:
