@@ -37,6 +37,16 @@ class Wire:
 
 
 @dataclass(frozen=True)
+class OverWire:
+    """A catheter over the wire; insertion_mm : of its own tip beyond the entry, one for all frames or one per frame."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    bending_stiffness_N_mm2: NonNegative
+    radius_mm: Positive
+    insertion_mm: NonNegative | tuple[NonNegative, ...]
+
+
+@dataclass(frozen=True)
 class Wall:
     """The vessel's elastic wall: its stiffness per mm of wire, and Coulomb friction."""
 

@@ -30,6 +30,7 @@ What differs from the seed, and why, is said where it happens, in ``_kernels``: 
 fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 """
 
+from solver.catheter import Catheter
 from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.relax import relax
@@ -38,4 +39,4 @@ from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Grid", "GuideWire", "Insertion", "Snap", "Solution", "Status", "VesselWall", "relax", "warm_up"]
+__all__ = ["Catheter", "Grid", "GuideWire", "Insertion", "Snap", "Solution", "Status", "VesselWall", "relax", "warm_up"]

@@ -110,6 +110,8 @@ CREASE = 0.3
 falls by 2, of which at least 0.58 is seen along an axis at one voxel; round an obstacle of r voxels it falls by 1/r."""
 FOOT_STEPS = 64
 """Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
+FOOT_MM = 1e-9
+"""Distance from the level of a lumen's feet that is rounding: without it every third place was given up."""
 RIDGE_VOXELS = 0.05
 """Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
 that curves with two voxels of radius rises by a fifteenth of that."""

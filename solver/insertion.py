@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
 from solver import _tolerances as tol
+from solver.catheter import Catheter
 from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
 from solver.relax import Settings, base_frame, check_scene, weight_of
@@ -42,6 +43,7 @@ class Insertion:
     step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
+    catheter : over the wire, see ``to_depths``.
     shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is
     behind the hand.     shaft_friction_N : what it takes to slide or turn that shaft, force at its surface.
     Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
@@ -69,6 +71,7 @@ class Insertion:
         down: ArrayLike | None = None,
         shaft_mm: float = 0.0,
         shaft_friction_N: float = 0.0,
+        catheter: Catheter | None = None,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
         check_scene("insertion", wire, wall)
@@ -80,7 +83,7 @@ class Insertion:
         self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
-        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft, drag)
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft, drag, catheter)
         weight = weight_of("insertion", wire, down)
         self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
@@ -98,29 +101,43 @@ class Insertion:
         """Where the base is turned to."""
         return float(self._work.place["roll"][0])
 
-    def to_depths(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0) -> Iterator[Solution]:
+    @property
+    def catheter_mm(self) -> float:
+        """Where the tip of the catheter is, mm beyond the entry."""
+        return float(self._work.place["catheter"][0])
+
+    def to_depths(
+        self,
+        depths_mm: Iterable[float],
+        roll_deg: float | Sequence[float] = 0.0,
+        catheter_mm: float | Sequence[float] = 0.0,
+    ) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
-        depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base, one for all or
-        one per depth. A depth that cannot be reached yields the last good state with its own depth and a status.
+        depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base.     catheter_mm : the
+        catheter's tip beyond the entry, no deeper than the wire's; each one for all or one per depth. From depth to
+        depth wire, roll and catheter go on in proportion; push_force_N is the wire's hand's, with the catheter held.
+        A depth that cannot be reached yields the last good state with its own depth and a status.
         The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
         and a call while another thread is at work, is a RuntimeError.
         """
         if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
         depths = _list("depths_mm", depths_mm, DEPTH_MM)
-        if isinstance(roll_deg, (list, tuple, np.ndarray)) and np.ndim(roll_deg) > 0:
-            rolls = _list("roll_deg", roll_deg, ANGLE_DEG)
-        else:
-            rolls = [number("insertion", "roll_deg", roll_deg, ANGLE_DEG)] * len(depths)
-        if len(rolls) != len(depths):
-            refuse("insertion", "roll_deg", rolls, f"one number, or {len(depths)} as there are depths", "one per depth")
-        return self._each(depths, rolls)
+        rolls = _each_of("roll_deg", roll_deg, ANGLE_DEG, len(depths))
+        tips = _each_of("catheter_mm", catheter_mm, DEPTH_MM, len(depths))
+        if any(tips) and self._work.catheter is None:
+            refuse("insertion", "catheter_mm", catheter_mm, "0 without a catheter", "Insertion(..., catheter=...)")
+        for depth, tip in zip(depths, tips, strict=True):
+            if tip > depth:
+                advice = "a wire whose tip lies inside the catheter is not modelled: push it out or pull the tube back"
+                refuse("insertion", "catheter_mm", tip, f"{depth:g}, the wire's depth, or less", advice)
+        return self._each(depths, rolls, tips)
 
-    def _each(self, depths: list[float], rolls: list[float]) -> Iterator[Solution]:
+    def _each(self, depths: list[float], rolls: list[float], tips: list[float]) -> Iterator[Solution]:
         """Go to each depth, for as long as no later call has begun."""
         way = None
-        for depth, roll in zip(depths, rolls, strict=True):
+        for depth, roll, tip in zip(depths, rolls, tips, strict=True):
             self._hold()
             try:
                 if way is None:
@@ -129,6 +146,7 @@ class Insertion:
                     self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
                 if self._way is not way:
                     raise RuntimeError(f"insertion: to_depths: a later call has begun since; {ONE_AT_A_TIME}")
+                self._work.place["goal"] = tip
                 solution = self._go(depth, roll)
             finally:
                 self._lock.release()
@@ -179,6 +197,16 @@ def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[floa
     step = number("insertion", "step_mm", step_mm, LENGTH_MM)
     turn = number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
     return step, turn, number("insertion", "finest_mm", finest_mm, FINEST_MM)
+
+
+def _each_of(name: str, values: float | Sequence[float], allowed: Range, count: int) -> list[float]:
+    """One number for each of so many depths, from one for all or from a list of them."""
+    if not (isinstance(values, (list, tuple, np.ndarray)) and np.ndim(values) > 0):
+        return [number("insertion", name, values, allowed)] * count
+    each = _list(name, values, allowed)
+    if len(each) != count:
+        refuse("insertion", name, each, f"one number, or {count} as there are depths", "one per depth")
+    return each
 
 
 def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:

@@ -16,6 +16,7 @@ from solver._kernels.handle import Contents, handle_of
 from solver._kernels.insertion import advance
 from solver._kernels.minimise import CLOSED_FORM
 from solver._kernels.shaft import shaft_forces
+from solver.catheter import Catheter, sleeve_of
 from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
 from solver.solution import Snap, Solution, Status
@@ -72,6 +73,7 @@ class Workspace:
         limits: Limits,
         shaft_mm: float = 0.0,
         drag_N: float = 0.0,
+        catheter: Catheter | None = None,
     ) -> None:
         if limits.method == CLOSED_FORM and wire.twists:
             name, got = "torsional_stiffness_N_mm2", wire.torsional_stiffness_N_mm2
@@ -80,6 +82,7 @@ class Workspace:
         self.shaft_mm = float(shaft_mm)
         springs = np.zeros((1, 3, 3)), np.zeros(2), np.zeros((2, 2))
         self.shaft = data.Shaft(float(drag_N), float(wire.radius_mm), *springs)
+        self.catheter, self.sleeve = catheter, sleeve_of(wire, catheter)
         self.rule = look_up_rule(wire, wall, quadrature)
         self.field = wall.field if wall is not None else NO_FIELD
         # rolling a straight wire with one bending stiffness and a round, smooth hull changes nothing
@@ -120,7 +123,11 @@ class Workspace:
         segment = float(self.wire.segment_mm)
         cells = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, segment, cells)
-        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile, self.shaft_mm)
+        if self.sleeve.there:
+            self.sleeve = self.sleeve._replace(cells=np.zeros((capacity + 1, 2)))
+            tabulate(self.sleeve.profile, segment, self.sleeve.cells)
+        rest = self.skips.profile, self.shaft_mm, self.sleeve
+        self.table = WireTable(self.wire.profile, self.rule, cells, segment, *rest)
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
@@ -207,7 +214,9 @@ class Workspace:
         # the same arrays, and as read-only as they were: to numba that is a type
         self.field = self.wall.field if self.wall is not None else NO_FIELD
         self.problem = self.problem._replace(field=self.field)
-        self.table = self.table._replace(profile=self.wire.profile)
+        made = sleeve_of(self.wire, self.catheter)
+        self.sleeve = made._replace(tip=self.sleeve.tip, cells=self.sleeve.cells)
+        self.table = self.table._replace(profile=self.wire.profile, sleeve=self.sleeve)
         self.counts = self.counters.view(np.int64)
         self._bind()
 
@@ -239,7 +248,7 @@ class Workspace:
         if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
             # half of the first segment's weight hangs at the entry, where no joint can move
             force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
-        _, _, energy, *_, dissipated, calm, _, snaps = self.place.item(0)
+        _, _, energy, *_, dissipated, calm, _, _, _, _, _, stored, snaps = self.place.item(0)
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
         for array in arrays:
             array.setflags(write=False)
@@ -249,7 +258,7 @@ class Workspace:
             joints_mm=arrays[0],
             frames=arrays[1],
             energy_N_mm=energy,
-            bending_energy_N_mm=bending,
+            bending_energy_N_mm=bending + stored,
             wall_energy_N_mm=wall,
             friction_energy_N_mm=self.place["rubbed"].item(0),
             status=status,
@@ -262,7 +271,7 @@ class Workspace:
             depth_mm=depth_mm,
             roll_deg=roll_deg,
             counts=self.counters.item(0),
-            start_energy_N_mm=start,
+            start_energy_N_mm=start + stored,
             least_pivot=pivot,
             dissipated_N_mm=dissipated,
             snaps=tuple(Snap(*self.snaps.item(n)) for n in range(snaps)),

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.polyline import angle_deg, at_arc
-from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
+from pipeline.model import Array, Clamp, Curve, Lumen, OverWire, Wall, Wire
 from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
-from solver import GuideWire, Insertion, Solution, VesselWall
+from solver import Catheter, GuideWire, Insertion, Solution, VesselWall
 
 REACH_MM = 8.0
 """Length of wire behind the entry that is used: long against the trace's error, short against a vessel's bend."""
@@ -85,12 +85,17 @@ def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> G
     )
 
 
-def simulate(insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> Iterator[Solution]:
-    """Yield the simulated wire at each depth (mm from the clamp to the tip) and roll, in the order given.
+def simulate(
+    insertion: Insertion,
+    depths_mm: Sequence[float],
+    roll_deg: Sequence[float],
+    catheter_mm: Sequence[float] | None = None,
+) -> Iterator[Solution]:
+    """Yield the simulated wire at each depth (mm from the clamp to the tip), roll and catheter, in the order given.
 
     A depth that cannot be reached is a status, not an exception; the last good state goes on to the next depth.
     """
-    return insertion.to_depths(list(depths_mm), roll_deg=list(roll_deg))
+    return insertion.to_depths(list(depths_mm), list(roll_deg), 0.0 if catheter_mm is None else list(catheter_mm))
 
 
 def insertion_of(
@@ -100,6 +105,7 @@ def insertion_of(
     clamp: Clamp,
     solver: SolverConfig = SolverConfig(),
     config: SimulateConfig = SimulateConfig(),
+    catheter: OverWire | None = None,
 ) -> Insertion:
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
@@ -116,4 +122,5 @@ def insertion_of(
         step_mm=solver.step_mm,
         down=clamp.down,
         finest_mm=solver.finest_mm,
+        catheter=None if catheter is None else Catheter(catheter.bending_stiffness_N_mm2, catheter.radius_mm),
     )

@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
-from pipeline.model import Wall, Wire
+from pipeline.model import OverWire, Wall, Wire
 from pipeline.ranges import Axis, Direction, Finite, Positive, Vector
 from pipeline.status import InputError, did_you_mean
 
@@ -118,6 +118,7 @@ class Case(Strict):
     truth: PathText | None = None
     wall: Wall = Wall()
     down: Axis | None = None
+    catheter: OverWire | None = None
 
     @property
     def frame_count(self) -> int:
@@ -127,7 +128,9 @@ class Case(Strict):
     @property
     def lists(self) -> dict[str, Any]:
         """What must have one entry per frame."""
-        return {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
+        catheter = self.catheter and self.catheter.insertion_mm
+        named = {"insertion_mm": self.insertion_mm, "catheter insertion_mm": catheter}
+        return {**named, "roll_deg": self.roll_deg, "traces": self.traces}
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
@@ -142,6 +145,24 @@ class Case(Strict):
         if self.wire.weight_N_per_mm > 0 and self.down is None:
             problem = f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
             raise _problem(problem)
+        return self
+
+    @model_validator(mode="after")
+    def _catheter_over_the_wire(self) -> "Case":
+        if self.catheter is None:
+            return self
+        radius, own = self.catheter.radius_mm, self.wire.radius_mm
+        problems = [f"catheter radius_mm = {radius:g} is no more than the wire's {own:g}; a catheter goes over it"]
+        problems *= radius <= own
+        tips = self.catheter.insertion_mm
+        depths = self.insertion_mm or ()
+        each = tips if isinstance(tips, tuple) else (tips,) * len(depths)
+        for frame, (tip, depth) in enumerate(zip(each, depths, strict=False)):
+            if tip > depth:
+                what = f"catheter insertion_mm = {tip:g} of frame {frame} is deeper than the wire, {depth:g}"
+                problems.append(f"{what}; a wire whose tip lies inside the catheter is not modelled")
+        if problems:
+            raise _problem(*problems)
         return self
 
     @model_validator(mode="after")
@@ -259,6 +280,7 @@ def _siblings(location: tuple[int | str, ...]) -> set[str]:
         "case": set(Case.model_fields),
         "wires": {item.name for item in fields(Wire)} - {"name"},
         "wall": {item.name for item in fields(Wall)},
+        "catheter": {item.name for item in fields(OverWire)},
     }
     nearest = next((part for part in reversed(location[:-1]) if part in tables), None)
     return tables[str(nearest)] if nearest else {"schema", "wires", "case"}

@@ -40,6 +40,18 @@ def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
 
 
 @kernel
+def profile_at(at: Any, value: Any, s: float) -> float:
+    """A piecewise linear function of the distance from the tip; at a jump the value further out."""
+    n = at.size
+    if s < at[0]:
+        return float(value[0])
+    for i in range(n - 1):
+        if s < at[i + 1]:
+            return float(value[i] + (value[i + 1] - value[i]) * (s - at[i]) / (at[i + 1] - at[i]))
+    return float(value[n - 1])
+
+
+@kernel
 def cell(profile: Profile, inner: float, outer: float) -> tuple[float, float]:
     """Compliance 1/c and rest bend of a joint whose cell reaches from ``inner`` to ``outer`` mm from the tip."""
     compliance = integral(profile.stiffness_at, profile.stiffness, outer, True)

@@ -59,6 +59,22 @@ class Rule(NamedTuple):
     zone: int
 
 
+class Sleeve(NamedTuple):
+    """A catheter over the wire, see ``sleeve``.
+
+    there : whether there is one.     tip : (1,), mm beyond the entry.
+    profile, cells : as in ``WireTable``, of the pair.
+    stored_at, stored : (n,) energy of the pair at its rest, N mm per mm, by the distance from the wire's tip.
+    """
+
+    there: bool
+    tip: Any
+    profile: Profile
+    cells: Any
+    stored_at: Any
+    stored: Any
+
+
 class WireTable(NamedTuple):
     """What a wire of any depth is cut from.
 
@@ -72,6 +88,7 @@ class WireTable(NamedTuple):
     segment: float
     tabled: bool
     shaft: float
+    sleeve: Sleeve
 
 
 class Chain(NamedTuple):

@@ -6,6 +6,7 @@ from typing import Any
 from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import dot, load3, load9, store3, store9
+from solver._kernels.chain import profile_at
 from solver._kernels.data import CURRENT, Chain, Field, Problem, WireTable
 from solver._kernels.flags import cached, kernel, merged
 from solver._kernels.friction import friction_force
@@ -39,15 +40,14 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
 
 
 @kernel
-def profile_at(at: Any, value: Any, s: float) -> float:
-    """A piecewise linear function of the distance from the tip; at a jump the value further out."""
-    n = at.size
-    if s < at[0]:
-        return float(value[0])
-    for i in range(n - 1):
-        if s < at[i + 1]:
-            return float(value[i] + (value[i + 1] - value[i]) * (s - at[i]) / (at[i + 1] - at[i]))
-    return float(value[n - 1])
+def bends(table: WireTable, depth: float, s: float) -> tuple[float, float]:
+    """Compliance per mm, 1/(N mm²), and rest curvature, 1/mm, at a distance from the tip of a wire at a depth."""
+    sleeve = table.sleeve
+    if sleeve.there and s >= depth - sleeve.tip[0]:
+        pair = sleeve.profile
+        return 1.0 / profile_at(pair.stiffness_at, pair.stiffness, s), profile_at(pair.rest_at, pair.rest, s)
+    own = table.profile
+    return 1.0 / profile_at(own.stiffness_at, own.stiffness, s), profile_at(own.rest_at, own.rest, s)
 
 
 @cached
@@ -56,9 +56,9 @@ def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: 
 
     The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
     share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
-    weight : (3,) N per mm of wire, of which the first segment gains.
+    weight : (3,) N per mm of wire, of which the first segment gains. A catheter goes in with the wire.
     """
-    chain, profile, u = problem.chain, table.profile, problem.state.u[CURRENT]
+    chain, u = problem.chain, problem.state.u[CURRENT]
     depth = 0.0
     for j in range(k):
         depth += chain.length[j]
@@ -66,25 +66,38 @@ def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: 
     force = report.force[0] * ahead[0, 2] + report.force[1] * ahead[1, 2] + report.force[2] * ahead[2, 2]
     force -= 0.5 * chain.length[0] * (weight[0] * ahead[0, 2] + weight[1] * ahead[1, 2] + weight[2] * ahead[2, 2])
     inner = depth - 0.5 * chain.length[0]
-    flexible = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, inner)
-    rest = profile_at(profile.rest_at, profile.rest, inner)
+    flexible, rest = bends(table, depth, inner)
+    flexible_in, rest_in = bends(table, depth, depth)
+    if table.sleeve.there:
+        force += profile_at(table.sleeve.stored_at, table.sleeve.stored, depth)
     for j in range(min(k, 2)):
         compliance, bend = 0.5 * flexible, 0.5 * rest
         if j == 0:
-            compliance = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, depth) - compliance
-            bend = profile_at(profile.rest_at, profile.rest, depth) - bend
+            compliance, bend = flexible_in - compliance, rest_in - bend
         moment = chain.bend[j] ** 2 * (u[j, 0] ** 2 + u[j, 1] ** 2)
         force -= 0.5 * moment * compliance
         if problem.twisting:
-            force -= 0.25 * (chain.twist[j] * u[j, 2]) ** 2 / profile.twist
+            force -= 0.25 * (chain.twist[j] * u[j, 2]) ** 2 / table.profile.twist
         e = turn(0.0, load3(u, j))
         force += bend * dot(load3(report.turned, j), e[3:6])
-    if k > 1:
-        # half of node 1's cell lies on the first segment
-        for p in range(chain.first[1], chain.first[2]):
-            if chain.offset[p, 2] == 0.0:
-                d = problem.state.penetration[CURRENT, p]
-                force += 0.5 * wall_law.energy_per_mm(problem.stiffness, d) / table.rule.hull.shape[0]
+    return float(force + wall_gained(problem, table))
+
+
+@kernel
+def wall_gained(problem: Problem, table: WireTable) -> float:
+    """What the wall under the first segment adds to the push force, N: more wire lies there, and moves less."""
+    chain, state, force = problem.chain, problem.state, 0.0
+    for p in range(chain.first[1], chain.first[2]):
+        d, back = state.penetration[CURRENT, p], -chain.offset[p, 2] / chain.length[0]
+        if d == 0.0:
+            continue
+        # half of node 1's cell lies on the first segment, and all that a point inside it stands for
+        gains = chain.weight[p] / chain.length[0] if back != 0.0 else 0.5 / table.rule.hull.shape[0]
+        force += gains * wall_law.energy_per_mm(problem.stiffness, d)
+        jet, ahead = state.jet[CURRENT, p], state.r[CURRENT, 1]
+        slope = jet[1] * ahead[0, 2] + jet[2] * ahead[1, 2] + jet[3] * ahead[2, 2]
+        # such a point stays behind, in proportion
+        force -= back * wall_law.force(problem.stiffness, chain.weight[p], d) * slope
     return float(force)
 
 

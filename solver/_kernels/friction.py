@@ -109,7 +109,10 @@ def take_loads(problem: Problem, slot: int, k: int) -> float:
             largest = max(largest, load)
             friction.load[p] = load
         store_start(problem, n)
-    return change / largest if largest > 0.0 else 0.0
+    if largest > 0.0:
+        return change / largest
+    # a wire that friction has lifted off the wall is not at rest without it
+    return 1.0 if change > 0.0 else 0.0
 
 
 @inlined

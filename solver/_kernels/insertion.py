@@ -17,6 +17,7 @@ from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, settle_shaft
+from solver._kernels.sleeve import put_over, stored_energy
 from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, follow, note_change
 
@@ -50,13 +51,14 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
     counters = handle.problem.scratch.counters[0]
     # a cap on the time that a hopeless scene can take
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
+    steps += abs(at.goal - at.catheter) / introducer.step
     limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
     outcome, iterations = data.CONVERGED, 0
     at.dissipated, at.snaps, at.seen_depth = 0.0, 0, math.nan
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         counters.rolls_proven_idle += 1
-    while laid > 0 or abs(to_depth - at.inserted) >= tol.MATCH_DEPTH_MM or at.roll != to_roll:
+    while laid > 0 or not arrived(at, to_depth, to_roll):
         outcome, used = step(handle, to_depth, to_roll, laid)
         iterations += used
         if laid > 0:
@@ -77,6 +79,12 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
     return outcome, iterations
 
 
+@inlined
+def arrived(at: Any, depth: float, roll: float) -> bool:
+    """Whether wire, roll and catheter are where they are to go."""
+    return bool(abs(depth - at.inserted) < tol.MATCH_DEPTH_MM and at.roll == roll and at.catheter == at.goal)
+
+
 @merged
 def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Take one step towards a depth and roll, or take it back where it fails; return outcome and iterations.
@@ -95,18 +103,20 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     outcome, used, energy = data.CONVERGED, 0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
-        start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
+        start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy - at.stored)
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
         outcome = where(problem, handle.introducer.margin, k, laid)
+    energy += stored_energy(handle.table, depth)
     if outcome == data.CONVERGED and laid == 0:
         outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), used)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
         at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
+        at.catheter, at.stored = at.next, stored_energy(handle.table, depth)
         if problem.friction.coefficient > 0.0:
             at.rubbed += settle_friction(problem, k)
         if problem.shaft.drag > 0.0:
@@ -127,15 +137,19 @@ def where(problem: Problem, margin: float, k: int, laid: int) -> int:
 
 @merged
 def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
-    """Depth, mm, and roll, degrees, that the next step leads to."""
-    at = handle.place[0]
+    """Depth, mm, and roll, degrees, that the next step leads to; a catheter goes on in proportion."""
+    at, goal = handle.place[0], handle.place[0].goal
     if not math.isnan(at.seen_depth):
         # to where a rough step led, for the two ways to be compared there
-        to_depth, to_roll = at.seen_depth, at.seen_roll
+        to_depth, to_roll, goal = at.seen_depth, at.seen_roll, at.seen_catheter
     ahead, turn = to_depth - at.inserted, to_roll - at.roll
-    longest = at.shrink * allowed(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
+    longest = allowed(handle.problem, handle.table, handle.introducer, at.inserted, ahead, turn)
+    if goal != at.catheter:
+        longest = min(longest, handle.introducer.step / abs(goal - at.catheter))
+    longest *= at.shrink
     # the way in equal steps, none longer than that but for a small overshoot
     share = 1.0 / max(math.ceil((1.0 - tol.OVERSHOOT) / longest), 1.0)
+    at.next = at.catheter + share * (goal - at.catheter) if share < 1.0 else goal
     return at.inserted + share * ahead, at.roll + share * turn
 
 
@@ -176,6 +190,7 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
     handle.report[1] = report
     k, first = segments_at(depth, table.segment)
     clamp(problem, introducer, roll)
+    table.sleeve.tip[0] = handle.place[0].next
     if problem.shaft.drag > 0.0:
         anchor_shaft(problem, was, depth - inserted, math.radians(roll - handle.place[0].roll))
     if k > 2 and table.tabled:
@@ -194,8 +209,10 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
 def take_back(handle: Any) -> None:
     """Put the last good state back."""
     was, first = segments_at(handle.place[0].inserted, handle.table.segment)
+    handle.table.sleeve.tip[0] = handle.place[0].catheter
     if was > 0:
         lay_out(handle.problem.chain, handle.table, was, first)
+        put_over(handle.problem.chain, handle.table, was)
         put_load(handle.problem.chain, handle.introducer, was)
     copy_state(handle.problem, data.LAST_GOOD, data.CURRENT, was)
     handle.report[0] = handle.report[1]
@@ -221,6 +238,7 @@ def lay_along(
     chain, state = problem.chain, problem.state
     before = chain.length[0]
     lay_out(chain, table, k, first)
+    put_over(chain, table, k)
     if problem.twisting:
         # twist stays with the material, which is counted from the tip
         for j in range(k):

@@ -72,8 +72,9 @@ Closed form. share : of its own step.     next_check : iteration at which it is 
 """
 PLACE = record(
     *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")),
-    *((name, float) for name in ("seen_depth", "seen_roll", "seen_calm")),
+    *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm")),
     *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
+    *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
     ("snaps", np.int64),
 )
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
@@ -81,8 +82,10 @@ step, mm (0 after a roll).
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
 by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.
-seen_depth, seen_roll : where a rough step led that is being taken again; nan where there is none.     seen_calm : what
-calm was before it.
+seen_depth, seen_roll, seen_catheter : where a rough step led that is being taken again; nan where there is none.
+seen_calm : what calm was before it.
+catheter, goal, next : its tip, where it is to go, and where this step takes it, mm beyond the entry.     pull : the
+force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
 """An event: depths before and after, energy released, the largest way of a joint."""

@@ -91,7 +91,9 @@ def foot(field: Field, q: Three, level: float, weights: Any, jet: Any) -> Foot:
     """Go down the distance from a place until it is ``level``, mm, or until a lumen too narrow for that is deepest."""
     c, v = field.coefficients, distance(field, q)
     for _ in range(tol.FOOT_STEPS):
-        if v <= level:
+        if v <= level + tol.FOOT_MM:
+            # the last of these steps ends a rounding above the level or below it
+            v = min(v, level)
             break
         fill_jet(c, field.to_index, locate(c, indices(field.to_index, field.origin, q)), weights, jet)
         g = (jet[1], jet[2], jet[3])

@@ -14,6 +14,7 @@ from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import merged
 from solver._kernels.forces import push_force
 from solver._kernels.minimise import NEWTON
+from solver._kernels.sleeve import tip_force
 
 
 @merged
@@ -26,10 +27,18 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     ahead, turn = reached[0] - at.inserted, math.radians(reached[1] - at.roll)
     push = push_force(problem, handle.table, introducer.weight, k, report) if k > 0 else 0.0
     torque = report.torque[2] if k > 0 else 0.0
-    lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn) - (reached[2] - at.energy)
+    pull, onwards = 0.0, at.next - at.catheter
+    if handle.table.sleeve.there and k > 0:
+        pull = tip_force(problem, handle.table, k)
+        # the wire's hand pushes it through a catheter that stays
+        push -= pull
+    lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn + (pull + at.pull) * onwards)
+    lost -= reached[2] - at.energy
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
+    work += max(abs(pull), abs(at.pull)) * abs(onwards)
     large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy))
-    share = max(abs(ahead) / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
+    share = max(abs(ahead), abs(onwards)) / introducer.step
+    share = max(share, abs(reached[1] - at.roll) / introducer.turn)
     soft, pending = report.pivot < tol.SOFT, not math.isnan(at.seen_depth)
     if soft:
         doubtful = used > tol.TOIL or (used > tol.EASY and abs(lost) > tol.SOFT_SHARE * large)
@@ -46,14 +55,14 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     if doubtful and lost > large:
         note_snap(problem, at, k, segments_at(at.inserted, handle.table.segment)[0], (reached[0], lost))
     trust(handle, k, reached, doubtful)
-    at.push, at.torque, at.dissipated = push, torque, at.dissipated + lost
+    at.push, at.torque, at.pull, at.dissipated = push, torque, pull, at.dissipated + lost
     return CONVERGED
 
 
 @merged
 def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, float]) -> None:
     """Keep the wire that a rough step led to, for that of shorter steps to be held against it."""
-    at.seen_depth, at.seen_roll, at.seen_calm = reached[0], reached[1], at.calm
+    at.seen_depth, at.seen_roll, at.seen_catheter, at.seen_calm = reached[0], reached[1], at.next, at.calm
     for n in range(k + 1):
         store3(problem.scratch.seen, n, load3(problem.state.x[CURRENT], n))
 
@@ -71,7 +80,8 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
         at.calm += ahead
     if doubtful or report.pivot < tol.CRITICAL:
         at.calm = 0.0
-    if abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) < tol.MATCH_DEPTH_MM:
+    left = abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) + abs(at.next - at.seen_catheter)
+    if left < tol.MATCH_DEPTH_MM:
         same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
         at.calm = at.seen_calm + ahead if same and report.pivot > tol.LOOSE else 0.0
         at.seen_depth = math.nan

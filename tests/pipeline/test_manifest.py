@@ -67,6 +67,22 @@ def test_natural_order() -> None:
         (("schema = 1", "schema = 2"), "schema"),
         (('wire = "soft"', 'wire = "soft"\nroll_deg = "fit"'), "cannot be carried out in this version"),
         (('wire = "soft"', 'wire = "soft"\nparameters = "x.toml"'), "cannot be read in this version"),
+        *(
+            (("entry_mm", f"catheter = {{ {keys} }}\nentry_mm"), expected)
+            for keys, expected in (
+                ("radius_mm = 0.9, insertion_mm = 1.0", "catheter bending_stiffness_N_mm2: missing"),
+                ("bending_stiffness_N_mm2 = -1, radius_mm = 0.9, insertion_mm = 1.0", "greater than or equal to 0"),
+                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion = 1.0", "did you mean 'insertion_mm'?"),
+                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = [1, 2]", "has 2 entries for 3 frames"),
+                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = -1", "greater than or equal to 0"),
+                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.1, insertion_mm = 1", "no more than the wire's 0.18"),
+                (
+                    "bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = [1, 9, 3] }\nspacing_mm = [1, 1, 1]\n"
+                    "insertion_mm = [4, 8, 12] #",
+                    "insertion_mm = 9 of frame 1 is deeper than the wire, 8",
+                ),
+            )
+        ),
         (('wire = "soft"', 'wire = "soft"\ninsertion_mm = [1.0]'), "insertion_mm has 1 entries for 3 frames"),
     ],
 )

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
+from pipeline.cli import main
 from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
-from pipeline.run.stages.load import rolls
+from pipeline.run.stages.load import each_frame
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
@@ -62,6 +64,28 @@ def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
     assert last.joints_mm[-1, 1] == pytest.approx(1e-5 * 12.0**4 / (8 * 0.6), rel=0.01)
 
 
+STUDY = MANIFEST.replace("none.stl", "tube.swc").replace("6.0, 12.0", "10.0, 10.0, 14.0")
+CATHETER = "catheter = {bending_stiffness_N_mm2 = 50.0, radius_mm = 0.9, insertion_mm = [0.0, 9.0, 4.0]}\n"
+
+
+def test_a_catheter_is_a_key_of_the_case(tmp_path: Path) -> None:
+    """From the manifest through check and run: it straightens the second frame and, drawn back, lets the third bend."""
+    (tmp_path / "tube.swc").write_text("1 0 0 0 -5 6 -1\n2 0 0 0 25 6 1\n")
+    path, tips = tmp_path / "manifest.toml", {}
+    for name, text in (("bare", STUDY), ("over", STUDY + CATHETER)):
+        path.write_text(text)
+        assert main(["check", str(path)]) == 0
+        assert main(["run", str(path), "-o", str(tmp_path / name), "--set", "solver.segment_mm=0.5"]) == 0
+        with h5py.File(next((tmp_path / name).rglob("frames.h5"))) as file:
+            tips[name] = [np.asarray(file[f"frames/{n:03d}/simulated_mm"])[-1] for n in range(3)]
+    np.testing.assert_allclose(tips["over"][0], tips["bare"][0], atol=1e-6)
+    assert np.hypot(*tips["over"][1][:2]) < 0.2 * np.hypot(*tips["bare"][1][:2])
+    # 8 mm of hook are 10 mm beyond the catheter: only where it is clamped, nothing changes
+    np.testing.assert_allclose(tips["over"][2], tips["bare"][2], atol=1e-3)
+    path.write_text(STUDY + CATHETER.replace("9.0", "10.5"))
+    assert main(["check", str(path)]) == 2
+
+
 def test_a_weight_without_down_is_a_problem_of_the_manifest(tmp_path: Path) -> None:
     path, weighed = tmp_path / "manifest.toml", MANIFEST.replace("radius_mm", "weight_N_per_mm = 8e-6\nradius_mm")
     path.write_text(weighed)
@@ -108,8 +132,8 @@ def test_scales_reach_the_wire(case: Case) -> None:
 
 
 def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:
-    assert rolls(15.0, 2) == (15.0, 15.0)
-    assert rolls((10.0, 20.0), 2) == (10.0, 20.0)
+    assert each_frame(15.0, 2) == (15.0, 15.0)
+    assert each_frame((10.0, 20.0), 2) == (10.0, 20.0)
 
 
 def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:

@@ -23,6 +23,18 @@ def test_forces_balance_and_push_force_is_the_slope_of_the_energy() -> None:
     assert middle.max_penetration_mm > 0.01
 
 
+@pytest.mark.parametrize("quadrature", ["joints", "tip", "segments"])
+@pytest.mark.parametrize("hull", ["offset", "samples:6"])
+@pytest.mark.parametrize("depth", [0.6, 2.3, 9.3])
+def test_push_force_where_the_first_segment_touches(quadrature: str, hull: str, depth: float) -> None:
+    """The clamp lies in the wall: what is looked up inside the first segment grows with it, too."""
+    wall = VesselWall(tube_grid(), 20.0, hull=hull)
+    wire = GuideWire(1.0, 0.4, 5.0, 0.1)
+    insertion = Insertion(wire, wall, [1.75, 0.1, 0], [0.1, 0, 1], quadrature=quadrature, tolerance=1e-13)
+    low, middle, high = list(insertion.to_depths([*np.arange(0.4, depth, 0.4), depth - 1e-3, depth, depth + 1e-3]))[-3:]
+    assert middle.push_force_N == pytest.approx((high.energy_N_mm - low.energy_N_mm) / 2e-3, rel=1e-4)
+
+
 def test_reaction_torque_is_the_slope_of_the_energy_in_roll() -> None:
     wire = GuideWire(1.0, 0.18, STIFFNESS, 0.03)
     wall = VesselWall(bend_grid(), 1.0)

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import solver
-from solver import Grid, GuideWire, Insertion, VesselWall, relax, skips, warm_up
+from solver import Catheter, Grid, GuideWire, Insertion, VesselWall, relax, skips, warm_up
 from tests.solver.scenes import tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -91,6 +91,10 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "torsional_stiffness_N_mm2": [v for v in NOT_NUMBERS if v is not np.inf] + HUGE + BELOW,
         },
     ),
+    "catheter": (
+        lambda **how: Catheter(**({"bending_stiffness_N_mm2": 50.0, "radius_mm": 0.9} | how)),
+        {"bending_stiffness_N_mm2": NOT_NUMBERS + HUGE + [-1.0], "radius_mm": NOT_NUMBERS + HUGE + BELOW},
+    ),
     "wall": (
         wall,
         {
@@ -137,6 +141,7 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
         | METHOD
         | {
             "initial": NOT_WORDS,
+            "catheter": ["x", 1.0, WIRE, Catheter],
             "step_mm": NOT_NUMBERS + HUGE + BELOW + [1e-12],
             "roll_step_deg": NOT_NUMBERS + HUGE + BELOW + [1e-12],
             "finest_mm": [n for n in NOT_NUMBERS if n is not np.inf] + BELOW + [1e-12],
@@ -170,6 +175,7 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             ],
             "roll_deg": [v for v in NOT_NUMBERS if np.shape(v) != (2,)]
             + [[0.0, 0.0, 0.0], [0.0, np.nan], ["0", "0"], [[0.0, 0.0]], [True, False], np.array([True, False]), 1e9],
+            "catheter_mm": [v for v in NOT_NUMBERS if np.shape(v) != (2,)] + [[0.0], [0.0, np.nan], -1.0, 1.0],
         },
     ),
     "relax": (
@@ -232,7 +238,7 @@ def test_what_cannot_be_used_is_refused_by_name_at_the_call(call: Callable[..., 
 def test_no_public_argument_is_left_out() -> None:
     """What stands in ``solver.__all__``, its public methods, and every argument of theirs is in the list above."""
     listed = {name: set(arguments) for name, (_, arguments) in DOORS.items()}
-    classes = {"wire": GuideWire, "wall": VesselWall, "grid": Grid, "insertion": Insertion}
+    classes = {"wire": GuideWire, "catheter": Catheter, "wall": VesselWall, "grid": Grid, "insertion": Insertion}
     calls: dict[str, Any] = dict(classes) | {"relax": relax, "warm_up": warm_up}
     for kind in classes.values():
         calls |= {n: f for n, f in vars(kind).items() if inspect.isfunction(f) and not n.startswith("_")}

@@ -166,3 +166,17 @@ def test_room_for_a_longer_wire_keeps_contact_and_friction() -> None:
     assert np.abs(there.contact_force_N).max() > 1e-3
     np.testing.assert_array_equal(again.contact_force_N, there.contact_force_N)
     assert again.push_force_N == pytest.approx(there.push_force_N, rel=1e-12)
+
+
+def test_a_wire_that_leaves_the_wall_takes_no_friction_along() -> None:
+    """A hook rolled on a wall of high friction until it lets go, in few and in many turns: then nothing bends it."""
+    wall = VesselWall(sampled(lambda p: np.abs(p[..., 1]) - 2.2, 0.6, (-16, -7, -6), (16, 7, 40)), 0.7, friction=0.4)
+    wire = GuideWire(0.68, 0.18, [[0, 3.0], [30, 5.6]], [[0, 0.08], [10, 0.08], [10, 0.0]])
+    insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[0, 1, 0])
+    free = 0
+    for solution in insertion.to_depths([12.0] * 30, np.arange(30) * 30.0):
+        if solution.converged and not solution.contact_force_N.any():
+            free += 1
+            # rest, but for the last place of a tip that may touch without a load
+            assert solution.energy_N_mm < 1e-12
+    assert free > 5

@@ -1,13 +1,15 @@
 """Random scenes: a moderate plan is drawn, then made extreme along one to three axes of stress."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from pipeline.benchmark.stress.plan import ScenePlan
+from pipeline.benchmark.stress.lumens import NEAR
+from pipeline.benchmark.stress.plan import ScenePlan, side_angle
+from pipeline.benchmark.stress.rubbing import RUBBING_MM
 
 Rng = np.random.Generator
 Changes = dict[str, Any]
@@ -15,11 +17,11 @@ Changes = dict[str, Any]
 LUMENS = ("straight", "bend", "siphon", "sphere", "channel")
 
 
-def draw(seed: int, index: int) -> ScenePlan:
-    """Scene ``index`` of the study ``seed``: the same one every time, in any order."""
+def draw(seed: int, index: int, among: Sequence[str] = ()) -> ScenePlan:
+    """Scene ``index`` of the study ``seed``: the same one every time, in any order. among : axes, default all."""
     rng = np.random.default_rng([seed, index])
     plan = moderate(rng, seed, index)
-    names = list(AXES)
+    names = list(among or AXES)
     first = names[index % len(names)]
     others = rng.choice([n for n in names if n != first], size=int(rng.integers(0, 3)), replace=False)
     plan.axes = (first, *(str(n) for n in others))
@@ -145,6 +147,32 @@ def _closed_form(plan: ScenePlan, rng: Rng) -> Changes:
     return {"method": "closed_form", "joints": min(plan.joints, 40), "rolls": rolls, "max_iterations": limit}
 
 
+def _septum(plan: ScenePlan, rng: Rng) -> Changes:
+    """A vessel or a limb close by, behind a wall of up to 4 voxels; a soft wire, curved at its tip, and a soft wall."""
+    voxel, soft, curvature = rng.uniform(0.2, 0.4), _log_uniform(rng, 0.2, 3.0), rng.uniform(0.0, 0.4)
+    # every second tip points at the other vessel, which lies along x
+    towards = -np.degrees(side_angle(plan)) - 90.0
+    return {
+        "lumen": str(rng.choice(NEAR)),
+        "lumen_mm": rng.uniform(0.8, 1.5),
+        "septum_mm": voxel * rng.uniform(0.0, 4.0),
+        "voxel_mm": (voxel, voxel, voxel),
+        "stiffness": [[0.0, soft], [15.0, 4.0 * soft]],
+        "rest": [[0.0, curvature], [6.0, curvature], [6.0, 0.0]],
+        "wall_stiffness": _log_uniform(rng, 0.1, 10.0),
+        "joints": max(1, round(rng.uniform(8.0, 30.0) / plan.segment_mm)),
+        "rolls": [float(towards)] if rng.random() < 0.5 else plan.rolls,
+    }
+
+
+def _rubbing(plan: ScenePlan, rng: Rng) -> Changes:
+    """Friction in small steps, in and out again, so that the hand's work can be added up."""
+    end = plan.length_mm * rng.uniform(0.3, 0.9)
+    way = end + RUBBING_MM
+    changes = {"way": "insertion", "friction": rng.uniform(0.0, 0.5), "joints": min(plan.joints, 200)}
+    return {**changes, "depths": [*way.tolist(), *way[-2::-1].tolist()], "rolls": plan.rolls[:1]}
+
+
 AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     # from next to nothing to hard
     "wall_stiffness": lambda _, rng: {"wall_stiffness": _log_uniform(rng, 1e-3, 1e6)},
@@ -200,5 +228,7 @@ AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     # an iteration limit that is too low: it must be said, and the state must be sound
     "few_iterations": lambda _, rng: {"max_iterations": int(rng.integers(1, 6))},
     "closed_form": _closed_form,
+    "septum": _septum,
+    "rubbing": _rubbing,
 }
 """Each makes one thing of a scene extreme. The order is part of what a seed stands for."""

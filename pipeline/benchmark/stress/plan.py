@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.benchmark.stress.lumens import NEAR, near_vessels
 from pipeline.benchmark.stress.statics import Array
 from pipeline.benchmark.vessels import lumen_distance
 from solver import Grid
@@ -18,10 +19,12 @@ BOXES = {
     "channel": ([-16.0, -7.0, -6.0], [16.0, 7.0, 60.0]),
     "voxel": ([-5.0, -5.0, -5.0], [5.0, 5.0, 12.0]),
     "thread": ([-5.0, -5.0, -5.0], [5.0, 5.0, 30.0]),
+    **dict.fromkeys(NEAR, ([-4.0, -4.0, -4.0], [9.0, 4.0, 30.0])),
 }
 """The grid's two corners for each kind of lumen, mm."""
 SHOWN = (
-    "way", "lumen", "segment_mm", "joints", "wall_stiffness", "hull", "quadrature", "dtype", "method"
+    "way", "lumen", "segment_mm", "joints", "wall_stiffness", "friction", "septum_mm", "hull", "quadrature", "dtype",
+    "method",
 )  # fmt: skip
 """What the table of scenes shows of a plan."""
 
@@ -32,6 +35,7 @@ class ScenePlan:
 
     way : "relax" (one relaxation from a start shape) or "insertion" (depth after depth).
     lumen : kind of vessel; ``lumen_mm`` its radius, ``voxel_mm`` (3,) the grid's spacing.
+    septum_mm : wall between it and another one near it.
     stiffness, rest : rows [distance from tip mm, value].     start : (m, 3) polyline of a relaxation, or None.
     """
 
@@ -56,6 +60,7 @@ class ScenePlan:
     lumen_mm: float = 2.0
     voxel_mm: tuple[float, float, float] = (0.8, 0.8, 0.8)
     dtype: str = "float32"
+    septum_mm: float = 1.0
     stenosis: float = 1.0
     noise_mm: float = 0.0
     defect: str = ""
@@ -90,7 +95,10 @@ def lumen_grid(plan: ScenePlan) -> Grid:
         where = np.argwhere(inside & (points[..., 2] > -1.0))[: 1 if plan.lumen == "voxel" else None]
         values[tuple(where.T)] *= -1.0
     else:
-        values = lumen_distance(plan.lumen, points, plan.lumen_mm)
+        if plan.lumen in NEAR:
+            values = near_vessels(plan.lumen, points, plan.lumen_mm, plan.septum_mm).min(axis=0)
+        else:
+            values = lumen_distance(plan.lumen, points, plan.lumen_mm)
         middle = 0.5 * (axes[2][0] + axes[2][-1])
         narrow = (1.0 - plan.stenosis) * plan.lumen_mm * np.exp(-(((points[..., 2] - middle) / 2.5) ** 2))
         values = values + narrow
@@ -111,11 +119,15 @@ def placement(plan: ScenePlan) -> tuple[Array, Array]:
     return turn, plan.far_mm * rng.uniform(-1.0, 1.0, 3)
 
 
+def side_angle(plan: ScenePlan) -> float:
+    """Angle about the vessel at which the entry lies off its axis, rad; a curved tip bends a right angle beyond it."""
+    return float(np.random.default_rng([plan.seed, plan.index, 3]).uniform(0.0, 2 * np.pi))
+
+
 def entry(plan: ScenePlan) -> tuple[Array, Array, Array]:
     """Entry point, direction and material axis of the plan, in the scene's place."""
-    rng = np.random.default_rng([plan.seed, plan.index, 3])
     turn, shift = placement(plan)
-    about = rng.uniform(0.0, 2 * np.pi)
+    about = side_angle(plan)
     side = np.array([np.cos(about), np.sin(about), 0.0])
     tilt = np.deg2rad(plan.tilt_deg)
     direction = np.cos(tilt) * np.array([0.0, 0.0, 1.0]) + np.sin(tilt) * side

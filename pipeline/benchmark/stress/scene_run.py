@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.benchmark.stress.axes import draw
 from pipeline.benchmark.stress.plan import ScenePlan, entry, lumen_grid
+from pipeline.benchmark.stress.rubbing import made_energy
 from pipeline.benchmark.stress.statics import assemble
 from pipeline.benchmark.stress.verdict import SceneVerdict, judge
 from solver import GuideWire, Insertion, Solution, Status, VesselWall, relax
@@ -37,8 +38,13 @@ class SceneOutcome:
 
 
 def run_scene(seed: int, index: int) -> SceneOutcome:
-    """Build, run and judge scene ``index``; an exception other than a well-formed refusal is a fault."""
-    plan = draw(seed, index)
+    """Run scene ``index`` of the study ``seed``."""
+    return run_plan(draw(seed, index))
+
+
+def run_plan(plan: ScenePlan) -> SceneOutcome:
+    """Build, run and judge a scene; an exception other than a well-formed refusal is a fault."""
+    index = plan.index
     clock = process_time()
     try:
         wire, wall = build(plan)
@@ -52,6 +58,8 @@ def run_scene(seed: int, index: int) -> SceneOutcome:
     else:
         seconds = process_time() - clock
         verdicts = [judge(plan, wire, wall, s, e, index % DEEP_EVERY == 0) for s, e in results]
+        if text := made_energy(plan, [s for s, _ in results]):
+            verdicts.append(SceneVerdict("made_energy", text))
         return _outcome(plan, [s for s, _ in results], verdicts, seconds)
     return SceneOutcome(index, plan.axes, outcome, fault, detail, seconds=process_time() - clock)
 

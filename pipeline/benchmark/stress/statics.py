@@ -2,7 +2,7 @@
 
 Nothing here shares code with the minimiser: joint angles are read back from the frames by a logarithm, forces are
 summed from the tip to the clamp, and only the interpolated distance itself is the wall's own.
-Valid without friction; the wall is looked up at the joints (trapezium rule, half a weight at the tip).
+The wall is looked up at the joints (trapezium rule, half a weight at the tip); friction is no part of it.
 """
 
 from collections.abc import Callable
@@ -54,7 +54,7 @@ class StaticChain:
             nodes[j + 1] = nodes[j] + self.length[j] * frames[j + 1, :, 2]
         return nodes, frames
 
-    def _wall(self, nodes: Array, frames: Array) -> tuple[Array, Array, float]:
+    def contact(self, nodes: Array, frames: Array) -> tuple[Array, Array, float]:
         """Force and moment about the origin on each node, (k + 1, 3), N and N mm, and energy: ½ k w d² at the joints.
 
         The wall is looked up afresh; w is half of either segment.
@@ -77,18 +77,21 @@ class StaticChain:
         np.add.at(moment, node, np.cross(points, each))
         return force, moment, float(0.5 * np.sum(stiffness * depth**2))
 
-    def moments(self, nodes: Array, frames: Array, contact_N: Array | None = None) -> tuple[Array, Array]:
+    def moments(
+        self, nodes: Array, frames: Array, contact_N: Array | None = None, held_mm: Array | None = None
+    ) -> tuple[Array, Array]:
         """Energy gradient (k, 3) by the joint angles, N mm, and the elastic moments (k, 3) that it balances.
 
         Turning all that lies beyond joint j by δ moves its points by δ × (x - x_j): the gradient is c u_j plus the
         moment of the forces beyond, taken into the material frame and through the right Jacobian of exp.
         Rows hold bend, bend, twist; the twist row is 0 where torsion is rigid.
         contact_N : the wall's forces (k + 1, 3) on the nodes, where they are known better than by a look-up.
+        held_mm : (k + 1, 3), where they act if not at the nodes.
         """
         if contact_N is None:
-            force, moment, _ = self._wall(nodes, frames)
+            force, moment, _ = self.contact(nodes, frames)
         else:
-            force, moment = contact_N, np.cross(nodes, contact_N)
+            force, moment = contact_N, np.cross(nodes if held_mm is None else held_mm, contact_N)
         force, moment = force + self.load, moment + np.cross(nodes, self.load)
         force, moment = np.cumsum(force[::-1], axis=0)[::-1], np.cumsum(moment[::-1], axis=0)[::-1]
         # forces on node j itself have no lever at joint j, so the sum may start at j + 1
@@ -105,7 +108,7 @@ class StaticChain:
         u = self.angles(frames)
         bending = 0.5 * float(np.sum(self.bend * (u[:, 0] ** 2 + u[:, 1] ** 2)))
         twisting = 0.5 * float(np.sum(self.twist * u[:, 2] ** 2))
-        return bending + self._wall(nodes, frames)[2] + twisting - float(np.sum(self.load * nodes))
+        return bending + self.contact(nodes, frames)[2] + twisting - float(np.sum(self.load * nodes))
 
 
 def assemble(

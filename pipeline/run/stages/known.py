@@ -25,6 +25,7 @@ class Frame:
 
     status : identifier (``ok``, a FrameStatus or a solver status).     stage, message : where and why it is not ok.
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
+    catheter_mm : depth of the tip of a catheter over the wire.
     num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
     projections : maximum-intensity projections of the scan along the array axes.
     """
@@ -37,6 +38,7 @@ class Frame:
     expected_mm: float = float("nan")
     depth_mm: float = float("nan")
     roll_deg: float = 0.0
+    catheter_mm: float = 0.0
     curve: Curve | None = None
     simulated: Solution | None = None
     num_mm: float = float("nan")

@@ -20,7 +20,10 @@ def open_case(run: Context, known: Known) -> Known:
     if wrong:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
     offset = run.config.simulate.roll_offset_deg
-    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(rolls(case.roll_deg, count))]
+    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(case.roll_deg, count))]
+    if case.catheter:
+        tips = each_frame(case.catheter.insertion_mm, count)
+        frames = [replace(f, catheter_mm=tip) for f, tip in zip(frames, tips, strict=True)]
     if case.insertion_mm:
         frames = [replace(f, expected_mm=mm) for f, mm in zip(frames, case.insertion_mm, strict=True)]
     if case.truth:
@@ -29,6 +32,6 @@ def open_case(run: Context, known: Known) -> Known:
     return replace(known, scans=scans, frames=tuple(frames))
 
 
-def rolls(roll_deg: float | tuple[float, ...], count: int) -> tuple[float, ...]:
-    """Roll of every frame in degrees: the manifest's list, or its one number for all."""
-    return roll_deg if isinstance(roll_deg, tuple) else (roll_deg,) * count
+def each_frame(given: float | tuple[float, ...], count: int) -> tuple[float, ...]:
+    """A number for every frame: the manifest's list, or its one number for all."""
+    return given if isinstance(given, tuple) else (given,) * count

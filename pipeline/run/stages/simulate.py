@@ -31,8 +31,10 @@ def simulate_frames(run: Context, known: Known) -> Known:
         """The wire of every frame with segments of one length."""
         finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
         settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
-        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate)
-        found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay])
+        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter)
+        # a wire that is traced a little short of the catheter's tip ends with it
+        tips = [min(f.catheter_mm, f.depth_mm) for f in replay] if case.catheter else None
+        found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay], tips)
         return list(_noted(log, replay, found, len(frames)))
 
     try:

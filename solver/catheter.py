@@ -1,0 +1,70 @@
+"""A catheter over the wire: up to its tip the two bend as one, beyond it the wire bends alone."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from solver._kernels.data import Profile, Sleeve
+from solver.doors import Array, Range, instance, number
+from solver.errors import refuse
+from solver.grid import read_only
+from solver.wire import GuideWire
+
+PIECES = 32
+"""Of a stretch in which stiffness changes and the rest shape is curved: the pair's rest curvature is no straight line
+there. Between EI of 1 and 1000 the sum is right to 1e-3."""
+
+
+@dataclass(frozen=True)
+class Catheter:
+    """A straight tube over the wire, clamped with it at the entry.
+
+    bending_stiffness_N_mm2 : EI of the tube alone, 0 or more.     radius_mm : of its outer hull, more than the wire's.
+    The pair bends by the sum of both EI; at rest it has the wire's curvature times its share of that sum. The two slide
+    and turn on each other freely.
+    """
+
+    bending_stiffness_N_mm2: float
+    radius_mm: float
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        stiffness = Range(0.0, 1e12, "20 to 200 is usual")
+        number("catheter", "bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, stiffness)
+        number("catheter", "radius_mm", self.radius_mm, Range(1e-6, 1e3, "0.9 is a catheter of 5 French"))
+
+
+def sleeve_of(wire: GuideWire, catheter: Catheter | None) -> Sleeve:
+    """The catheter for the kernels, with its tip at the entry; ValueError where it does not go over the wire."""
+    tip, cells = np.zeros(1), np.zeros((1, 2))
+    if catheter is None:
+        nothing = read_only(np.zeros(1))
+        return Sleeve(False, tip, wire.profile, cells, nothing, nothing)
+    instance("insertion", "catheter", catheter, Catheter)
+    if not catheter.radius_mm > wire.radius_mm:
+        advice = "a catheter goes over the wire"
+        refuse("catheter", "radius_mm", catheter.radius_mm, f"more than the wire's {wire.radius_mm:g}", advice)
+    own, more = wire.profile, float(catheter.bending_stiffness_N_mm2)
+    at, stiffness, curvature = (read_only(line) for line in _both(own))
+    share = stiffness / (stiffness + more)
+    profile = Profile(own.stiffness_at, read_only(own.stiffness + more), at, read_only(share * curvature), own.twist)
+    stored = 0.5 * more * share * curvature**2
+    return Sleeve(True, tip, profile, cells, at, read_only(stored))
+
+
+def _both(own: Profile) -> tuple[Array, Array, Array]:
+    """Abscissae, stiffness and rest curvature of a wire on common abscissae, close where both matter."""
+    edges = np.unique(np.concatenate([[0.0], own.stiffness_at, own.rest_at]))
+    rows = []
+    for a, b in pairwise(edges):
+        # inside a stretch, short of its ends, both are straight lines
+        inner = np.array([0.25, 0.75]) * (b - a) + a
+        lines = [np.interp(inner, x, y) for x, y in ((own.stiffness_at, own.stiffness), (own.rest_at, own.rest))]
+        count = 1 if not np.any(lines[1]) or np.ptp(lines[0]) <= 1e-3 * lines[0][0] else PIECES
+        t = np.linspace(0.0, 1.0, count + 1)
+        s = [line[0] + (2.0 * t - 0.5) * (line[1] - line[0]) for line in lines]
+        rows.append(np.stack([a + t * (b - a), *s]))
+    ends = np.array([[edges[-1]], [own.stiffness[-1]], [own.rest[-1]]])
+    at, stiffness, curvature = np.concatenate([*rows, ends], axis=1)
+    return at, stiffness, curvature
