@@ -32,10 +32,11 @@ fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 
 from solver.grid import Grid
 from solver.insertion import Insertion
+from solver.insertions import Insertions
 from solver.relax import relax
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Grid", "GuideWire", "Insertion", "Solution", "Status", "VesselWall", "relax", "warm_up"]
+__all__ = ["Grid", "GuideWire", "Insertion", "Insertions", "Solution", "Status", "VesselWall", "relax", "warm_up"]

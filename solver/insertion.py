@@ -56,10 +56,10 @@ class Insertion:
             if not (math.isfinite(value) and value > 0):
                 refuse("insertion", name, value, "a positive number", "leave it out for the default")
         self.wire, self.wall, self.max_joints = wire, wall, max_joints
-        self._work = Workspace(wire, wall, settings.quadrature, settings.limits)
+        self.work = Workspace(wire, wall, settings.quadrature, settings.limits)
         frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
         entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
-        self._work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
+        self.work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
         self._started = False
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
@@ -71,12 +71,12 @@ class Insertion:
     @property
     def depth_mm(self) -> float:
         """Where the tip is, mm of wire beyond the entry."""
-        return float(self._work.place["inserted"][0])
+        return float(self.work.place["inserted"][0])
 
     @property
     def roll_deg(self) -> float:
         """Where the base is turned to."""
-        return float(self._work.place["roll"][0])
+        return float(self.work.place["roll"][0])
 
     def to_depths(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
@@ -84,28 +84,38 @@ class Insertion:
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base, one for all or
         one per depth. A depth that cannot be reached yields the last good state with its own depth and a status.
         """
+        goals = self.goals(depths_mm, roll_deg)
+        self.get_ready(*goals)
+        for depth, roll in zip(*goals, strict=True):
+            yield self._go(depth, roll)
+
+    def goals(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float]) -> tuple[list[float], list[float]]:
+        """Depths and a roll for each, or a refusal of what cannot be reached."""
         depths = [float(d) for d in depths_mm]
         rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
         for depth, roll in zip(depths, rolls, strict=True):
             if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
                 allowed = "finite depths >= 0 and rolls"
                 refuse("insertion", "to_depths", (depth, roll), allowed, "mm from the entry")
-        # room for all of it at once
-        self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
-        for depth, roll in zip(depths, rolls, strict=True):
-            yield self._go(depth, roll)
+        return depths, rolls
+
+    def get_ready(self, depths: Sequence[float], rolls: Sequence[float]) -> None:
+        """Make room for all of the way at once."""
+        self.work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+        if rolls and not self._started:
+            # a wire that is not yet in the lumen has no history: it starts at its first roll
+            self.work.place["roll"], self._started = rolls[0], True
+
+    def reaches(self, depth_mm: float) -> bool:
+        """Whether the wire can be tried at a depth at all."""
+        return depth_mm < self._too_long and not self._outside
 
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
-        work = self._work
+        work = self.work
         work.counts.fill(0)
-        if not self._started:
-            # a wire that is not yet in the lumen has no history: it starts at its first roll
-            work.place["roll"], self._started = roll, True
-        if depth >= self._too_long:
-            status, iterations = Status.TOO_LONG, 0
-        elif self._outside:
-            status, iterations = Status.ENTRY_OUTSIDE, 0
-        else:
+        if self.reaches(depth):
             status, iterations = work.advance(depth, roll)
-        return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+        else:
+            status, iterations = Status.ENTRY_OUTSIDE if self._outside else Status.TOO_LONG, 0
+        return work.solution(status, iterations)

@@ -131,7 +131,9 @@ def relax(
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k)
     status, iterations = work.advance(depth_mm, 0.0, work.k)
-    return work.solution(status, iterations, depth_mm, roll_deg)
+    solution = work.solution(status, iterations)
+    vars(solution).update(depth_mm=depth_mm, roll_deg=roll_deg)
+    return solution
 
 
 def _polyline(points: ArrayLike) -> NDArray[np.float64]:

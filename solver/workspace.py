@@ -104,10 +104,10 @@ class Workspace:
         return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
-        gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
+        gain, anchor = np.zeros((k, 3, 7)), np.ones((points, 4))
         start, change, keep = np.zeros((3, k, 3))
         descent = np.zeros(1, data.DESCENT)
-        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep)
+        return data.Scratch(gain, anchor, self.counters, descent, start, change, keep)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -152,7 +152,7 @@ class Workspace:
     def _bind(self) -> None:
         """Take a handle of the arrays, wherever in memory they are now."""
         settings = self.introducer, self.limits
-        self._handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
+        self.handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""
@@ -170,36 +170,12 @@ class Workspace:
 
     def advance(self, depth_mm: float, roll_deg: float, laid: int = 0) -> tuple[Status, int]:
         """Go to a depth and roll, see ``_kernels.insertion.advance``; return the status and the iterations."""
-        outcome, iterations, self.k = advance(self._handle, depth_mm, roll_deg, laid)
+        outcome, iterations, self.k = advance(self.handle, depth_mm, roll_deg, laid)
         return Status[data.OUTCOMES[outcome]], iterations
 
-    def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
+    def solution(self, status: Status, iterations: int) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        start, penetration, push, force, torque, *_ = self.report.item(0)
-        bending, wall, _, friction = state.energies.item(CURRENT)
-        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
-        for array in arrays:
-            array.setflags(write=False)
-        solution = object.__new__(Solution)
-        # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take
-        vars(solution).update(
-            joints_mm=arrays[0],
-            frames=arrays[1],
-            energy_N_mm=self.place["energy"].item(0),
-            bending_energy_N_mm=bending,
-            wall_energy_N_mm=wall,
-            friction_energy_N_mm=friction,
-            status=status,
-            iterations=iterations,
-            contact_force_N=arrays[2],
-            reaction_force_N=arrays[3],
-            reaction_torque_N_mm=float(torque[2]),
-            push_force_N=push,
-            max_penetration_mm=penetration,
-            depth_mm=depth_mm,
-            roll_deg=roll_deg,
-            counts=self.counters.item(0),
-            start_energy_N_mm=start,
-        )
-        return solution
+        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n])]
+        records = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
+        return Solution.assembled(arrays, records, status, iterations)

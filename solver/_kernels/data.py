@@ -177,14 +177,13 @@ class Scratch(NamedTuple):
     """Work space.
 
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
-    distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``COUNTERS`` and
-    ``DESCENT``.     start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in
-    the last step, from the tip inwards.     keep : (k, 3) controls to come back to.
+    distance there.     counters, descent : (1,), see ``COUNTERS`` and ``DESCENT``.     start : (k, 3) controls that the
+    step began with.     change : (k, 3) what relaxing them added in the last step, from the tip inwards.
+    keep : (k, 3) controls to come back to.
     """
 
     gain: Any
     anchor: Any
-    weights: Any
     counters: Any
     descent: Any
     start: Any

@@ -9,7 +9,7 @@ from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import Three, dot, load3, minus, store3
 from solver._kernels.data import Chain, Problem
-from solver._kernels.field import fill_jet, in_grid, indices, locate, trilinear, value
+from solver._kernels.field import in_grid, indices, jet_at, locate, store_jet, trilinear, value
 from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.friction import friction_energy
 
@@ -67,7 +67,7 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
     x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
-    anchor, weights = problem.scratch.anchor, problem.scratch.weights
+    anchor = problem.scratch.anchor
     clear, cheap = 0, 0
     for n in range(first_free + 1, k + 1):
         for p in range(first[n], first[n + 1]):
@@ -92,7 +92,9 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
                     continue
             d = -1.0 if touched else value(c, cell) + reach
             if touched or d > 0.0:
-                d = fill_jet(c, m, cell, weights, jet[p]) + reach
+                found = jet_at(c, m, cell)
+                store_jet(jet, p, found)
+                d = found[0][0] + reach
             anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
             if d > 0.0:
                 penetration[p] = d

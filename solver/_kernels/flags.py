@@ -51,6 +51,8 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
 # Called from Python; kept on disk.
 entry_point = on_disk(**FAST)
+# The same for what takes long: other threads of Python run meanwhile.
+released = on_disk(nogil=True, **FAST)
 # Called by other kernels.
 kernel = _internal()
 # The same, kept on disk as well: another process can compile it meanwhile.

@@ -15,7 +15,7 @@ from solver._kernels import data
 from solver._kernels.chain import lay_out, segments_at
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
-from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
+from solver._kernels.flags import cached, entry_point, inlined, kernel, merged, released
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
 from solver._kernels.minimise import relax_with_friction
@@ -61,7 +61,7 @@ def handle_of(contents: Contents) -> Any:
     return bound(*contents) if hasattr(bound, "py_func") else contents
 
 
-@entry_point
+@released
 def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
     """Step to a depth (mm) and roll (degrees); return the outcome, the iterations and the number of segments.
 
@@ -69,6 +69,12 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
     outcome, iterations = go(handle, to_depth, to_roll, laid)
+    return outcome, iterations, sum_up(handle)
+
+
+@kernel
+def sum_up(handle: Any) -> int:
+    """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
     problem, report, force = handle.problem, handle.report[0], handle.force
     for n in range(k + 1):
@@ -78,38 +84,57 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
         report.penetration = contact_forces(problem, k, force)
     if k > 0:
         report.push = push_force(problem, handle.table, k, report)
-    return outcome, iterations, k
+    return k
 
 
 @merged
 def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
-    at, introducer, limits = handle.place[0], handle.introducer, handle.limits
-    counters = handle.problem.scratch.counters[0]
-    # a cap on the time that a hopeless scene can take
-    steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
-    limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
+    limit = prepare(handle, to_depth, to_roll)
     outcome, iterations = data.CONVERGED, 0
-    if introducer.idle_roll and at.roll != to_roll:
-        at.roll = to_roll
-        counters.rolls_proven_idle += 1
-    while laid > 0 or abs(to_depth - at.inserted) >= tol.MATCH_DEPTH_MM or at.roll != to_roll:
+    while laid > 0 or not arrived(handle.place[0], to_depth, to_roll):
         outcome, used = step(handle, to_depth, to_roll, laid)
         iterations += used
         if laid > 0:
             break
-        if iterations > limit or counters.passed >= limits.work:
-            outcome = data.MAX_ITERATIONS
+        goes_on, outcome = judge(handle, outcome, iterations, limit)
+        if not goes_on:
             break
-        if outcome == data.CONVERGED:
-            at.shrink = min(1.0, 2 * at.shrink)
-        elif at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE:
-            at.shrink *= 0.5
-        else:
-            # outside the grid or without a finite energy a shorter step does not help either
-            break
-    at.shrink = max(at.shrink, 8 * tol.SMALLEST_STEP)
+    handle.place[0].shrink = max(handle.place[0].shrink, 8 * tol.SMALLEST_STEP)
     return outcome, iterations
+
+
+@merged
+def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
+    """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
+    at, introducer = handle.place[0], handle.introducer
+    steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
+    if introducer.idle_roll and at.roll != to_roll:
+        at.roll = to_roll
+        handle.problem.scratch.counters[0].rolls_proven_idle += 1
+    return float(handle.limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps))
+
+
+@inlined
+def arrived(at: Any, to_depth: float, to_roll: float) -> bool:
+    """Whether the wire is at its goal."""
+    return bool(abs(to_depth - at.inserted) < tol.MATCH_DEPTH_MM and at.roll == to_roll)
+
+
+@merged
+def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
+    """Whether to take another step after one that ended so, and what to call the outcome if not."""
+    at = handle.place[0]
+    if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
+        return False, data.MAX_ITERATIONS
+    if outcome == data.CONVERGED:
+        at.shrink = min(1.0, 2 * at.shrink)
+        return True, outcome
+    # outside the grid or without a finite energy a shorter step does not help
+    helps = at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE
+    if helps:
+        at.shrink *= 0.5
+    return helps, outcome
 
 
 @merged
@@ -131,16 +156,23 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
+    return settle(handle, (depth, roll), k, outcome, energy, laid), used
+
+
+@kernel
+def settle(handle: Any, place: tuple[float, float], k: int, outcome: int, energy: float, laid: int) -> int:
+    """Keep the wire where a step led it, or take the step back where it failed; return the outcome."""
+    problem, at = handle.problem, handle.place[0]
     walled = laid == 0 and outcome == data.CONVERGED and problem.stiffness > 0.0
     if walled and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin:
         outcome = data.LEFT_GRID
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
-        at.last_step = depth - at.inserted if roll == at.roll else 0.0
-        at.inserted, at.roll, at.energy = depth, roll, energy
+        at.last_step = place[0] - at.inserted if place[1] == at.roll else 0.0
+        at.inserted, at.roll, at.energy = place[0], place[1], energy
     else:
         take_back(handle)
-    return outcome, used
+    return outcome
 
 
 @merged

@@ -1,0 +1,200 @@
+"""Insertions in lock-step: each lane goes its own way from depth to depth, and all that relax do so together.
+
+Setting out on a step, and what follows its relaxation, a wire does by itself: ``insertion`` says how.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from solver import _tolerances as tol
+from solver._kernels import data
+from solver._kernels.data import CURRENT
+from solver._kernels.energy import energy_of, stiffest
+from solver._kernels.flags import kernel, released
+from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
+from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
+from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
+from solver._kernels.lane_relax import (
+    ALONE,
+    DONE,
+    IDLE,
+    READY,
+    RESTED,
+    STOPPED,
+    SWEEP,
+    Team,
+    do_round,
+    hand_over,
+    take_over,
+)
+from solver._kernels.lanes import WIDTH, in_lanes
+from solver._kernels.minimise import begin
+from solver._kernels.newton_method import rests
+from solver._kernels.start import extrapolate_start
+
+
+class Plan(NamedTuple):
+    """Where the wires go, and room for what they find there; the first axis is the lane, the second the depth.
+
+    goal : (WIDTH, d, 2) depth, mm, and roll, degrees.     count : (WIDTH,) how many of them.
+    row : (WIDTH, d) where a solution's joints begin in x, r and force, (WIDTH, rows, ...).
+    ended : (WIDTH, d, 3) outcome, iterations, segments.     place, report, energies, counters : (WIDTH, d) records.
+    blank : (1,), counters at 0.
+    """
+
+    goal: Any
+    count: Any
+    row: Any
+    x: Any
+    r: Any
+    force: Any
+    ended: Any
+    place: Any
+    report: Any
+    energies: Any
+    counters: Any
+    blank: Any
+
+
+@released
+def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any) -> None:
+    """Lead each wire through all its depths."""
+    block = Block(
+        in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
+        in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
+        in_lanes(raw.touch), in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque), in_lanes(raw.turned),
+        in_lanes(raw.asked), in_lanes(raw.number),
+    )  # fmt: skip
+    lanes, nows, counts = records
+    team = Team(wires, lanes, nows, counts, block, raw, first, wires[0].problem.field)
+    left = 0
+    for lane in range(WIDTH):
+        problem = wires[lane].problem
+        raw.number[STIFFNESS, lane], raw.number[REACH, lane] = problem.stiffness, problem.chain.reach
+        lanes[lane].phase, lanes[lane].goal, lanes[lane].tolerance = IDLE, -1, wires[lane].limits.tolerance
+        if plan.count[lane] > 0:
+            next_goal(team, plan, lane)
+            proceed(team, plan, lane)
+            left += lanes[lane].phase != IDLE
+    while left > 0:
+        do_round(team)
+        left = 0
+        for lane in range(WIDTH):
+            if lanes[lane].phase == DONE or lanes[lane].phase == RESTED:
+                end_relaxation(team, lane)
+                proceed(team, plan, lane)
+            left += lanes[lane].phase != IDLE
+
+
+@kernel
+def next_goal(team: Team, plan: Plan, lane: int) -> None:
+    """Set the next depth as the goal, or let the lane idle where there is none."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    me.goal += 1
+    me.phase, me.k, team.nows[lane].first_free = IDLE, 0, 0
+    if me.goal < plan.count[lane]:
+        wire.problem.scratch.counters[0] = plan.blank[0]
+        me.limit = prepare(wire, plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1])
+        me.outcome, me.iterations, me.phase = data.CONVERGED, 0, READY
+
+
+@kernel
+def proceed(team: Team, plan: Plan, lane: int) -> None:
+    """Go on until a step has to be relaxed, or nothing is left to do."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    while me.phase != IDLE:
+        depth, roll = plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1]
+        if me.phase == STOPPED or arrived(wire.place[0], depth, roll):
+            write_down(team, plan, lane)
+            next_goal(team, plan, lane)
+            continue
+        me.depth, me.roll = next_place(wire, depth, roll)
+        me.k = set_out(wire, me.depth, me.roll)
+        me.outcome = data.CONVERGED
+        if me.k == 0:
+            end_step(team, lane, 0, 0.0)
+        elif begin_relaxation(team, lane):
+            return
+        else:
+            end_step(team, lane, 0, wire.problem.scratch.descent[0].energy)
+
+
+@kernel
+def begin_relaxation(team: Team, lane: int) -> bool:
+    """Put a wire that set out on a step into its lane; False where it rests as it is, or cannot be relaxed."""
+    me, wire, raw = team.lanes[lane], team.wires[lane], team.raw
+    problem, at, k, limits = wire.problem, wire.place[0], me.k, wire.limits
+    now, counters = problem.scratch.descent[0], problem.scratch.counters[0]
+    start = extrapolate_start(problem, CURRENT, k, likeness(problem, at, me.depth, me.roll), at.energy)
+    counters.relaxations_without_friction += 1
+    counters.relaxations_without_twist += 1
+    me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
+    begin(now, start, energy_of(problem, start))
+    wire.report[0].start = now.energy
+    resting = rests(problem, k, now)
+    if resting:
+        forget_forces(wire.report[0])
+    if now.slot != CURRENT:
+        copy_state(problem, now.slot, CURRENT, k)
+        now.slot = CURRENT
+    if resting or not math.isfinite(now.energy):
+        me.outcome = data.CONVERGED if resting else data.NON_FINITE
+        return False
+    shift = raw.length.shape[0] - k
+    fill_up(raw, lane, problem, min(me.filled, shift) if me.roll == me.clamped else 0, shift)
+    take_over(team, lane)
+    me.filled, me.clamped, me.stiffest = shift, me.roll, stiffest(problem.chain, k)
+    me.phase = SWEEP if me.allowed > 0 else ALONE
+    return True
+
+
+@kernel
+def end_relaxation(team: Team, lane: int) -> None:
+    """What follows the relaxation of a lane, as in ``minimise.relax_with_friction``."""
+    me, problem = team.lanes[lane], team.wires[lane].problem
+    now = problem.scratch.descent[0]
+    if me.phase == RESTED:
+        hand_over(team, lane)
+    problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
+    if me.outcome == data.CONVERGED and least_turn_cosine(problem.state.r[CURRENT], me.k) < tol.FOLD_COSINE:
+        me.outcome = data.FOLDED
+    end_step(team, lane, now.iterations, now.energy)
+
+
+@kernel
+def end_step(team: Team, lane: int, iterations: int, energy: float) -> None:
+    """Keep a step or take it back, as in ``insertion.step`` and ``go``."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    me.iterations += iterations
+    outcome = settle(wire, (me.depth, me.roll), me.k, me.outcome, energy, 0)
+    goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
+    me.phase = READY if goes_on else STOPPED
+
+
+@kernel
+def write_down(team: Team, plan: Plan, lane: int) -> None:
+    """Write down the wire at a depth."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
+    wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)
+    k = sum_up(wire)
+    counted, number = team.counts[lane], team.raw.number
+    counters.sweeps += counted.sweeps
+    counters.rollouts += counted.rollouts
+    counters.levenberg += counted.levenberg
+    counters.joints_left_still += counted.joints_left_still
+    counters.starts_at_rest += counted.starts_at_rest
+    counters.wall_look_ups += int(number[FULL, lane])
+    counters.wall_look_ups_cheap += int(number[CHEAP, lane])
+    counters.wall_look_ups_proven_unnecessary += int(number[CLEAR, lane])
+    number[FULL, lane] = number[CHEAP, lane] = number[CLEAR, lane] = 0.0
+    team.counts[lane] = plan.blank[0]
+    plan.ended[lane, goal, 0], plan.ended[lane, goal, 1], plan.ended[lane, goal, 2] = me.outcome, me.iterations, k
+    plan.place[lane, goal], plan.report[lane, goal] = wire.place[0], wire.report[0]
+    plan.energies[lane, goal], plan.counters[lane, goal] = state.energies[CURRENT], counters
+    x, r, row = state.x[CURRENT], state.r[CURRENT], plan.row[lane, goal]
+    for n in range(k + 1):
+        for a in range(3):
+            plan.x[lane, row + n, a], plan.force[lane, row + n, a] = x[n, a], wire.force[n, a]
+            for c in range(3):
+                plan.r[lane, row + n, a, c] = r[n, a, c]

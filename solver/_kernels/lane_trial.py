@@ -1,0 +1,180 @@
+"""A trial state of wires in lanes: laid out by ``rollout``, its energy, whether it may be reached, and its acceptance."""
+
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels import wall_law
+from solver._kernels.algebra import Three, apply_transposed, dot, load3, load9, minus, store3, store9, times
+from solver._kernels.data import CURRENT, TRIAL, Field
+from solver._kernels.field import Cell, indices, jet_at, locate, trilinear, value
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.lane_block import (
+    ACCEPTED,
+    ACTIVE,
+    ALONG,
+    ANCHOR,
+    BENDING,
+    CHEAP,
+    CLEAR,
+    FRACTION,
+    FULL,
+    JUMP,
+    LOAD,
+    REACH,
+    START,
+    STIFFNESS,
+    STILL,
+    WALL,
+    WEIGHT,
+    Block,
+)
+from solver._kernels.lane_newton import turn_of
+from solver._kernels.lanes import WIDTH, anywhere, bits, greater, select, select3, size, spread
+from solver._kernels.rollout import limited, relative
+
+NO_JET = (0.0,) * 10
+
+
+@kernel
+def rollout(b: Block, base: int, spacing: float) -> None:
+    """``rollout.rollout`` of every lane from joint ``base`` on, and what of the energy comes with it.
+
+    spacing : of the field, mm; see ``crossing.crossed``.
+    """
+    old_u, old_x, old_r, u, x, r = b.u[CURRENT], b.x[CURRENT], b.r[CURRENT], b.u[TRIAL], b.x[TRIAL], b.r[TRIAL]
+    fraction, start, zero = b.number[FRACTION], b.number[START], spread(0.0)
+    frame, at = load9(old_r, base), load3(old_x, base)
+    store9(r, base, frame)
+    store3(x, base, at)
+    energy, furthest = zero, zero
+    for j in range(base, b.length.shape[0]):
+        ahead, there, before = load9(old_r, j + 1), load3(old_x, j + 1), (old_u[j, 0], old_u[j, 1], zero)
+        moved = apply_transposed(ahead, minus(at, load3(old_x, j)))
+        turned = apply_transposed(ahead, relative(load9(old_r, j), frame))
+        v = limited(before, answer(b.gain, j, fraction, moved, turned))
+        length, held = b.length[j], start > float(j)
+        if anywhere(held):
+            v = select3(held, before, v)
+        frame = times(frame, turn_of(b, j, v))
+        at = (at[0] + length * frame[2], at[1] + length * frame[5], at[2] + length * frame[8])
+        if anywhere(held):
+            frame, at = select9(held, ahead, frame), select3(held, there, at)
+        u[j, 0], u[j, 1] = v[0], v[1]
+        store9(r, j + 1, frame)
+        store3(x, j + 1, at)
+        energy = energy + 0.5 * b.bend[j] * (v[0] * v[0] + v[1] * v[1])
+        way = minus(at, there)
+        furthest = greater(furthest, dot(way, way))
+    b.number[BENDING], b.number[LOAD] = energy, -(b.load[0] * at[0] + b.load[1] * at[1] + b.load[2] * at[2])
+    b.number[JUMP] = select(furthest > 0.25 * spacing * spacing, 1.0, zero)
+
+
+@inlined
+def answer(gain: Any, j: int, fraction: Any, dp: Three, dr: Three) -> Three:
+    """``rollout.answer`` with two controls."""
+    one = fraction * gain[j, 0, 0]
+    two = fraction * gain[j, 1, 0]
+    one += gain[j, 0, 1] * dp[0] + gain[j, 0, 2] * dp[1] + gain[j, 0, 3] * dp[2]
+    two += gain[j, 1, 1] * dp[0] + gain[j, 1, 2] * dp[1] + gain[j, 1, 3] * dp[2]
+    one += gain[j, 0, 4] * dr[0] + gain[j, 0, 5] * dr[1] + gain[j, 0, 6] * dr[2]
+    two += gain[j, 1, 4] * dr[0] + gain[j, 1, 5] * dr[1] + gain[j, 1, 6] * dr[2]
+    return one, two, spread(0.0)
+
+
+@inlined
+def select9(condition: Any, one: Any, other: Any) -> Any:
+    """``select`` of nine numbers."""
+    head = select3(condition, one[:3], other[:3])
+    return head + select3(condition, one[3:6], other[3:6]) + select3(condition, one[6:], other[6:])
+
+
+@kernel
+def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> None:
+    """``energy.wall_energy`` of the trial in every active lane.
+
+    The way from a point's last look-up decides for all lanes at once; those that need a look-up get one each.
+    raw : the numbers of b.
+    """
+    c, m, o, gap, square = field.coefficients, field.to_index, field.origin, field.gap, field.slope * field.slope
+    x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
+    sites, touches, numbers, asks = raw.site, raw.touch[TRIAL], raw.number, raw.asked
+    high, reach, zero = (c.shape[0] - 3.0, c.shape[1] - 3.0, c.shape[2] - 3.0), number[REACH], spread(0.0)
+    active, total, clear = number[ACTIVE] > 0.0, zero, number[CLEAR]
+    for n in range(base + 1, b.length.shape[0] + 1):
+        for p in range(first[n], first[n + 1]):
+            along = site[p, ALONG]
+            q = (x[n, 0] + along * r[n, 0, 2], x[n, 1] + along * r[n, 1, 2], x[n, 2] + along * r[n, 2, 2])
+            f = indices(m, o, q)
+            inside = (f[0] >= 0.0) & (f[1] >= 0.0) & (f[2] >= 0.0)
+            inside = inside & (f[0] <= high[0]) & (f[1] <= high[1]) & (f[2] <= high[2])
+            room = -site[p, ANCHOR + 3] - reach
+            way = (q[0] - site[p, ANCHOR], q[1] - site[p, ANCHOR + 1], q[2] - site[p, ANCHOR + 2])
+            still = inside & (room >= 0.0) & (square * dot(way, way) <= room * room)
+            here = active & (site[p, WEIGHT] > 0.0)
+            clear = clear + select(here & still, 1.0, zero)
+            touch[p, 0] = zero
+            wanted = bits(here & ~still)
+            if wanted != 0:
+                asked[0], asked[1], asked[2], asked[3], asked[4] = q[0], q[1], q[2], room, select(inside, 1.0, zero)
+                for lane in range(WIDTH):
+                    if wanted >> lane & 1:
+                        cell = locate(c, indices(m, o, (asks[0, lane], asks[1, lane], asks[2, lane])))
+                        how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, asks[4, lane] > 0.0
+                        d, known, jet = look(c, m, cell, how)
+                        numbers[CHEAP if d < 0.0 else FULL, lane] += 1.0
+                        for a in range(3):
+                            sites[p, ANCHOR + a, lane] = asks[a, lane]
+                        sites[p, ANCHOR + 3, lane] = known
+                        if d > 0.0:
+                            touches[p, 0, lane] = d
+                            for a in range(10):
+                                touches[p, 1 + a, lane] = jet[a]
+                total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
+    number[WALL], number[CLEAR] = total, clear
+
+
+@kernel
+def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, bool]) -> tuple[float, float, Any]:
+    """Look a point up as ``energy.wall_energy`` does: penetration, what is known of the distance, and the jet.
+
+    how : reach, the field's gap, whether it touched when it was looked up last, and whether it is inside the grid.
+    The penetration is 0 off contact, and -1 where the first, cheap look was enough.
+    """
+    reach, gap, touched, inside = how
+    if inside and not touched:
+        phi = trilinear(c, cell) + gap
+        if phi + reach <= 0.0:
+            return -1.0, phi, NO_JET
+    d = -1.0 if touched else value(c, cell) + reach
+    jet = NO_JET
+    if touched or d > 0.0:
+        first, second = jet_at(c, m, cell)
+        jet = first + second
+        d = first[0] + reach
+    return max(d, 0.0), d - reach if inside else 1.0, jet
+
+
+@kernel
+def accept(b: Block, first: Any, base: int) -> None:
+    """Make the trial the current state in the lanes that accept it; say which joint is the first that it turned.
+
+    Turned: by more than ``tol.UNMOVED`` of the joint that it turned most.
+    """
+    accepted, k, zero = b.number[ACCEPTED] > 0.0, b.length.shape[0], spread(0.0)
+    u, x, r, touch = b.u[CURRENT], b.x[CURRENT], b.r[CURRENT], b.touch[CURRENT]
+    new_u, new_x, new_r, new_touch = b.u[TRIAL], b.x[TRIAL], b.r[TRIAL], b.touch[TRIAL]
+    largest, still = zero, spread(float(k))
+    for j in range(base, k):
+        largest = greater(largest, greater(size(new_u[j, 0] - u[j, 0]), size(new_u[j, 1] - u[j, 1])))
+    for j in range(k - 1, base - 1, -1):
+        change = greater(size(new_u[j, 0] - u[j, 0]), size(new_u[j, 1] - u[j, 1]))
+        still = select(change > tol.UNMOVED * largest, float(j), still)
+        u[j, 0], u[j, 1] = select(accepted, new_u[j, 0], u[j, 0]), select(accepted, new_u[j, 1], u[j, 1])
+    b.number[STILL] = still
+    for n in range(base + 1, k + 1):
+        store3(x, n, select3(accepted, load3(new_x, n), load3(x, n)))
+        store9(r, n, select9(accepted, load9(new_r, n), load9(r, n)))
+        for p in range(first[n], first[n + 1]):
+            touches = anywhere(new_touch[p, 0] > 0.0)
+            for a in range(11 if touches else 1):
+                touch[p, a] = select(accepted, new_touch[p, a], touch[p, a])
