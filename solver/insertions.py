@@ -49,8 +49,8 @@ class Insertions:
         what ``Insertion.to_depths`` takes.
         """
         count = len(self.insertions)
-        depths = list(depths_mm) if np.ndim(depths_mm[0]) else [depths_mm] * count
-        rolls = [roll_deg] * count if np.ndim(roll_deg) == 0 else list(roll_deg)
+        depths: Any = [depths_mm] * count if all(np.isscalar(depth) for depth in depths_mm) else depths_mm
+        rolls: Any = [roll_deg] * count if np.isscalar(roll_deg) else roll_deg
         goals = [one.goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
         found: list[list[Solution]] = [[] for _ in range(count)]
 
@@ -123,15 +123,19 @@ def _plan(team: Sequence[tuple[Insertion, Goals]]) -> Plan:
         rows = max(rows, sum(room_for))
     x, r, force = np.zeros((WIDTH, rows, 3)), np.zeros((WIDTH, rows, 3, 3)), np.zeros((WIDTH, rows, 3))
     kinds = (data.PLACE, data.REPORT, data.ENERGIES, data.COUNTERS)
-    records = [np.zeros((WIDTH, most), kind).view(np.recarray) for kind in kinds]
+    place, report, energies, counters = (np.zeros((WIDTH, most), kind).view(np.recarray) for kind in kinds)
     ended = np.zeros((WIDTH, most, 3), np.int64)
-    return Plan(goal, count, row, x, r, force, ended, *records, np.zeros(1, data.COUNTERS))
+    blank = np.zeros(1, data.COUNTERS)
+    return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, blank)
 
 
 def _solutions(plan: Plan, lane: int) -> list[Solution]:
     """What a lane found at its depths."""
     found = []
-    records = zip(*(getattr(plan, name)[lane].tolist() for name in ("place", "report", "energies", "counters", "ended", "row")), strict=True)
+    records = zip(
+        *(getattr(plan, name)[lane].tolist() for name in ("place", "report", "energies", "counters", "ended", "row")),
+        strict=True,
+    )
     for _, (place, report, energies, counters, (outcome, iterations, k), row) in zip(
         range(int(plan.count[lane])), records, strict=False
     ):

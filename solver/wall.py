@@ -1,6 +1,7 @@
 """The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
 import math
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -43,11 +44,7 @@ class VesselWall:
 
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
-        if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
-            refuse("wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual")
-        if not (math.isfinite(self.friction) and self.friction >= 0):
-            refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
-        _ = self.samples
+        self._check_law()
         values = _checked(self.distance)
         prefilter(values)
         # the ghost layers: c[-1] = 2 c[0] - c[1]
@@ -57,6 +54,23 @@ class VesselWall:
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing))
+
+    def _check_law(self) -> None:
+        """Refuse a stiffness, a friction or a hull that no wall has."""
+        if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
+            refuse("wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual")
+        if not (math.isfinite(self.friction) and self.friction >= 0):
+            refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
+        _ = self.samples
+
+    def like(self, *, stiffness_N_mm2: float | None = None, friction: float | None = None) -> "VesselWall":
+        """The same lumen with another stiffness or friction: its grid is shared, and not filtered again."""
+        other = copy(self)
+        for name, value in (("stiffness_N_mm2", stiffness_N_mm2), ("friction", friction)):
+            if value is not None:
+                object.__setattr__(other, name, value)
+        other._check_law()
+        return other
 
     @cached_property
     def samples(self) -> int:

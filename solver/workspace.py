@@ -8,7 +8,8 @@ from solver import skips
 from solver._kernels import data
 from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
-from solver._kernels.insertion import Contents, advance, handle_of
+from solver._kernels.handle import Contents, handle_of
+from solver._kernels.insertion import advance
 from solver._kernels.minimise import CLOSED_FORM
 from solver.errors import refuse
 from solver.grid import Array
@@ -46,7 +47,7 @@ NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros
 class Workspace:
     """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
 
-    problem, table, limits, place, report, force : see ``_kernels.insertion.Contents``.
+    problem, table, limits, place, report, force : see ``_kernels.handle.Contents``.
     """
 
     problem: Problem

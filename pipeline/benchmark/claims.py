@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.benchmark import scenes
+from pipeline.benchmark import many, scenes
 from pipeline.benchmark.insert import Run, SolverSetting, insert, timed
 from pipeline.benchmark.reference import reference, shape_error
 from pipeline.benchmark.scenes import BenchScene
@@ -38,6 +38,7 @@ OFF_LATTICE = 0.37
 MANY_LOOK_UPS = "samples:16"
 """The hull with which skips of look-ups are measured; with one look-up a joint there is little to save."""
 PAIRS = 9
+MANY_SEED, SAME_MM = 100, 1e-9
 COLD = """
 from time import perf_counter, process_time
 from solver import warm_up
@@ -208,6 +209,16 @@ def skips() -> Iterator[Claim]:
         yield Claim(f"{where}: time, times", float(slow / quick), "1")
 
 
+def many_at_once() -> Iterator[Claim]:
+    """256 variations of the circle of Willis, thirty depths each, in lock-step against one after the other."""
+    found = many.compared(scenes.willis(MANY_SEED), MANY_SEED)
+    name = "256 varied insertions at once, circle of Willis: "
+    yield Claim(name + "as many a second, one core", found.one_core, "1", "at least 3", found.one_core >= 3)
+    yield Claim(name + "as many a second, two cores", found.two_cores, "1", "at least 6", found.two_cores >= 6)
+    share = float(np.mean(found.apart > SAME_MM))
+    yield Claim(name + "depths apart by more than 1e-9 mm", share, "1", "at most 0.01 (snaps)", share <= 0.01)
+
+
 def compilation() -> Iterator[Claim]:
     """Compile everything of the solver in a fresh process that finds nothing compiled."""
     with tempfile.TemporaryDirectory() as folder:
@@ -220,7 +231,8 @@ def compilation() -> Iterator[Claim]:
 
 
 STUDIES: tuple[Callable[[], Iterator[Claim]], ...] = (
-    step_time, against_closed_form, sub_steps, scene_b, orders, voxel_order, in_a_sheath, skips, compilation
+    step_time, against_closed_form, sub_steps, scene_b, orders, voxel_order, in_a_sheath, skips, many_at_once,
+    compilation
 )  # fmt: skip
 """Everything that the solver promises. A new promise is a function here."""
 

@@ -92,9 +92,7 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
                     continue
             d = -1.0 if touched else value(c, cell) + reach
             if touched or d > 0.0:
-                found = jet_at(c, m, cell)
-                store_jet(jet, p, found)
-                d = found[0][0] + reach
+                d = store_jet(jet, p, jet_at(c, m, cell)) + reach
             anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
             if d > 0.0:
                 penetration[p] = d

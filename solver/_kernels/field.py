@@ -12,7 +12,7 @@ import numpy as np
 from solver._kernels.algebra import Six, Three, apply, conjugate
 from solver._kernels.data import Field
 from solver._kernels.flags import entry_point, inlined, kernel
-from solver._kernels.lanes import four, weighted
+from solver._kernels.lanes import four, quad, weighted
 
 Four = tuple[float, float, float, float]
 Cell = tuple[int, int, int, float, float, float]
@@ -91,16 +91,40 @@ def trilinear(c: Any, cell: Cell) -> float:
 @inlined
 def cubic(t: float) -> Four:
     """Weights of the four coefficients around a place in a cell: linear beyond the grid."""
-    if t < 0.0 or t > 1.0:
-        return 0.0, 1 - t, t, 0.0
-    r = 1 - t
-    return r * r * r / 6, 2.0 / 3 - t * t * (1 - 0.5 * t), 2.0 / 3 - r * r * (1 - 0.5 * r), t * t * t / 6
+    s = min(max(t, 0.0), 1.0)
+    r, beyond, (a, b, c, d) = 1 - s, t - s, slopes(t)
+    return (
+        r * r * r / 6 + beyond * a,
+        2.0 / 3 - s * s * (1 - 0.5 * s) + beyond * b,
+        2.0 / 3 - r * r * (1 - 0.5 * r) + beyond * c,
+        s * s * s / 6 + beyond * d,
+    )
+
+
+@inlined
+def slopes(t: float) -> Four:
+    """Derivatives of ``cubic`` per index."""
+    s = min(max(t, 0.0), 1.0)
+    r = 1 - s
+    return -0.5 * r * r, s * (1.5 * s - 2), r * (2 - 1.5 * r), 0.5 * s * s
+
+
+@inlined
+def bends(t: float) -> Four:
+    """Second derivatives of ``cubic`` per index; beyond the grid the ghost layer makes their sum 0."""
+    s = min(max(t, 0.0), 1.0)
+    return 1 - s, 3 * s - 2, 1 - 3 * s, s
 
 
 @inlined
 def plane(c: Any, i: int, j: int, k: int, q: Four) -> Any:
     """Four rows of four coefficients, weighted."""
-    return four(c, i, j, k) * q[0] + four(c, i, j + 1, k) * q[1] + four(c, i, j + 2, k) * q[2] + four(c, i, j + 3, k) * q[3]
+    return (
+        four(c, i, j, k) * q[0]
+        + four(c, i, j + 1, k) * q[1]
+        + four(c, i, j + 2, k) * q[2]
+        + four(c, i, j + 3, k) * q[3]
+    )
 
 
 @kernel
@@ -109,31 +133,19 @@ def value(c: Any, cell: Cell) -> float:
     i, j, k, u, v, w = cell
     p, q = cubic(u), cubic(v)
     low = plane(c, i, j, k, q) * p[0] + plane(c, i + 1, j, k, q) * p[1]
-    return weighted(low + plane(c, i + 2, j, k, q) * p[2] + plane(c, i + 3, j, k, q) * p[3], cubic(w))
-
-
-@inlined
-def slopes(t: float) -> Four:
-    """Derivatives of ``cubic`` per index."""
-    if t < 0.0 or t > 1.0:
-        return 0.0, -1.0, 1.0, 0.0
-    r = 1 - t
-    return -0.5 * r * r, t * (1.5 * t - 2), r * (2 - 1.5 * r), 0.5 * t * t
-
-
-@inlined
-def bends(t: float) -> Four:
-    """Second derivatives of ``cubic`` per index."""
-    if t < 0.0 or t > 1.0:
-        return 0.0, 0.0, 0.0, 0.0
-    return 1 - t, 3 * t - 2, 1 - 3 * t, t
+    return weighted(low + plane(c, i + 2, j, k, q) * p[2] + plane(c, i + 3, j, k, q) * p[3], quad(cubic(w)))
 
 
 @inlined
 def layer(c: Any, cell: Cell, a: int, q: tuple[Four, Four, Four]) -> Any:
     """The coefficients of plane a of a cell, weighted by ``cubic``, ``slopes`` and ``bends`` along the second axis."""
     i, j, k, _, _, _ = cell
-    one, two, three, last = four(c, i + a, j, k), four(c, i + a, j + 1, k), four(c, i + a, j + 2, k), four(c, i + a, j + 3, k)
+    one, two, three, last = (
+        four(c, i + a, j, k),
+        four(c, i + a, j + 1, k),
+        four(c, i + a, j + 2, k),
+        four(c, i + a, j + 3, k),
+    )
     return (
         one * q[0][0] + two * q[0][1] + three * q[0][2] + last * q[0][3],
         one * q[1][0] + two * q[1][1] + three * q[1][2] + last * q[1][3],
@@ -151,14 +163,14 @@ def across(w: Four, a: Any, b: Any, c: Any, d: Any) -> Any:
 def spline(c: Any, cell: Cell) -> tuple[Four, Six]:
     """Value and gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
     _, _, _, u, v, w = cell
-    p, dp, r, dr = cubic(u), slopes(u), cubic(w), slopes(w)
+    p, dp, r, dr = cubic(u), slopes(u), quad(cubic(w)), quad(slopes(w))
     q = cubic(v), slopes(v), bends(v)
     a, b, e, f = layer(c, cell, 0, q), layer(c, cell, 1, q), layer(c, cell, 2, q), layer(c, cell, 3, q)
     here, x = across(p, a[0], b[0], e[0], f[0]), across(dp, a[0], b[0], e[0], f[0])
     y, xy = across(p, a[1], b[1], e[1], f[1]), across(dp, a[1], b[1], e[1], f[1])
     xx, yy = across(bends(u), a[0], b[0], e[0], f[0]), across(p, a[2], b[2], e[2], f[2])
     first = weighted(here, r), weighted(x, r), weighted(y, r), weighted(here, dr)
-    second = weighted(xx, r), weighted(yy, r), weighted(here, bends(w))
+    second = weighted(xx, r), weighted(yy, r), weighted(here, quad(bends(w)))
     return first, (*second, weighted(xy, r), weighted(x, dr), weighted(y, dr))
 
 
@@ -181,11 +193,12 @@ def look_up(field: Field, points: Any, jets: Any) -> None:
 
 
 @inlined
-def store_jet(jets: Any, n: int, jet: tuple[Four, Six]) -> None:
-    """Write row n of an array (m, 10)."""
+def store_jet(jets: Any, n: int, jet: tuple[Four, Six]) -> float:
+    """Write row n of an array (m, 10); return its value, mm."""
     first, second = jet
     jets[n, 0], jets[n, 1], jets[n, 2], jets[n, 3] = first
     jets[n, 4], jets[n, 5], jets[n, 6], jets[n, 7], jets[n, 8], jets[n, 9] = second
+    return first[0]
 
 
 @entry_point

@@ -1,64 +1,21 @@
 """The way to a depth: steps of the base, each laid along the wire's own curve, relaxed, and taken back if it fails.
 
-One compiled loop, because a step costs a few microseconds per joint. All that it works on is behind one pointer, a
-handle: handing forty arrays to a kernel costs 11 µs, a handle 0.6.
+One compiled loop, because a step costs a few microseconds per joint.
 """
 
 import math
-from typing import Any, NamedTuple
-
-from numba import types
-from numba.experimental import structref
+from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import data
 from solver._kernels.chain import lay_out, segments_at
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
-from solver._kernels.flags import cached, entry_point, inlined, kernel, merged, released
+from solver._kernels.flags import cached, inlined, kernel, merged, released
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, anchor_friction_behind
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.start import extrapolate_start, follow, note_change
-
-
-class Contents(NamedTuple):
-    """What is behind a handle.
-
-    problem, table, introducer, limits : see ``data``.     place, report : (1,), (2,) records of ``data.PLACE`` and
-    ``data.REPORT``; the second report is that of the last good state.     force : (k + 1, 3) contact forces, N.
-    """
-
-    problem: Any
-    table: Any
-    introducer: Any
-    limits: Any
-    place: Any
-    report: Any
-    force: Any
-
-
-@structref.register
-class HandleType(types.StructRef):
-    """Numba's type of a handle; it keeps the arrays alive."""
-
-
-class Handle(structref.StructRefProxy):
-    """The contents as compiled code sees them: their fields are read there alone."""
-
-
-structref.define_proxy(Handle, HandleType, list(Contents._fields))  # type: ignore[no-untyped-call]
-
-
-@entry_point
-def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, report: Any, force: Any) -> Any:
-    """The handle of the contents."""
-    return Handle(problem, table, introducer, limits, place, report, force)  # type: ignore[no-untyped-call]
-
-
-def handle_of(contents: Contents) -> Any:
-    """The handle of the contents; where nothing is compiled (NUMBA_DISABLE_JIT) the contents themselves."""
-    return bound(*contents) if hasattr(bound, "py_func") else contents
 
 
 @released

@@ -16,7 +16,20 @@ from solver._kernels.flags import inlined, kernel
 
 NUMBERS = (
     *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted"),
-    *("decrement", "definite", "bending", "wall", "load", "jump", "moment", "largest", "still", "full", "cheap", "clear"),
+    *(
+        "decrement",
+        "definite",
+        "bending",
+        "wall",
+        "load",
+        "jump",
+        "moment",
+        "largest",
+        "still",
+        "full",
+        "cheap",
+        "clear",
+    ),
 )
 """Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
 Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0). Answered: the fall
@@ -36,7 +49,7 @@ class Block(NamedTuple):
     length, bend, cosine, sine, hold : (size,) of the joints: mm, N mm/rad, of the rest bend, bend over length².
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
-    row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of the current state and the trial.
+    row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
     load : (3,) on the tip, N.     force, torque, turned : as in ``data.REPORT``.     asked : (5,) a place that is
     looked up, how clear of the wall it was, and whether it is inside the grid.     number : see ``NUMBERS``.
     """

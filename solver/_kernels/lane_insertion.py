@@ -8,25 +8,15 @@ from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
 from solver._kernels import data
-from solver._kernels.data import CURRENT
+from solver._kernels.bare import bare
+from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
-from solver._kernels.flags import kernel, released
+from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
-from solver._kernels.lane_relax import (
-    ALONE,
-    DONE,
-    IDLE,
-    READY,
-    RESTED,
-    STOPPED,
-    SWEEP,
-    Team,
-    do_round,
-    hand_over,
-    take_over,
-)
+from solver._kernels.lane_decide import ALONE, DONE, IDLE, READY, RESTED, STOPPED, SWEEP
+from solver._kernels.lane_relax import Team, do_round, hand_over, take_over
 from solver._kernels.lanes import WIDTH, in_lanes
 from solver._kernels.minimise import begin
 from solver._kernels.newton_method import rests
@@ -65,25 +55,31 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
         in_lanes(raw.touch), in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque), in_lanes(raw.turned),
         in_lanes(raw.asked), in_lanes(raw.number),
     )  # fmt: skip
-    lanes, nows, counts = records
-    team = Team(wires, lanes, nows, counts, block, raw, first, wires[0].problem.field)
+    plan, raw, (lanes, nows, counts) = bare(plan), bare(raw), bare(records)
+    team = Team(wires, lanes, nows, counts, bare(first), wires[0].problem.field)
+    number = raw.number
     left = 0
     for lane in range(WIDTH):
-        problem = wires[lane].problem
-        raw.number[STIFFNESS, lane], raw.number[REACH, lane] = problem.stiffness, problem.chain.reach
-        lanes[lane].phase, lanes[lane].goal, lanes[lane].tolerance = IDLE, -1, wires[lane].limits.tolerance
+        set_up(team, number, lane)
         if plan.count[lane] > 0:
             next_goal(team, plan, lane)
-            proceed(team, plan, lane)
+            proceed(team, plan, raw, lane)
             left += lanes[lane].phase != IDLE
     while left > 0:
-        do_round(team)
+        do_round(team, block, raw, number)
         left = 0
         for lane in range(WIDTH):
             if lanes[lane].phase == DONE or lanes[lane].phase == RESTED:
-                end_relaxation(team, lane)
-                proceed(team, plan, lane)
+                proceed(team, plan, raw, lane)
             left += lanes[lane].phase != IDLE
+
+
+@kernel
+def set_up(team: Team, number: Any, lane: int) -> None:
+    """Put into a lane what stays the same all the way."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    number[STIFFNESS, lane], number[REACH, lane] = wire.problem.stiffness, wire.problem.chain.reach
+    me.phase, me.goal, me.tolerance = IDLE, -1, wire.limits.tolerance
 
 
 @kernel
@@ -99,86 +95,78 @@ def next_goal(team: Team, plan: Plan, lane: int) -> None:
 
 
 @kernel
-def proceed(team: Team, plan: Plan, lane: int) -> None:
-    """Go on until a step has to be relaxed, or nothing is left to do."""
+def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
+    """End a relaxation, and go on until the next step has to be relaxed or nothing is left to do."""
     me, wire = team.lanes[lane], team.wires[lane]
+    problem, report, at = wire.problem, wire.report[0], wire.place[0]
+    now = problem.scratch.descent[0]
+    relaxed = me.phase == DONE or me.phase == RESTED
+    if me.phase == RESTED:
+        hand_over(team, raw, lane, problem, report)
     while me.phase != IDLE:
+        if relaxed:
+            end_step(me, now, wire, problem)
         depth, roll = plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1]
-        if me.phase == STOPPED or arrived(wire.place[0], depth, roll):
-            write_down(team, plan, lane)
+        relaxed = False
+        if me.phase == STOPPED or arrived(at, depth, roll):
+            write_down(team, plan, raw.number, lane)
             next_goal(team, plan, lane)
             continue
         me.depth, me.roll = next_place(wire, depth, roll)
         me.k = set_out(wire, me.depth, me.roll)
-        me.outcome = data.CONVERGED
-        if me.k == 0:
-            end_step(team, lane, 0, 0.0)
-        elif begin_relaxation(team, lane):
+        me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
+        if me.k > 0 and start_relaxing(me, now, wire, problem, report):
+            shift = raw.length.shape[0] - me.k
+            fill_up(raw, lane, problem, min(me.filled, shift) if me.roll == me.clamped else 0, shift)
+            take_over(team, raw, lane, problem)
+            me.filled, me.clamped, me.stiffest = shift, me.roll, stiffest(problem.chain, me.k)
+            me.phase = SWEEP if me.allowed > 0 else ALONE
             return
-        else:
-            end_step(team, lane, 0, wire.problem.scratch.descent[0].energy)
+        relaxed = True
 
 
-@kernel
-def begin_relaxation(team: Team, lane: int) -> bool:
-    """Put a wire that set out on a step into its lane; False where it rests as it is, or cannot be relaxed."""
-    me, wire, raw = team.lanes[lane], team.wires[lane], team.raw
-    problem, at, k, limits = wire.problem, wire.place[0], me.k, wire.limits
-    now, counters = problem.scratch.descent[0], problem.scratch.counters[0]
+@merged
+def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) -> bool:
+    """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
+    at, k, limits, counters = wire.place[0], me.k, wire.limits, problem.scratch.counters[0]
     start = extrapolate_start(problem, CURRENT, k, likeness(problem, at, me.depth, me.roll), at.energy)
     counters.relaxations_without_friction += 1
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
     begin(now, start, energy_of(problem, start))
-    wire.report[0].start = now.energy
+    report.start = now.energy
     resting = rests(problem, k, now)
     if resting:
-        forget_forces(wire.report[0])
+        forget_forces(report)
     if now.slot != CURRENT:
         copy_state(problem, now.slot, CURRENT, k)
         now.slot = CURRENT
-    if resting or not math.isfinite(now.energy):
-        me.outcome = data.CONVERGED if resting else data.NON_FINITE
-        return False
-    shift = raw.length.shape[0] - k
-    fill_up(raw, lane, problem, min(me.filled, shift) if me.roll == me.clamped else 0, shift)
-    take_over(team, lane)
-    me.filled, me.clamped, me.stiffest = shift, me.roll, stiffest(problem.chain, k)
-    me.phase = SWEEP if me.allowed > 0 else ALONE
-    return True
+    finite = math.isfinite(now.energy)
+    me.outcome = data.CONVERGED if finite else data.NON_FINITE
+    return finite and not resting
 
 
-@kernel
-def end_relaxation(team: Team, lane: int) -> None:
-    """What follows the relaxation of a lane, as in ``minimise.relax_with_friction``."""
-    me, problem = team.lanes[lane], team.wires[lane].problem
-    now = problem.scratch.descent[0]
-    if me.phase == RESTED:
-        hand_over(team, lane)
+@merged
+def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
+    """Keep a step or take it back, as in ``minimise.relax_with_friction``, ``insertion.step`` and ``go``."""
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
-    if me.outcome == data.CONVERGED and least_turn_cosine(problem.state.r[CURRENT], me.k) < tol.FOLD_COSINE:
-        me.outcome = data.FOLDED
-    end_step(team, lane, now.iterations, now.energy)
-
-
-@kernel
-def end_step(team: Team, lane: int, iterations: int, energy: float) -> None:
-    """Keep a step or take it back, as in ``insertion.step`` and ``go``."""
-    me, wire = team.lanes[lane], team.wires[lane]
-    me.iterations += iterations
-    outcome = settle(wire, (me.depth, me.roll), me.k, me.outcome, energy, 0)
+    if me.k > 0 and me.outcome == data.CONVERGED:
+        folded = least_turn_cosine(problem.state.r[CURRENT], me.k) < tol.FOLD_COSINE
+        me.outcome = data.FOLDED if folded else me.outcome
+    me.iterations += now.iterations
+    outcome = settle(wire, (me.depth, me.roll), me.k, me.outcome, now.energy, 0)
     goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
 
 
 @kernel
-def write_down(team: Team, plan: Plan, lane: int) -> None:
+def write_down(team: Team, plan: Plan, number: Any, lane: int) -> None:
     """Write down the wire at a depth."""
     me, wire = team.lanes[lane], team.wires[lane]
     state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
     wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)
     k = sum_up(wire)
-    counted, number = team.counts[lane], team.raw.number
+    counted = team.counts[lane]
     counters.sweeps += counted.sweeps
     counters.rollouts += counted.rollouts
     counters.levenberg += counted.levenberg

@@ -1,4 +1,4 @@
-"""A trial state of wires in lanes: laid out by ``rollout``, its energy, whether it may be reached, and its acceptance."""
+"""A trial state of wires in lanes: laid out as by ``rollout``, its energy, and its acceptance."""
 
 from typing import Any
 
@@ -99,18 +99,16 @@ def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> No
     x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
     sites, touches, numbers, asks = raw.site, raw.touch[TRIAL], raw.number, raw.asked
     high, reach, zero = (c.shape[0] - 3.0, c.shape[1] - 3.0, c.shape[2] - 3.0), number[REACH], spread(0.0)
-    active, total, clear = number[ACTIVE] > 0.0, zero, number[CLEAR]
+    total, clear = zero, number[CLEAR]
     for n in range(base + 1, b.length.shape[0] + 1):
         for p in range(first[n], first[n + 1]):
             along = site[p, ALONG]
             q = (x[n, 0] + along * r[n, 0, 2], x[n, 1] + along * r[n, 1, 2], x[n, 2] + along * r[n, 2, 2])
-            f = indices(m, o, q)
-            inside = (f[0] >= 0.0) & (f[1] >= 0.0) & (f[2] >= 0.0)
-            inside = inside & (f[0] <= high[0]) & (f[1] <= high[1]) & (f[2] <= high[2])
+            inside = between(indices(m, o, q), high)
             room = -site[p, ANCHOR + 3] - reach
-            way = (q[0] - site[p, ANCHOR], q[1] - site[p, ANCHOR + 1], q[2] - site[p, ANCHOR + 2])
+            way = minus(q, (site[p, ANCHOR], site[p, ANCHOR + 1], site[p, ANCHOR + 2]))
             still = inside & (room >= 0.0) & (square * dot(way, way) <= room * room)
-            here = active & (site[p, WEIGHT] > 0.0)
+            here = (number[ACTIVE] > 0.0) & (site[p, WEIGHT] > 0.0)
             clear = clear + select(here & still, 1.0, zero)
             touch[p, 0] = zero
             wanted = bits(here & ~still)
@@ -118,19 +116,32 @@ def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> No
                 asked[0], asked[1], asked[2], asked[3], asked[4] = q[0], q[1], q[2], room, select(inside, 1.0, zero)
                 for lane in range(WIDTH):
                     if wanted >> lane & 1:
-                        cell = locate(c, indices(m, o, (asks[0, lane], asks[1, lane], asks[2, lane])))
+                        at = (asks[0, lane], asks[1, lane], asks[2, lane])
                         how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, asks[4, lane] > 0.0
-                        d, known, jet = look(c, m, cell, how)
-                        numbers[CHEAP if d < 0.0 else FULL, lane] += 1.0
-                        for a in range(3):
-                            sites[p, ANCHOR + a, lane] = asks[a, lane]
-                        sites[p, ANCHOR + 3, lane] = known
-                        if d > 0.0:
-                            touches[p, 0, lane] = d
-                            for a in range(10):
-                                touches[p, 1 + a, lane] = jet[a]
+                        found = look(c, m, locate(c, indices(m, o, at)), how)
+                        numbers[CHEAP if found[0] < 0.0 else FULL, lane] += 1.0
+                        keep(sites, touches, p, lane, at, found)
                 total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
     number[WALL], number[CLEAR] = total, clear
+
+
+@inlined
+def between(f: Three, high: tuple[float, float, float]) -> Any:
+    """In which lanes indices are those of a place in the grid, the last of which are ``high``."""
+    low = (f[0] >= 0.0) & (f[1] >= 0.0) & (f[2] >= 0.0)
+    return low & (f[0] <= high[0]) & (f[1] <= high[1]) & (f[2] <= high[2])
+
+
+@inlined
+def keep(sites: Any, touches: Any, p: int, lane: int, at: Three, found: tuple[float, float, Any]) -> None:
+    """Keep what the look-up of a point said."""
+    d, known, jet = found
+    sites[p, ANCHOR, lane], sites[p, ANCHOR + 1, lane], sites[p, ANCHOR + 2, lane] = at
+    sites[p, ANCHOR + 3, lane] = known
+    if d > 0.0:
+        touches[p, 0, lane] = d
+        for a in range(10):
+            touches[p, 1 + a, lane] = jet[a]
 
 
 @kernel
@@ -141,17 +152,21 @@ def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, bool]) -> tu
     The penetration is 0 off contact, and -1 where the first, cheap look was enough.
     """
     reach, gap, touched, inside = how
-    if inside and not touched:
-        phi = trilinear(c, cell) + gap
-        if phi + reach <= 0.0:
-            return -1.0, phi, NO_JET
-    d = -1.0 if touched else value(c, cell) + reach
-    jet = NO_JET
+    d, jet, cheap = -1.0, NO_JET, False
+    if not touched:
+        phi = trilinear(c, cell)
+        cheap = inside and phi + gap + reach <= 0.0
+        # as good as certain to touch: its value alone is not asked first
+        touched = phi - gap + reach > 0.0
+        if cheap:
+            d = phi + gap + reach
+        elif not touched:
+            d = value(c, cell) + reach
     if touched or d > 0.0:
         first, second = jet_at(c, m, cell)
         jet = first + second
         d = first[0] + reach
-    return max(d, 0.0), d - reach if inside else 1.0, jet
+    return -1.0 if cheap else max(d, 0.0), d - reach if inside else 1.0, jet
 
 
 @kernel

@@ -3,8 +3,8 @@
 A recursion along a wire waits for the result before, not for the processor, which does eight multiplications in the
 time of one. A kernel whose numbers are ``Lanes`` therefore does eight wires in lock-step in the time of one, and its
 source is that of one wire: sums and products, ``math.sqrt``, ``sin`` and ``cos``. Where one wire would take a branch,
-lanes may disagree: ``select`` takes a value for each lane, and ``anywhere`` asks whether any lane needs a branch at all.
-Both are plain Python for plain numbers.
+lanes may disagree: ``select`` takes a value for each lane, ``anywhere`` asks whether any lane needs the branch at all.
+Both are plain Python for plain numbers. A vector of four, a quad, is a row of the wall's coefficients.
 """
 
 import math
@@ -14,16 +14,19 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, models, overload, register_model
-from numba.np.arrayobj import make_array, populate_array
+from numba import extending, types
+from numba.core import cgutils, typeconv
+from numba.core.typing import templates
+from numba.np import arrayobj
 
 from solver._kernels.flags import inlined
 
 untyped: Any = types
+extend: Any = extending
+typing: Any = templates
+arrays: Any = arrayobj
+build: Any = cgutils
+conversions: Any = typeconv
 WIDTH = 8
 """Lanes: what AVX-512 holds. Where the processor's vectors are shorter the compiler takes two or four for each."""
 BITS = ir.VectorType(ir.IntType(1), WIDTH)
@@ -40,7 +43,7 @@ class VectorType(untyped.Type):  # type: ignore[misc]
 
     def can_convert_from(self, _: Any, other: Any) -> Any:
         """A plain number is the same one in each lane."""
-        return Conversion.safe if isinstance(other, untyped.Number) else None
+        return conversions.Conversion.safe if isinstance(other, untyped.Number) else None
 
 
 class MaskType(untyped.Type):  # type: ignore[misc]
@@ -53,16 +56,16 @@ class MaskType(untyped.Type):  # type: ignore[misc]
 LANES, QUAD, MASK = VectorType(WIDTH), VectorType(4), MaskType()
 
 
-@register_model(VectorType)
-class VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+@extend.register_model(VectorType)
+class VectorModel(extend.models.PrimitiveModel):  # type: ignore[misc]
     """A vector register."""
 
     def __init__(self, manager: Any, kind: VectorType) -> None:
         super().__init__(manager, kind, kind.value)
 
 
-@register_model(MaskType)
-class MaskModel(models.PrimitiveModel):  # type: ignore[misc]
+@extend.register_model(MaskType)
+class MaskModel(extend.models.PrimitiveModel):  # type: ignore[misc]
     """A mask register."""
 
     def __init__(self, manager: Any, kind: Any) -> None:
@@ -77,7 +80,7 @@ def _spread(builder: Any, number: Any, kind: VectorType) -> Any:
     return builder.shuffle_vector(first, nothing, everywhere)
 
 
-@lower_cast(untyped.Number, VectorType)
+@extend.lower_cast(untyped.Number, VectorType)
 def _from_number(context: Any, builder: Any, kind: Any, to: Any, value: Any) -> Any:
     return _spread(builder, context.cast(builder, value, kind, untyped.float64), to)
 
@@ -85,15 +88,15 @@ def _from_number(context: Any, builder: Any, kind: Any, to: Any, value: Any) -> 
 def _operator(symbol: Any, takes: Any, gives: Any, lower: Callable[..., Any]) -> None:
     """Teach the compiler an operator of lanes or masks; numbers beside them are spread."""
 
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class Template(typing.AbstractTemplate):  # type: ignore[misc]
         def generic(self, args: tuple[Any, ...], _: Any) -> Any:
             plain = untyped.Number if takes is not MASK else ()
             fits = takes in args and all(a == takes or isinstance(a, plain) for a in args)
-            return signature(gives, *[takes] * len(args)) if fits else None
+            return typing.signature(gives, *[takes] * len(args)) if fits else None
 
-    infer_global(symbol)(Template)
+    typing.infer_global(symbol)(Template)
     for count in (1, 2):
-        lower_builtin(symbol, *[takes] * count)(lambda _, builder, __, args: lower(builder, *args))
+        extend.lower_builtin(symbol, *[takes] * count)(lambda _, builder, __, args: lower(builder, *args))
 
 
 _SUMS = ((operator.add, "fadd"), (operator.iadd, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"))
@@ -115,15 +118,15 @@ def _mathematical(function: Any) -> None:
     """Teach the compiler a function of ``math`` for lanes."""
     name = f"llvm.{function.__name__}.v{WIDTH}f64"
 
-    @intrinsic  # type: ignore[misc]
+    @extend.intrinsic
     def of_lanes(_: Any, x: Any) -> Any:
         def lower(__: Any, builder: Any, ___: Any, args: Any) -> Any:
             kind = ir.FunctionType(LANES.value, [LANES.value])
-            return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
+            return builder.call(build.get_or_insert_function(builder.module, kind, name), args)
 
-        return signature(LANES, LANES), lower
+        return typing.signature(LANES, LANES), lower
 
-    @overload(function, strict=False)  # type: ignore[misc]
+    @extend.overload(function, strict=False)
     def choose(x: Any) -> Any:
         return (lambda x: of_lanes(x)) if x == LANES else None
 
@@ -132,15 +135,15 @@ for _function in (math.sqrt, math.sin, math.cos):
     _mathematical(_function)
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
 def _chosen(_: Any, mask: Any, one: Any, other: Any) -> Any:
-    return signature(LANES, MASK, LANES, LANES), lambda __, builder, ___, args: builder.select(*args)
+    return typing.signature(LANES, MASK, LANES, LANES), lambda __, builder, ___, args: builder.select(*args)
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
 def bits(_: Any, mask: Any) -> Any:
     """The lanes in which a mask holds, as the bits of an integer: the first lane is the lowest."""
-    return signature(untyped.int64, MASK), lambda context, builder, __, args: builder.zext(
+    return typing.signature(untyped.int64, MASK), lambda context, builder, __, args: builder.zext(
         builder.bitcast(args[0], ir.IntType(WIDTH)), ir.IntType(64)
     )
 
@@ -150,7 +153,7 @@ def select(condition: Any, one: Any, other: Any) -> Any:
     return one if condition else other
 
 
-@overload(select, jit_options={"forceinline": True}, strict=False)  # type: ignore[misc]
+@extend.overload(select, jit_options={"forceinline": True}, strict=False)
 def _select(condition: Any, one: Any, other: Any) -> Any:
     if condition == MASK:
         return lambda condition, one, other: _chosen(condition, one, other)
@@ -162,7 +165,7 @@ def anywhere(condition: Any) -> Any:
     return condition
 
 
-@overload(anywhere, jit_options={"forceinline": True}, strict=False)  # type: ignore[misc]
+@extend.overload(anywhere, jit_options={"forceinline": True}, strict=False)
 def _anywhere(condition: Any) -> Any:
     return (lambda condition: bits(condition) != 0) if condition == MASK else (lambda condition: condition)
 
@@ -185,21 +188,21 @@ def select3(condition: Any, one: Any, other: Any) -> Any:
     return select(condition, one[0], other[0]), select(condition, one[1], other[1]), select(condition, one[2], other[2])
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
 def spread(_: Any, number: Any) -> Any:
     """A number in all lanes."""
-    return signature(LANES, untyped.float64), lambda __, builder, ___, args: _spread(builder, args[0], LANES)
+    return typing.signature(LANES, untyped.float64), lambda __, builder, ___, args: _spread(builder, args[0], LANES)
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
 def _four(_: Any, c: Any, i: Any, j: Any, k: Any) -> Any:
     def lower(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-        array = make_array(kinds.args[0])(context, builder, args[0])
-        place = cgutils.get_item_pointer(context, builder, kinds.args[0], array, args[1:], wraparound=False)
+        array = arrays.make_array(kinds.args[0])(context, builder, args[0])
+        place = build.get_item_pointer(context, builder, kinds.args[0], array, args[1:], wraparound=False)
         four = ir.VectorType(ir.FloatType(), 4)
         return builder.fpext(builder.load(builder.bitcast(place, four.as_pointer()), align=4), QUAD.value)
 
-    return signature(QUAD, c, untyped.intp, untyped.intp, untyped.intp), lower
+    return typing.signature(QUAD, c, untyped.intp, untyped.intp, untyped.intp), lower
 
 
 def four(c: Any, i: int, j: int, k: int) -> Any:
@@ -207,51 +210,71 @@ def four(c: Any, i: int, j: int, k: int) -> Any:
     return c[i, j, k : k + 4].astype(np.float64)
 
 
-@overload(four, jit_options={"forceinline": True}, strict=False)  # type: ignore[misc]
+@extend.overload(four, jit_options={"forceinline": True}, strict=False)
 def _four_of(c: Any, i: Any, j: Any, k: Any) -> Any:
     return lambda c, i, j, k: _four(c, i, j, k)
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
+def _quad(_: Any, numbers: Any) -> Any:
+    def lower(__: Any, builder: Any, ___: Any, args: Any) -> Any:
+        result = ir.Constant(QUAD.value, ir.Undefined)
+        for lane in range(4):
+            number = builder.extract_value(args[0], lane)
+            result = builder.insert_element(result, number, ir.Constant(ir.IntType(32), lane))
+        return result
+
+    return typing.signature(QUAD, untyped.UniTuple(untyped.float64, 4)), lower
+
+
+def quad(numbers: tuple[float, float, float, float]) -> Any:
+    """Four numbers as a vector."""
+    return np.array(numbers)
+
+
+@extend.overload(quad, jit_options={"forceinline": True}, strict=False)
+def _quad_of(numbers: Any) -> Any:
+    return lambda numbers: _quad(numbers)
+
+
+@extend.intrinsic
 def _weighted(_: Any, x: Any, w: Any) -> Any:
     def lower(__: Any, builder: Any, ___: Any, args: Any) -> Any:
-        terms = []
-        for lane in range(4):
-            at = ir.Constant(ir.IntType(32), lane)
-            terms.append((builder.extract_element(args[0], at), builder.extract_value(args[1], lane)))
-        products = [builder.fmul(a, b, flags=CONTRACT) for a, b in terms]
-        low, high = (builder.fadd(products[n], products[n + 2], flags=CONTRACT) for n in (0, 1))
+        pair = ir.VectorType(ir.IntType(32), 2)
+        products = builder.fmul(*args, flags=CONTRACT)
+        halves = [builder.shuffle_vector(products, products, ir.Constant(pair, [n, n + 1])) for n in (0, 2)]
+        both = builder.fadd(*halves, flags=CONTRACT)
+        low, high = (builder.extract_element(both, ir.Constant(ir.IntType(32), n)) for n in (0, 1))
         return builder.fadd(low, high, flags=CONTRACT)
 
-    return signature(untyped.float64, QUAD, untyped.UniTuple(untyped.float64, 4)), lower
+    return typing.signature(untyped.float64, QUAD, QUAD), lower
 
 
-def weighted(x: Any, w: tuple[float, float, float, float]) -> float:
+def weighted(x: Any, w: Any) -> float:
     """The sum of the four numbers of a vector, each with its weight."""
     return float(x[0] * w[0] + x[2] * w[2] + (x[1] * w[1] + x[3] * w[3]))
 
 
-@overload(weighted, jit_options={"forceinline": True}, strict=False)  # type: ignore[misc]
+@extend.overload(weighted, jit_options={"forceinline": True}, strict=False)
 def _weighted_of(x: Any, w: Any) -> Any:
     return lambda x, w: _weighted(x, w)
 
 
-@intrinsic  # type: ignore[misc]
+@extend.intrinsic
 def in_lanes(_: Any, array: Any) -> Any:
-    """An array (..., WIDTH) of numbers as one (...) of lanes, in the same memory."""
+    """An array (..., WIDTH) of numbers as one (...) of lanes, in the same memory, which must be kept."""
     result = untyped.Array(LANES, array.ndim - 1, "C", aligned=False)
 
     def lower(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-        source = make_array(kinds.args[0])(context, builder, args[0])
-        view = make_array(result)(context, builder)
-        shape, strides = (cgutils.unpack_tuple(builder, s, array.ndim)[:-1] for s in (source.shape, source.strides))
+        source = arrays.make_array(kinds.args[0])(context, builder, args[0])
+        view = arrays.make_array(result)(context, builder)
+        shape, strides = (build.unpack_tuple(builder, s, array.ndim)[:-1] for s in (source.shape, source.strides))
         size = context.get_constant(untyped.intp, 8 * WIDTH)
         data = builder.bitcast(source.data, LANES.value.as_pointer())
-        populate_array(view, data, shape, strides, size, source.meminfo, source.parent)
-        context.nrt.incref(builder, result, view._getvalue())
+        arrays.populate_array(view, data, shape, strides, size, None, source.parent)
         return view._getvalue()
 
-    return signature(result, array), lower
+    return typing.signature(result, array), lower
 
 
 def room(*shape: int) -> np.ndarray[Any, np.dtype[np.float64]]:

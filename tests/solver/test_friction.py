@@ -43,7 +43,7 @@ def test_friction_raises_the_push_and_is_not_computed_without_a_coefficient() ->
         solution = last(insertion, np.arange(1.0, 61.0))
         push.append(solution.push_force_N)
         work.append(solution.friction_energy_N_mm)
-        assert insertion._work.problem.friction.load.size == 0 or coefficient > 0
+        assert insertion.work.problem.friction.load.size == 0 or coefficient > 0
         np.testing.assert_allclose(solution.reaction_force_N, -solution.contact_force_N.sum(axis=0), atol=1e-6)
     assert push[0] < push[1] < push[2]
     assert work[0] == 0.0 < work[1] < work[2]
