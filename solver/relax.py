@@ -129,7 +129,7 @@ def relax(
         work.load(load_N)
     work.clamp(entry, base_frame(direction, material_axis, roll_deg))
     chain, state = work.problem.chain, work.problem.state
-    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k)
+    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
     status, iterations = work.advance(depth_mm, 0.0, work.k)
     solution = work.solution(status, iterations)
     vars(solution).update(depth_mm=depth_mm, roll_deg=roll_deg)

@@ -1,4 +1,4 @@
-"""Many insertions at once against one after the other: 256 variations of one scene, as uncertainty studies need them."""
+"""Many insertions at once against one after the other: 256 variations of one scene, as an uncertainty study asks for."""
 
 from collections.abc import Sequence
 from time import perf_counter, process_time

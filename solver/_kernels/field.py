@@ -71,10 +71,11 @@ def locate(c: Any, f: Three) -> Cell:
 
 
 @inlined
-def in_grid(c: Any, f: Three) -> bool:
-    """Whether continuous indices lie among a field's nodes."""
-    shape = c.shape
-    return bool(0.0 <= f[0] <= shape[0] - 3 and 0.0 <= f[1] <= shape[1] - 3 and 0.0 <= f[2] <= shape[2] - 3)
+def depth_in_grid(c: Any, f: Three) -> float:
+    """How far inside a field's nodes continuous indices lie, in indices; negative outside."""
+    s = c.shape
+    low = min(f[0], f[1], f[2])
+    return float(min(low, s[0] - 3 - f[0], s[1] - 3 - f[1], s[2] - 3 - f[2]))
 
 
 @inlined

@@ -235,9 +235,22 @@ def lay_along(
         source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
     elif introducer.translate and ahead != 0.0:
         source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
-    follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
+    # moved on by whole segments, the joints of a straight wire lie where joints lay, and are there already
+    lies = problem.straight and source == data.LAST_GOOD and abs(chain.length[0] - before) < tol.SAME_LENGTH_MM
+    joints = (min(was, k) if lies and same_base(state.r) else 0, k)
+    follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], joints)
     if problem.friction.coefficient > 0.0:
         anchor_friction_behind(problem, state.x[data.LAST_GOOD], was, k, ahead)
+
+
+@inlined
+def same_base(r: Any) -> bool:
+    """Whether the base is turned as in the last good state."""
+    same = True
+    for a in range(3):
+        for b in range(3):
+            same = same and r[data.CURRENT, 0, a, b] == r[data.LAST_GOOD, 0, a, b]
+    return same
 
 
 @merged

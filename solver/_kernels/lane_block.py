@@ -50,8 +50,8 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``data.REPORT``.     asked : (5,) a place that is
-    looked up, how clear of the wall it was, and whether it is inside the grid.     number : see ``NUMBERS``.
+    load : (3,) on the tip, N.     force, torque, turned : as in ``data.REPORT``.     asked : (4,) a place that is
+    looked up, and how clear of the wall it was.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -75,7 +75,7 @@ class Block(NamedTuple):
 
 SHAPES = (
     *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
-    *("3", "3", "3", "2 3", "5", str(len(NUMBERS))),
+    *("3", "3", "3", "2 3", "4", str(len(NUMBERS))),
 )
 """Of the arrays of a block: k joints, n nodes, p points."""
 LANE = record(

@@ -6,7 +6,7 @@ from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import Three, apply_transposed, dot, load3, load9, minus, store3, store9, times
 from solver._kernels.data import CURRENT, TRIAL, Field
-from solver._kernels.field import Cell, indices, jet_at, locate, trilinear, value
+from solver._kernels.field import Cell, depth_in_grid, indices, jet_at, locate, trilinear, value
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.lane_block import (
     ACCEPTED,
@@ -96,40 +96,34 @@ def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> No
     raw : the numbers of b.
     """
     c, m, o, gap, square = field.coefficients, field.to_index, field.origin, field.gap, field.slope * field.slope
+    spacing = field.spacing
     x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
     sites, touches, numbers, asks = raw.site, raw.touch[TRIAL], raw.number, raw.asked
-    high, reach, zero = (c.shape[0] - 3.0, c.shape[1] - 3.0, c.shape[2] - 3.0), number[REACH], spread(0.0)
+    reach, zero = number[REACH], spread(0.0)
     total, clear = zero, number[CLEAR]
     for n in range(base + 1, b.length.shape[0] + 1):
         for p in range(first[n], first[n + 1]):
             along = site[p, ALONG]
             q = (x[n, 0] + along * r[n, 0, 2], x[n, 1] + along * r[n, 1, 2], x[n, 2] + along * r[n, 2, 2])
-            inside = between(indices(m, o, q), high)
             room = -site[p, ANCHOR + 3] - reach
             way = minus(q, (site[p, ANCHOR], site[p, ANCHOR + 1], site[p, ANCHOR + 2]))
-            still = inside & (room >= 0.0) & (square * dot(way, way) <= room * room)
+            still = (room >= 0.0) & (square * dot(way, way) <= room * room)
             here = (number[ACTIVE] > 0.0) & (site[p, WEIGHT] > 0.0)
             clear = clear + select(here & still, 1.0, zero)
             touch[p, 0] = zero
             wanted = bits(here & ~still)
             if wanted != 0:
-                asked[0], asked[1], asked[2], asked[3], asked[4] = q[0], q[1], q[2], room, select(inside, 1.0, zero)
+                asked[0], asked[1], asked[2], asked[3] = q[0], q[1], q[2], room
                 for lane in range(WIDTH):
                     if wanted >> lane & 1:
                         at = (asks[0, lane], asks[1, lane], asks[2, lane])
-                        how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, asks[4, lane] > 0.0
-                        found = look(c, m, locate(c, indices(m, o, at)), how)
+                        f = indices(m, o, at)
+                        how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, -spacing * depth_in_grid(c, f)
+                        found = look(c, m, locate(c, f), how)
                         numbers[CHEAP if found[0] < 0.0 else FULL, lane] += 1.0
                         keep(sites, touches, p, lane, at, found)
                 total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
     number[WALL], number[CLEAR] = total, clear
-
-
-@inlined
-def between(f: Three, high: tuple[float, float, float]) -> Any:
-    """In which lanes indices are those of a place in the grid, the last of which are ``high``."""
-    low = (f[0] >= 0.0) & (f[1] >= 0.0) & (f[2] >= 0.0)
-    return low & (f[0] <= high[0]) & (f[1] <= high[1]) & (f[2] <= high[2])
 
 
 @inlined
@@ -145,17 +139,17 @@ def keep(sites: Any, touches: Any, p: int, lane: int, at: Three, found: tuple[fl
 
 
 @kernel
-def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, bool]) -> tuple[float, float, Any]:
+def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, float]) -> tuple[float, float, Any]:
     """Look a point up as ``energy.wall_energy`` does: penetration, what is known of the distance, and the jet.
 
-    how : reach, the field's gap, whether it touched when it was looked up last, and whether it is inside the grid.
+    how : reach, the field's gap, whether it touched when it was looked up last, and how far outside the grid it is, mm.
     The penetration is 0 off contact, and -1 where the first, cheap look was enough.
     """
-    reach, gap, touched, inside = how
+    reach, gap, touched, border = how
     d, jet, cheap = -1.0, NO_JET, False
     if not touched:
         phi = trilinear(c, cell)
-        cheap = inside and phi + gap + reach <= 0.0
+        cheap = border <= 0.0 and phi + gap + reach <= 0.0
         # as good as certain to touch: its value alone is not asked first
         touched = phi - gap + reach > 0.0
         if cheap:
@@ -166,7 +160,7 @@ def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, bool]) -> tu
         first, second = jet_at(c, m, cell)
         jet = first + second
         d = first[0] + reach
-    return -1.0 if cheap else max(d, 0.0), d - reach if inside else 1.0, jet
+    return -1.0 if cheap else max(d, 0.0), max(d - reach, border) if border <= 0.0 else 1.0, jet
 
 
 @kernel

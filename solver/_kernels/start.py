@@ -35,14 +35,15 @@ def leaving(a: Any, b: Any, centre: Any, radius: float) -> float:
 
 
 @entry_point
-def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, k: int) -> None:
-    """Lay k segments along a polyline (m, 3) from x[0], which lies on its start; fill u, x and frames r.
+def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, joints: tuple[int, int]) -> None:
+    """Lay segments along a polyline (m, 3) from x[0], which lies on its start; fill u, x and frames r.
 
     Each joint is the first place on the curve at its segment's length from the joint before; past the end the
     last direction continues. r[0] must hold the base frame.
+    joints : the first one to bend, up to which the wire lies on the polyline's own joints, and the number of segments.
     """
-    at, start = 0, 0.0
-    for j in range(k):
+    at, start = joints[0], 0.0
+    for j in range(joints[0], joints[1]):
         length = chain.length[j]
         while at < m - 1:
             t = leaving(curve[at], curve[at + 1], x[j], length)
