@@ -18,6 +18,7 @@ from solver._kernels.lane_block import LANE, SHAPES, Block
 from solver._kernels.lane_insertion import Plan, advance_together
 from solver._kernels.lanes import WIDTH, room
 from solver._kernels.minimise import NEWTON
+from solver.errors import refuse
 from solver.insertion import Insertion
 from solver.solution import Solution, Status
 from solver.workspace import Workspace
@@ -30,15 +31,21 @@ class Insertions:
     """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
 
     insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
-    from one another by ``VesselWall.like`` go in lock-step, WIDTH of them for little more than the price of one; each
-    comes to lie as by itself (to rounding: 1e-9 mm, away from snaps). With friction, a finite torsional stiffness, a
-    sampled hull, no wall or the closed form each goes by itself.
+    from one another by ``VesselWall.like`` go in lock-step, WIDTH at a time; each comes to lie as by itself (to
+    rounding: 1e-9 mm, away from snaps; straight wires 2e-8). With friction, a finite torsional stiffness, a sampled
+    hull, no wall or the closed form each goes by itself.
     threads : how many of them to use (default: one a core); Python's lock is not held.
+    Raises ValueError where one insertion is given twice.
     """
 
     def __init__(self, insertions: Iterable[Insertion], *, threads: int | None = None) -> None:
         self.insertions = tuple(insertions)
-        self.threads = threads or len(os.sched_getaffinity(0))
+        if len(set(map(id, self.insertions))) < len(self.insertions):
+            got = f"{len(self.insertions)} of which {len(set(map(id, self.insertions)))} are different"
+            refuse("insertions", "insertions", got, "each of them once", "make another Insertion of the same wire")
+        if threads is not None and threads < 1:
+            refuse("insertions", "threads", threads, "1 or more", "leave it out for one a core")
+        self.threads = threads or os.cpu_count() or 1
 
     def to_depths(
         self, depths_mm: Sequence[float] | Sequence[Sequence[float]], roll_deg: float | Sequence[Any] = 0.0
@@ -79,7 +86,9 @@ def kind_of(insertion: Insertion, deepest_mm: float) -> tuple[int, int, int] | N
     work, wall = insertion.work, insertion.wall
     plain = wall is not None and wall.friction == 0.0 and wall.samples == 0 and not insertion.wire.twists
     reached = work.limits.method == NEWTON and work.skips == skips.ALL and insertion.reaches(deepest_mm)
-    return (id(work.field.coefficients), work.rule.zone, work.rule.tip_at.size) if plain and reached else None
+    # there are no vectors where nothing is compiled
+    possible = plain and reached and hasattr(advance_together, "py_func")
+    return (id(work.field.coefficients), work.rule.zone, work.rule.tip_at.size) if possible else None
 
 
 def together(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:

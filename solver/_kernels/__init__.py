@@ -9,5 +9,12 @@ rollout          joints and frames from the controls    blocks           a node'
 newton           the step, by a Riccati recursion       newton_straight  the same for a straight round wire
 newton_method    one iteration of Newton's method       closed_form      one sweep of the seed's eq. 8-10
 minimise         the loop around either method          crossing         whether a way passes through a wall
-start            the wire laid along a curve            insertion        the steps to a depth, behind one pointer
+start            the wire laid along a curve            insertion        the steps to a depth
+handle           all that these work on, behind one pointer
+
+Several wires side by side, in the processor's vectors, with the same formulas:
+lanes            numbers of eight wires as one type     bare             arrays without reference counts
+lane_block       eight wires in memory                  lane_newton      sweep and gradient
+lane_trial       trial states and their energies        lane_decide      what a lane does next
+lane_relax       one round of all lanes                 lane_insertion   from depth to depth
 """

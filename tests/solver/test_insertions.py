@@ -168,3 +168,12 @@ def test_a_wall_made_from_another_shares_its_grid() -> None:
     assert other.field.coefficients is wall.field.coefficients
     with pytest.raises(ValueError, match="stiffness_N_mm2"):
         wall.like(stiffness_N_mm2=-1.0)
+
+
+def test_one_insertion_twice_and_no_threads_are_refused() -> None:
+    insertion = Insertion(GuideWire(1.0, 0.18, 10.0), bend_wall(), [0, 0, 0], [0, 0, 1])
+    with pytest.raises(ValueError, match="insertions"):
+        Insertions([insertion, insertion])
+    with pytest.raises(ValueError, match="threads"):
+        Insertions([insertion], threads=0)
+    assert Insertions([]).to_depths([10.0]) == []
