@@ -14,7 +14,7 @@ validate: setup
 	  --sweep simulate.bending_scale=0.8,1.2 --sweep simulate.wall_scale=0.333,3 --sweep simulate.roll_offset_deg=-15,15
 
 test: setup lint
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 
 lint: setup
 	$(BIN)/ruff check .

@@ -77,16 +77,6 @@ class ScanGrid:
         return float(np.prod(self.spacing_mm) ** (1.0 / 3.0))
 
 
-def centred_grid(
-    centre_mm: ArrayLike, shape: tuple[int, ...], spacing_mm: ArrayLike, direction: ArrayLike | None = None
-) -> ScanGrid:
-    """The grid of that shape and spacing whose middle lies at ``centre_mm``."""
-    spacing = np.broadcast_to(np.asarray(spacing_mm, dtype=np.float64), 3).copy()
-    axes = np.eye(3) if direction is None else np.asarray(direction, dtype=np.float64)
-    half = axes @ (0.5 * (np.array(shape) - 1) * spacing)
-    return ScanGrid(shape, spacing, np.asarray(centre_mm, dtype=np.float64) - half, axes)
-
-
 def voxels_near(index: Array, radii_mm: Array, grid: ScanGrid) -> Index:
     """Indices (m, 3) of voxels within radii (n,) mm of points (n, 3), which are given in index coordinates."""
     mask = np.zeros(grid.shape, dtype=bool)

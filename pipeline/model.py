@@ -33,6 +33,7 @@ class Wire:
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
     torsional_stiffness_N_mm2: Annotated[float, Field(gt=0)] = float("inf")
+    weight_N_per_mm: Annotated[float, Field(ge=0, le=1)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -49,17 +50,19 @@ class Clamp:
     """Where the wire is held: entry_mm (3,) LPS, direction (3,) of length 1; note and warning are for the report.
 
     material_axis : (3,) where material axis 1 points at roll 0; None: the world axis least aligned with direction.
+    down : (3,) where the wire's weight pulls; None: it has none.
     """
 
     entry_mm: Array
     direction: Array
     material_axis: Array | None = None
+    down: Array | None = None
     note: str = ""
     warning: str = ""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("entry_mm", "direction", "material_axis"):
+        for name in ("entry_mm", "direction", "material_axis", "down"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
 
@@ -80,12 +83,10 @@ class Volume(Grid):
 class Lumen:
     """The vessel: ``distance`` is the signed distance to its wall in mm on the vessel's own box, negative inside.
 
-    mask : uint8 on the same box, the voxels that are connected to the seeds.
     wall_level : the grey value taken as the wall; NaN where the lumen did not come from grey values.
     """
 
     distance: Grid
-    mask: Grid
     wall_level: float = float("nan")
     warnings: tuple[str, ...] = ()
     counters: Counters = field(default_factory=dict)
@@ -149,11 +150,6 @@ class Curve:
             object.__setattr__(self, name, read_only(marks, bool))
 
     @property
-    def arc_mm(self) -> Array:
-        """Arc length (n,) from the entry, mm."""
-        return arc_length(self.points_mm)
-
-    @property
     def length_mm(self) -> float:
         """Length of the curve, mm; 0 for an empty one."""
-        return float(self.arc_mm[-1]) if len(self.points_mm) else 0.0
+        return float(arc_length(self.points_mm)[-1]) if len(self.points_mm) else 0.0

@@ -21,6 +21,14 @@ class FrameStatus(Enum):
         "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "
         "correct the manifest or look for a gap in the trace"
     )
+    UNDER_RESOLVED = (
+        "a joint of the simulated wire is turned by more than 30 degrees: its segments are too long for this bend; "
+        "set a shorter solver.segment_mm, or auto"
+    )
+    SELF_CONTACT = (
+        "the simulated wire passes through itself; parts of the wire do not push each other in this model, so that "
+        "shape and force are not to be trusted from here on"
+    )
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property
@@ -38,7 +46,12 @@ class StageError(Exception):
 
 
 class InputError(Exception):
-    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it."""
+    """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it.
+
+    place : where it was written, as the line that counts the problems calls it; empty for the manifest.
+    """
+
+    place = ""
 
     def __init__(self, problems: Sequence[str]) -> None:
         super().__init__("\n".join(problems))

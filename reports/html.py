@@ -139,6 +139,7 @@ def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:
     """Rows of failures.csv, then what it does not know of: cases without result.json."""
     table = read_if_there(out_dir / FAILURES.file, FAILURES)
+    table = table[table["status"] != "damaged"]  # the page finds out itself what it cannot read
     rows: list[dict[Any, Any]] = table.astype(object).where(table.notna(), "").to_dict("records")
     known = {row["case"] for row in rows}
     for case in cases:
@@ -163,7 +164,7 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
 def _headline(cases: list[CaseFiles], failed: bool) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too."""
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
-    n_frames = sum(case.statistics.get("frames", len(case.errors)) for case in cases)
+    n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     sentence = f"{len(cases)} case{'s' * (len(cases) != 1)}, {n_frames} frames: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
     good = bool(cases) and not failed

@@ -9,15 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reports.atomic import write_text
 from reports.case_files import CaseFiles, thinned
-from reports.export import read_surface_vtp
-from reports.figures._drawing import SIMULATED, TRACED, TRUTH
+from reports.export.vtp import Index, read_surface_vtp
+from reports.figures._style import SIMULATED, TRACED, TRUTH
+from reports.frames_file import Array
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 MISSING = "No 3D scene: plotly is not installed; `pip install wireval[report3d]` adds it."
 _SCRIPT = "plotly.min.js"
 _MAX_TRIANGLES = 30_000  # about 1 MB of page

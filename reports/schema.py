@@ -50,7 +50,7 @@ class Column:
     shown: Mapping[str, str] = field(default_factory=dict)
     """The PLACES that show it, each with what a legend calls it there."""
     style: str = ""
-    """How figures draw it, a name of ``figures._drawing.LINES``; empty: in a colour that the panel does not use."""
+    """How figures draw it, a name of ``figures._style.LINES``; empty: in a colour that the panel does not use."""
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored in silence."""
@@ -99,10 +99,7 @@ class Table:
 
     def __getitem__(self, name: str) -> Column:
         """The column of a name; KeyError for one that the table does not have."""
-        for column in self.columns:
-            if column.name == name:
-                return column
-        raise KeyError(name)
+        return {column.name: column for column in self.columns}[name]
 
     def shown(self, *places: str) -> tuple[Column, ...]:
         """Columns that a page shows at these places, place by place, each in the order of the file."""

@@ -34,9 +34,20 @@ from solver.grid import Grid
 from solver.insertion import Insertion
 from solver.insertions import Insertions
 from solver.relax import relax
-from solver.solution import Solution, Status
+from solver.solution import Snap, Solution, Status
 from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Grid", "GuideWire", "Insertion", "Insertions", "Solution", "Status", "VesselWall", "relax", "warm_up"]
+__all__ = [
+    "Grid",
+    "GuideWire",
+    "Insertion",
+    "Insertions",
+    "Snap",
+    "Solution",
+    "Status",
+    "VesselWall",
+    "relax",
+    "warm_up",
+]

@@ -13,6 +13,11 @@ MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
 """A block of the Hessian within this fraction of its joint's stiffness around zero is neutral, below it indefinite."""
+NEUTRAL = 1e-3
+"""Negative curvature, over the stiffest joint's stiffness, up to which a wire without moments is called at rest where
+no trial is lower: a turn of an angle there falls by less than a thousandth of what it would cost by itself."""
+SWING = 0.3
+"""Angle of the first step off a saddle, rad: the fourth order of the energy takes 1 % of its fall."""
 SUFFICIENT = 1e-4
 """Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
 STEP_ANGLE = 0.7
@@ -27,6 +32,10 @@ SMALLEST_STEP = 2.0**-10
 """Smallest fraction of step_mm that a failing step is halved down to."""
 HOP_VOXELS = 0.02
 """Rise of the distance above both ends of a straight path, in voxels, that counts as passing through a wall."""
+MOST_JOINTS = 1_000_000
+"""Joints of the longest wire that may be asked for: its arrays fill 1.5 GB."""
+USUAL_JOINTS = 20_000
+"""Joints of the longest wire accepted unless something else is said."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
 SAME_LENGTH_MM = 1e-13
@@ -96,3 +105,39 @@ MOST_FORESEEN = 1.5
 """Longest step, over the one before, that starts with that step's change: further ahead it is a guess."""
 OVERSHOOT = 0.02
 """How much longer than allowed a step may be rather than leave a remainder: the limits are round numbers."""
+CREASE_BLOCK = 4
+"""Voxels along an edge of the blocks in which creases of the distance are marked."""
+CREASE = 0.3
+"""Fall of the distance's slope from one voxel to the next that counts as a crease: at a ridge between parallel walls it
+falls by 2, of which at least 0.58 is seen along an axis at one voxel; round an obstacle of r voxels it falls by 1/r."""
+FOOT_STEPS = 64
+"""Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
+RIDGE_VOXELS = 0.05
+"""Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
+that curves with two voxels of radius rises by a fifteenth of that."""
+DETOUR_MM = 1.5
+"""How far around two feet lumen may join them: a wire may cut a carina's edge by as much."""
+FLOOD_CELLS = 48
+"""Cells along the way of a flood at most, however fine the grid is."""
+REFINE = 0.2
+"""Length of the steps tried next, over a rough one's: 1, 0.2 and 0.05 mm."""
+EASY = 6
+"""Iterations of a step that leads on along the same minimum: two to five, and no Levenberg term."""
+WORK_SHARE = 0.01
+"""Share of the hand's work in a hard step that may be missing from the wire's energy: the trapezium rule over 1 mm is
+right to that in most smooth steps, and where the wire found another minimum 0.016 and more were missing."""
+ENERGY_SHARE = 5e-4
+"""The same of the wire's energy, where the hand does hardly any work."""
+NEUTRAL = 0.005
+"""Pivot below which the wire is about to give way, in whichever direction rounding says."""
+SOFT = 0.5
+"""Pivot below which a wire is soft: moments that are nothing elsewhere move it far."""
+SOFT_TOLERANCE = 1e-4
+"""Tolerance of a soft wire, over the one asked for: at 1e-9 of the energy such wires lay up to 0.04 mm off."""
+TURNED = 0.02
+"""Pivot below which a wire may have given way in a hard step without a loss: in a round vessel, to any side."""
+STIFF = 0.2
+"""Pivot above which a wire that was about to give way comes back to calm: in a round vessel it stays free to turn about
+the axis, and lies on the side that rounding chose."""
+CALM_MM = 2.5
+"""Way after a snap on which a wire may still lie otherwise than after shorter steps."""

@@ -2,7 +2,12 @@
 
 from typing import NoReturn
 
+LONGEST = 200
+"""Characters of what was got that a message shows."""
+
 
 def refuse(what: str, where: str, got: object, allowed: str, advice: str) -> NoReturn:
     """Raise the ValueError of an argument that cannot be used."""
-    raise ValueError(f"{what}: {where}: got {got!r}; allowed: {allowed}; {advice}")
+    shown = repr(got)
+    shown = shown if len(shown) <= LONGEST else f"{shown[:LONGEST]}... ({len(shown)} characters)"
+    raise ValueError(f"{what}: {where}: got {shown}; allowed: {allowed}; {advice}")

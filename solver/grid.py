@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from solver.doors import ANYWHERE_MM, LENGTH_MM, Array, Found, Range, numbers
+from solver.errors import refuse
+
+__all__ = ["Array", "Grid", "read_only"]
 
 
 def read_only(array: ArrayLike, dtype: Any = None) -> NDArray[Any]:
@@ -16,11 +19,26 @@ def read_only(array: ArrayLike, dtype: Any = None) -> NDArray[Any]:
     return view
 
 
+def _own(values: object) -> NDArray[Any]:
+    """Values that no caller can change any more: a copy, or the array itself where it is read-only (``read_only``)."""
+    if np.ma.is_masked(values):
+        refuse("grid", "values", Found("a masked array"), "an array without masked voxels", "fill them")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        refuse("grid", "values", values, "an array with three axes x, y, z", "rows must be equally long")
+    if array.ndim != 3 or array.size == 0 or array.dtype.kind not in "biufc":
+        found = Found(f"{array.dtype} of shape {array.shape}")
+        refuse("grid", "values", found, "numbers with three axes x, y, z", "values[i, j, k] is the voxel at x, y, z")
+    return read_only(array.copy(order="K") if array.flags.writeable else array)
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Values on a regular grid, indexed x, y, z.
 
     values : (nx, ny, nz) any dtype; ``values[i, j, k]`` sits at ``origin + direction @ (spacing * (i, j, k))``.
+    An array that can be written to is copied; ``read_only(array)`` hands one over without a copy.
     spacing_mm : (3,) mm.     origin_mm : (3,) LPS mm, the centre of voxel (0, 0, 0).
     direction : (3, 3) orthonormal; column a is where index axis a points in LPS.
     """
@@ -32,18 +50,21 @@ class Grid:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse a geometry that is not one."""
-        object.__setattr__(self, "values", read_only(self.values))
-        for name, shape in (("spacing_mm", (3,)), ("origin_mm", (3,)), ("direction", (3, 3))):
-            value = read_only(np.array(getattr(self, name), dtype=np.float64))
-            if value.shape != shape or not np.all(np.isfinite(value)):
-                raise ValueError(f"grid {name}: got {value.tolist()}, expected {shape} finite numbers")
-            object.__setattr__(self, name, value)
-        if self.values.ndim != 3:
-            raise ValueError(f"grid values: got an array of shape {self.values.shape}, expected three axes x, y, z")
-        if np.any(self.spacing_mm <= 0):
-            raise ValueError(f"grid spacing_mm: got {self.spacing_mm.tolist()}, expected three positive lengths in mm")
+        object.__setattr__(self, "values", _own(self.values))
+        allowed = {"spacing_mm": LENGTH_MM, "origin_mm": ANYWHERE_MM, "direction": Range(-2, 2, "columns of length 1")}
+        for name, limits in allowed.items():
+            shape = (3, 3) if name == "direction" else (3,)
+            value = numbers("grid", name, getattr(self, name), shape, limits)
+            object.__setattr__(self, name, read_only(value.copy()))
         if not np.allclose(self.direction.T @ self.direction, np.eye(3), atol=1e-4):
-            raise ValueError(f"grid direction: got {self.direction.tolist()}, expected an orthonormal matrix")
+            refuse("grid", "direction", self.direction.tolist(), "an orthonormal matrix", "columns of length 1")
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Freeze what was unpickled: numpy forgets that an array was read-only."""
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        vars(self).update(state)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -53,13 +74,13 @@ class Grid:
 
     def to_index(self, points_mm: ArrayLike) -> Array:
         """Continuous indices (..., 3) of LPS points (..., 3) in mm."""
-        offset = np.asarray(points_mm, dtype=np.float64) - self.origin_mm
-        return np.asarray(offset @ self.direction / self.spacing_mm)
+        points = numbers("grid", "points_mm", points_mm, (..., 3), ANYWHERE_MM)
+        return np.asarray((points - self.origin_mm) @ self.direction / self.spacing_mm)
 
     def to_mm(self, index: ArrayLike) -> Array:
         """LPS points (..., 3) in mm of continuous indices (..., 3)."""
-        scaled = np.asarray(index, dtype=np.float64) * self.spacing_mm
-        return np.asarray(scaled @ self.direction.T + self.origin_mm)
+        at = numbers("grid", "index", index, (..., 3), Range(-1e12, 1e12, "voxels from the first one"))
+        return np.asarray(at * self.spacing_mm @ self.direction.T + self.origin_mm)
 
     def with_values(self, values: NDArray[Any]) -> "Grid":
         """The same geometry holding other values."""
@@ -67,5 +88,10 @@ class Grid:
 
     def crop(self, start: tuple[int, int, int], stop: tuple[int, int, int]) -> "Grid":
         """The sub-grid of voxels ``start`` (inclusive) to ``stop`` (exclusive), as a view."""
-        window = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
+        first = numbers("grid", "start", start, (3,), Range(0, max(self.shape), "voxels"))
+        last = numbers("grid", "stop", stop, (3,), Range(0, max(self.shape), "voxels"))
+        whole = np.all(first == np.floor(first)) and np.all(last == np.floor(last))
+        if not whole or np.any(first >= last) or np.any(last > self.shape):
+            refuse("grid", "crop", (start, stop), f"whole voxels, start < stop <= {self.shape}", "give indices x, y, z")
+        window = tuple(slice(int(a), int(b)) for a, b in zip(first, last, strict=True))
         return Grid(self.values[window], self.spacing_mm, self.to_mm(start), self.direction)

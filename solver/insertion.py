@@ -3,19 +3,29 @@
 Several minima exist, so a depth is reached by replaying its history, never by jumping to it.
 """
 
+import copy
 import math
-from collections.abc import Iterable, Iterator, Sequence
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
+from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
-from solver.relax import Settings, base_frame, unit, vector
+from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import Workspace
+
+ROLL_STEP_DEG = Range(1e-6, 1e6)
+DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
+FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
+SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
+ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
 class Insertion:
@@ -25,9 +35,13 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
+    finest_mm : length of the steps down to which a step is taken again that released energy; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
-    tip_load_N : (3,) dead force on the tip.
-    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status.
+    tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
+    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is
+    behind the hand.     shaft_friction_N : what it takes to slide or turn that shaft, force at its surface.
+    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
+    where it is: ``clone`` makes branches, ``pickle`` checkpoints, and it goes one way at a time (see ``to_depths``).
     """
 
     def __init__(
@@ -44,82 +58,154 @@ class Insertion:
         max_iterations: int = 200,
         step_mm: float = 1.0,
         roll_step_deg: float = 15.0,
+        finest_mm: float = 0.05,
         max_joints: int = 20_000,
         quadrature: str = "tip",
         tip_load_N: ArrayLike = (0.0, 0.0, 0.0),
+        down: ArrayLike | None = None,
+        shaft_mm: float = 0.0,
+        shaft_friction_N: float = 0.0,
     ) -> None:
         settings = Settings(method, tolerance, max_iterations, quadrature)
-        if initial not in ("slide", "translate"):
-            refuse("insertion", "initial", initial, "slide, translate", "slide is the default")
-        positive = {"step_mm": step_mm, "roll_step_deg": roll_step_deg, "max_joints": max_joints}
-        for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0):
-                refuse("insertion", name, value, "a positive number", "leave it out for the default")
-        self.wire, self.wall, self.max_joints = wire, wall, max_joints
-        self.work = Workspace(wire, wall, settings.quadrature, settings.limits)
-        frame = base_frame(unit(entry_direction, "entry_direction"), material_axis, 0.0)
-        entry, load = vector("entry_mm", entry_mm), vector("tip_load_N", tip_load_N)
-        self.work.clamp(entry, frame, load, initial == "translate", step_mm, roll_step_deg)
-        self._started = False
+        check_scene("insertion", wire, wall)
+        choice("insertion", "initial", initial, ("slide", "translate"))
+        steps = _steps(step_mm, roll_step_deg, finest_mm)
+        shaft = number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
+        drag = number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
+        self.wire, self.wall = wire, wall
+        self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
+        frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
+        entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
+        self._work = Workspace(wire, wall, settings.quadrature, settings.limits, shaft, drag)
+        weight = weight_of("insertion", wire, down)
+        self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
+        self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
-        self._too_long = (max_joints + 0.5 - 1e-12) * wire.segment_mm
-        self._outside = False
-        if wall is not None:
-            margin = tol.ENTRY_MARGIN_VOXELS * float(np.linalg.norm(wall.distance.spacing_mm))
-            self._outside = bool(wall.look_up(entry)[0][0] > margin)
+        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
+        self._refused = None if wall is None else _refused(wall, entry)
 
     @property
     def depth_mm(self) -> float:
         """Where the tip is, mm of wire beyond the entry."""
-        return float(self.work.place["inserted"][0])
+        return float(self._work.place["inserted"][0])
 
     @property
     def roll_deg(self) -> float:
         """Where the base is turned to."""
-        return float(self.work.place["roll"][0])
+        return float(self._work.place["roll"][0])
 
     def to_depths(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float] = 0.0) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base, one for all or
         one per depth. A depth that cannot be reached yields the last good state with its own depth and a status.
+        The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
+        and a call while another thread is at work, is a RuntimeError.
         """
-        goals = self.goals(depths_mm, roll_deg)
-        self.get_ready(*goals)
-        for depth, roll in zip(*goals, strict=True):
-            yield self._go(depth, roll)
+        return self._each(*self._goals(depths_mm, roll_deg))
 
-    def goals(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float]) -> tuple[list[float], list[float]]:
-        """Depths and a roll for each, or a refusal of what cannot be reached."""
-        depths = [float(d) for d in depths_mm]
-        if isinstance(roll_deg, float | int):
-            # as most ask; to broadcast it takes 5 µs of the 100 of a step
-            rolls = [float(roll_deg)] * len(depths)
+    def _goals(self, depths_mm: Iterable[float], roll_deg: float | Sequence[float]) -> tuple[list[float], list[float]]:
+        """Depths and a roll for each, or a refusal of what cannot be one."""
+        if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
+            refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
+        depths = _list("depths_mm", depths_mm, DEPTH_MM)
+        if isinstance(roll_deg, (list, tuple, np.ndarray)) and np.ndim(roll_deg) > 0:
+            rolls = _list("roll_deg", roll_deg, ANGLE_DEG)
         else:
-            rolls = [float(r) for r in np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), len(depths))]
-        for depth, roll in zip(depths, rolls, strict=True):
-            if not (math.isfinite(depth) and depth >= 0 and math.isfinite(roll)):
-                allowed = "finite depths >= 0 and rolls"
-                refuse("insertion", "to_depths", (depth, roll), allowed, "mm from the entry")
+            rolls = [number("insertion", "roll_deg", roll_deg, ANGLE_DEG)] * len(depths)
+        if len(rolls) != len(depths):
+            refuse("insertion", "roll_deg", rolls, f"one number, or {len(depths)} as there are depths", "one per depth")
         return depths, rolls
 
-    def get_ready(self, depths: Sequence[float], rolls: Sequence[float]) -> None:
-        """Make room for all of the way at once."""
-        self.work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
-        if rolls and not self._started:
-            # a wire that is not yet in the lumen has no history: it starts at its first roll
-            self.work.place["roll"], self._started = rolls[0], True
+    def _each(self, depths: list[float], rolls: list[float]) -> Iterator[Solution]:
+        """Go to each depth, for as long as no later call has begun."""
+        way = None
+        for depth, roll in zip(depths, rolls, strict=True):
+            self._hold()
+            try:
+                way = way or self._begin(depths, rolls)
+                if self._way is not way:
+                    raise RuntimeError(f"insertion: to_depths: a later call has begun since; {ONE_AT_A_TIME}")
+                solution = self._go(depth, roll)
+            finally:
+                self._release()
+            yield solution
 
-    def reaches(self, depth_mm: float) -> bool:
+    def _hold(self) -> None:
+        """Take the lock, or refuse to touch the wire while another thread does."""
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError(f"insertion: another thread is moving this wire; {ONE_AT_A_TIME}")
+
+    def _release(self) -> None:
+        """Give the lock back."""
+        self._lock.release()
+
+    def _begin(self, depths: list[float], rolls: list[float]) -> object:
+        """Make room for all of a way at once, and end the ways before it; return what tells it from others."""
+        self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+        if not self._started and rolls:
+            # a wire that is not yet in the lumen has no history: it starts at its first roll
+            self._work.place["roll"], self._started = rolls[0], True
+        self._way = object()
+        return self._way
+
+    def _reaches(self, depth_mm: float) -> bool:
         """Whether the wire can be tried at a depth at all."""
-        return depth_mm < self._too_long and not self._outside
+        return depth_mm < self._too_long and self._refused is None
+
+    def clone(self) -> Self:
+        """A second insertion where this one is, to the last bit; both go on from there, each on its own way."""
+        twin = object.__new__(type(self))
+        twin.__setstate__(self.__getstate__())
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy of all but the lock, which belongs to a process; wire and wall never change, and are shared."""
+        state = {name: value for name, value in vars(self).items() if name not in ("_lock", "_way")}
+        self._hold()
+        try:
+            return copy.deepcopy(state, {id(shared): shared for shared in (self.wire, self.wall)})
+        finally:
+            self._release()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on from a checkpoint."""
+        vars(self).update(state, _lock=threading.Lock(), _way=object())
 
     def _go(self, depth: float, roll: float) -> Solution:
         """Step until the depth is reached or no step succeeds."""
-        work = self.work
+        work = self._work
         work.counts.fill(0)
-        if self.reaches(depth):
-            status, iterations = work.advance(depth, roll)
+        if depth >= self._too_long:
+            status, iterations = Status.TOO_LONG, 0
+        elif self._refused is not None:
+            status, iterations = self._refused, 0
         else:
-            status, iterations = Status.ENTRY_OUTSIDE if self._outside else Status.TOO_LONG, 0
-        return work.solution(status, iterations)
+            status, iterations = work.advance(depth, roll)
+        return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+
+def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:
+    """The longest step and roll, and the finest step, each a number that can be used."""
+    step = number("insertion", "step_mm", step_mm, LENGTH_MM)
+    turn = number("insertion", "roll_step_deg", roll_step_deg, ROLL_STEP_DEG)
+    return step, turn, number("insertion", "finest_mm", finest_mm, FINEST_MM)
+
+
+def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
+    """Numbers one by one: numpy would take a truth value among them for one."""
+    if isinstance(values, np.ndarray):
+        return [float(v) for v in numbers("insertion", name, values, (None,), allowed)]
+    return [number("insertion", name, value, allowed) for value in values]
+
+
+def _refused(wall: VesselWall, entry: Array) -> Status | None:
+    """Why no wire may start at an entry point (3,): too far outside the lumen, or with lumen on both sides of it."""
+    voxel = float(np.linalg.norm(wall.distance.spacing_mm))
+    outside = float(wall.look_up(entry)[0][0])
+    if outside > tol.ENTRY_MARGIN_VOXELS * voxel:
+        return Status.ENTRY_OUTSIDE
+    ways = np.array([way for way in np.ndindex(3, 3, 3) if way > (1, 1, 1)]) - 1.0
+    ways *= (outside + voxel) / np.linalg.norm(ways, axis=1, keepdims=True)
+    ahead, behind = (wall.look_up(entry + side * ways)[0] < 0.0 for side in (1, -1))
+    return Status.ENTRY_IN_SEPTUM if outside > 0.0 and bool(np.any(ahead & behind)) else None

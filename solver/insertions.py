@@ -5,24 +5,28 @@ take little longer than one; see ``_kernels.lanes``.
 """
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver import skips
-from solver._kernels import data
+from solver._kernels import data, records
 from solver._kernels.lane_block import LANE, SHAPES, Block
 from solver._kernels.lane_insertion import Plan, advance_together
 from solver._kernels.lanes import WIDTH, room
 from solver._kernels.minimise import NEWTON
+from solver.doors import Found, instance, whole
 from solver.errors import refuse
 from solver.insertion import Insertion
 from solver.solution import Solution, Status
-from solver.workspace import Workspace
+from solver.workspace import SNAPS_KEPT, Workspace
 
+LISTS = (list, tuple, np.ndarray)
+MOST_THREADS = 4096
 Goals = tuple[list[float], list[float]]
 """Depths, mm, and rolls, degrees."""
 
@@ -33,19 +37,20 @@ class Insertions:
     insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
     from one another by ``VesselWall.like`` go in lock-step, WIDTH at a time; each comes to lie as by itself (to
     rounding: 1e-9 mm, away from snaps; straight wires 2e-8). With friction, a finite torsional stiffness, a sampled
-    hull, no wall or the closed form each goes by itself.
+    hull, a shaft, a weight, no wall or the closed form each goes by itself.
     threads : how many of them to use (default: one a core); Python's lock is not held.
     Raises ValueError where one insertion is given twice.
     """
 
     def __init__(self, insertions: Iterable[Insertion], *, threads: int | None = None) -> None:
-        self.insertions = tuple(insertions)
+        if not isinstance(insertions, Iterable):
+            refuse("insertions", "insertions", insertions, "a list of Insertion", "make each of them first")
+        self.insertions = tuple(instance("insertions", "insertions", one, Insertion) for one in insertions)
         if len(set(map(id, self.insertions))) < len(self.insertions):
-            got = f"{len(self.insertions)} of which {len(set(map(id, self.insertions)))} are different"
+            got = Found(f"{len(self.insertions)} of which {len(set(map(id, self.insertions)))} are different")
             refuse("insertions", "insertions", got, "each of them once", "make another Insertion of the same wire")
-        if threads is not None and threads < 1:
-            refuse("insertions", "threads", threads, "1 or more", "leave it out for one a core")
-        self.threads = threads or os.cpu_count() or 1
+        cores = os.cpu_count() or 1
+        self.threads = whole("insertions", "threads", cores if threads is None else threads, MOST_THREADS)
 
     def to_depths(
         self, depths_mm: Sequence[float] | Sequence[Sequence[float]], roll_deg: float | Sequence[Any] = 0.0
@@ -56,9 +61,11 @@ class Insertions:
         what ``Insertion.to_depths`` takes.
         """
         count = len(self.insertions)
-        depths: Any = [depths_mm] * count if all(np.isscalar(depth) for depth in depths_mm) else depths_mm
-        rolls: Any = [roll_deg] * count if np.isscalar(roll_deg) else roll_deg
-        goals = [one.goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
+        given: Any = list(depths_mm) if isinstance(depths_mm, Iterator) else depths_mm
+        own = isinstance(given, LISTS) and any(isinstance(depths, (*LISTS, range)) for depths in given)
+        depths = _one_each("depths_mm", given, count) if own else [given] * count
+        rolls = _one_each("roll_deg", roll_deg, count) if isinstance(roll_deg, LISTS) else [roll_deg] * count
+        goals = [one._goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
         found: list[list[Solution]] = [[] for _ in range(count)]
 
         def work(team: list[int]) -> None:
@@ -81,11 +88,19 @@ class Insertions:
         return [kind[i : i + WIDTH] for kind in kinds.values() for i in range(0, len(kind), WIDTH)]
 
 
+def _one_each(name: str, values: Any, count: int) -> list[Any]:
+    """One for each of ``count`` insertions, or a refusal."""
+    if np.shape(values)[:1] != (count,) if isinstance(values, np.ndarray) else len(values) != count:
+        refuse("insertions", name, values, f"{count} of them, as there are insertions", "give each its own")
+    return list(values)
+
+
 def kind_of(insertion: Insertion, deepest_mm: float) -> tuple[int, int, int] | None:
     """What insertions must share to go in lock-step; None for those that cannot."""
-    work, wall = insertion.work, insertion.wall
-    plain = wall is not None and wall.friction == 0.0 and wall.samples == 0 and not insertion.wire.twists
-    reached = work.limits.method == NEWTON and work.skips == skips.ALL and insertion.reaches(deepest_mm)
+    work, wall = insertion._work, insertion.wall
+    plain = wall is not None and wall.friction == 0.0 and wall.samples == 0 and work.shaft.drag == 0.0
+    plain = plain and not insertion.wire.twists and insertion.wire.weight_N_per_mm == 0.0
+    reached = work.limits.method == NEWTON and work.skips == skips.ALL and insertion._reaches(deepest_mm)
     # there are no vectors where nothing is compiled
     possible = plain and reached and hasattr(advance_together, "py_func")
     return (id(work.field.coefficients), work.rule.zone, work.rule.tip_at.size) if possible else None
@@ -93,10 +108,18 @@ def kind_of(insertion: Insertion, deepest_mm: float) -> tuple[int, int, int] | N
 
 def together(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:
     """The solutions of up to WIDTH insertions that go in lock-step."""
-    for insertion, (depths, rolls) in team:
-        insertion.get_ready(depths, rolls)
+    with ExitStack() as stack:
+        for insertion, goals in team:
+            insertion._hold()
+            stack.callback(insertion._release)
+            insertion._begin(*goals)
+        return _in_lock_step(team)
+
+
+def _in_lock_step(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:
+    """The solutions of insertions that are held and ready."""
     plan = _plan(team)
-    works = [insertion.work for insertion, _ in team]
+    works = [insertion._work for insertion, _ in team]
     size = max(
         insertion.wire.segments_at(max(*depths, insertion.depth_mm))[0] for insertion, (depths, _) in team if depths
     )
@@ -104,8 +127,9 @@ def together(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:
     axes = {"k": size, "n": size + 1, "p": int(first[-1])}
     block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
     wires = tuple(works[lane if lane < len(works) else 0].handle for lane in range(WIDTH))
-    records = tuple(np.zeros(WIDTH, kind).view(np.recarray) for kind in (LANE, data.DESCENT, data.COUNTERS))
-    advance_together(wires, plan, records, block, first)
+    kinds = LANE, records.DESCENT, records.COUNTERS
+    notes = tuple(np.zeros(WIDTH, kind).view(np.recarray) for kind in kinds)
+    advance_together(wires, plan, notes, block, first)
     return [_solutions(plan, lane) for lane in range(len(team))]
 
 
@@ -131,24 +155,21 @@ def _plan(team: Sequence[tuple[Insertion, Goals]]) -> Plan:
         row[lane, : len(depths)] = np.cumsum(room_for) - room_for
         rows = max(rows, sum(room_for))
     x, r, force = np.zeros((WIDTH, rows, 3)), np.zeros((WIDTH, rows, 3, 3)), np.zeros((WIDTH, rows, 3))
-    kinds = (data.PLACE, data.REPORT, data.ENERGIES, data.COUNTERS)
+    kinds = (records.PLACE, records.REPORT, records.ENERGIES, records.COUNTERS)
     place, report, energies, counters = (np.zeros((WIDTH, most), kind).view(np.recarray) for kind in kinds)
     ended = np.zeros((WIDTH, most, 3), np.int64)
-    blank = np.zeros(1, data.COUNTERS)
-    return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, blank)
+    snaps, blank = np.zeros((WIDTH, most, SNAPS_KEPT), records.SNAP), np.zeros(1, records.COUNTERS)
+    return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, snaps, blank)
 
 
 def _solutions(plan: Plan, lane: int) -> list[Solution]:
     """What a lane found at its depths."""
+    names = "place", "report", "energies", "counters", "ended", "row"
+    noted = zip(*(getattr(plan, name)[lane, : plan.count[lane]].tolist() for name in names), strict=True)
     found = []
-    records = zip(
-        *(getattr(plan, name)[lane].tolist() for name in ("place", "report", "energies", "counters", "ended", "row")),
-        strict=True,
-    )
-    for _, (place, report, energies, counters, (outcome, iterations, k), row) in zip(
-        range(int(plan.count[lane])), records, strict=False
-    ):
+    for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
         arrays = [a[lane, row : row + k + 1] for a in (plan.x, plan.r, plan.force)]
-        status = Status[data.OUTCOMES[outcome]]
-        found.append(Solution.assembled(arrays, (place, report, energies, counters), status, iterations))
+        depth, roll, *_ = notes[0]
+        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll
+        found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[lane, n], ended))
     return found

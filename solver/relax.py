@@ -6,35 +6,32 @@ Also the settings of a relaxation, and the frame in which the introducer holds t
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver._kernels.data import CURRENT, Limits
 from solver._kernels.minimise import CLOSED_FORM, METHODS
 from solver._kernels.start import follow
+from solver.doors import (
+    ANGLE_DEG,
+    ANYWHERE_MM,
+    FAR_MM,
+    Array,
+    Found,
+    Range,
+    choice,
+    instance,
+    number,
+    numbers,
+    unit,
+    vector,
+    whole,
+)
 from solver.errors import refuse
-from solver.grid import Array
 from solver.solution import Solution
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import QUADRATURES, Workspace
-
-
-def vector(name: str, value: ArrayLike) -> Array:
-    """Three finite numbers as an array; ValueError where they are not."""
-    v = np.array(value, dtype=np.float64)
-    if v.shape != (3,) or not np.all(np.isfinite(v)):
-        refuse("insertion", name, value, "three finite numbers", "LPS, in the unit of its name")
-    return v
-
-
-def unit(value: ArrayLike, name: str) -> Array:
-    """The direction of a 3-vector; ValueError where it has none."""
-    v = np.asarray(value, dtype=np.float64)
-    size = float(np.linalg.norm(v)) if v.shape == (3,) else 0.0
-    if not (np.isfinite(size) and size > 0):
-        refuse("insertion", name, np.asarray(value).tolist(), "three finite numbers, not all 0", "give LPS")
-    return v / size
 
 
 def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: float) -> Array:
@@ -43,7 +40,7 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
         axis = np.zeros(3)
         axis[int(np.argmin(np.abs(direction)))] = 1.0
     else:
-        axis = unit(material_axis, "material_axis")
+        axis = unit("insertion", "material_axis", material_axis)
     across = axis - direction * float(axis @ direction)
     if float(np.linalg.norm(across)) < tol.PARALLEL:
         advice = "leave it out for the default"
@@ -53,6 +50,15 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
     roll = np.deg2rad(roll_deg)
     first = np.cos(roll) * one + np.sin(roll) * two
     return np.column_stack([first, _cross(direction, first), direction])
+
+
+def weight_of(what: str, wire: GuideWire, down: ArrayLike | None) -> Array:
+    """What a mm of the wire weighs, (3,) N/mm; ValueError where it weighs something and nobody said where down is."""
+    if down is not None:
+        return unit(what, "down", down) * wire.weight_N_per_mm
+    if wire.weight_N_per_mm > 0.0:
+        refuse(what, "down", None, "a direction (3,), as the wire has a weight", "[0, 1, 0] for a patient on the back")
+    return np.zeros(3)
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -77,13 +83,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot work."""
-        for name, allowed in (("method", METHODS), ("quadrature", QUADRATURES)):
-            if getattr(self, name) not in allowed:
-                refuse("solver", name, getattr(self, name), ", ".join(allowed), "choose one of these")
-        if not 0 < self.tolerance < 1:
-            refuse("solver", "tolerance", self.tolerance, "above 0, below 1", "1e-9 is the default")
-        if self.max_iterations < 1:
-            refuse("solver", "max_iterations", self.max_iterations, "1 or more", "200 is the default")
+        choice("solver", "method", self.method, METHODS)
+        choice("solver", "quadrature", self.quadrature, QUADRATURES)
+        number("solver", "tolerance", self.tolerance, Range(1e-300, 1.0 - 1e-9, "1e-9 is the default"))
+        whole("solver", "max_iterations", self.max_iterations, 1_000_000)
 
     @property
     def limits(self) -> Limits:
@@ -105,6 +108,7 @@ def relax(
     roll_deg: float = 0.0,
     start_mm: ArrayLike | None = None,
     load_N: ArrayLike | None = None,
+    down: ArrayLike | None = None,
     method: str = "newton",
     tolerance: float = tol.DECREMENT,
     max_iterations: int = 200,
@@ -115,30 +119,41 @@ def relax(
     depth_mm : length beyond the entry.     start_mm : (m, 3) polyline from the entry that the wire is laid along
     before it relaxes (straight along entry_direction by default); friction acts against leaving it.
     load_N : (3,) dead force on the tip, or (k + 1, 3) on every joint, k from ``wire.segments_at(depth_mm)``.
+    down : (3,) LPS, where the wire's weight pulls.
     Raises ValueError for arguments that cannot be used; failures of the relaxation are a Status.
     """
     settings = Settings(method, tolerance, max_iterations, quadrature)
-    if not (np.isfinite(depth_mm) and depth_mm > 0):
-        refuse("relax", "depth_mm", depth_mm, "a positive length", "give the length beyond the entry")
-    direction = unit(entry_direction, "entry_direction")
-    entry = np.asarray(entry_mm, dtype=np.float64)
-    curve = _polyline([entry, entry + direction * depth_mm] if start_mm is None else start_mm)
+    check_scene("relax", wire, wall)
+    longest = Range(1e-6, min(tol.USUAL_JOINTS * wire.segment_mm, FAR_MM), "use longer segments for a longer wire")
+    depth_mm = number("relax", "depth_mm", depth_mm, longest)
+    roll_deg = number("relax", "roll_deg", roll_deg, ANGLE_DEG)
+    direction, entry = unit("relax", "entry_direction", entry_direction), vector("relax", "entry_mm", entry_mm)
+    straight = np.stack([entry, entry + direction * depth_mm])
+    curve = straight if start_mm is None else _polyline(start_mm, entry, wire.segment_mm)
     work = Workspace(wire, wall, settings.quadrature, settings.limits)
     work.lay_out(depth_mm)
-    if load_N is not None:
-        work.load(load_N)
-    work.clamp(entry, base_frame(direction, material_axis, roll_deg))
+    work.load((0.0, 0.0, 0.0) if load_N is None else load_N)
+    work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
-    status, iterations = work.advance(depth_mm, 0.0, work.k)
-    solution = work.solution(status, iterations)
-    vars(solution).update(depth_mm=depth_mm, roll_deg=roll_deg)
-    return solution
+    return work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)
 
 
-def _polyline(points: ArrayLike) -> NDArray[np.float64]:
-    """A start shape as an array (m, 3) mm; ValueError where it is none."""
-    curve = np.array(points, dtype=np.float64)
-    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.all(np.isfinite(curve)):
-        refuse("relax", "start_mm", curve.shape, "(m, 3) finite points, m >= 2", "start at the entry")
+def _polyline(points: ArrayLike, entry: Array, within_mm: float) -> Array:
+    """A start shape as an array (m, 3) mm, without points that repeat the one before; ValueError where it is none."""
+    curve = numbers("relax", "start_mm", points, (None, 3), ANYWHERE_MM)
+    apart = np.linalg.norm(np.diff(curve, axis=0), axis=1) > tol.MATCH_DEPTH_MM
+    curve = np.asarray(curve[np.append(True, apart)[: len(curve)]])
+    if len(curve) < 2:
+        refuse("relax", "start_mm", Found(f"{len(curve)} different points"), "two or more", "start at the entry")
+    away = float(np.linalg.norm(curve[0] - entry))
+    if away > within_mm:
+        refuse("relax", "start_mm", Found(f"a start {away:g} mm from entry_mm"), "a start there", "give both in LPS mm")
     return curve
+
+
+def check_scene(what: str, wire: object, wall: object) -> None:
+    """Refuse what is no wire, and what is neither a wall nor None."""
+    instance(what, "wire", wire, GuideWire)
+    if wall is not None:
+        instance(what, "wall", wall, VesselWall)

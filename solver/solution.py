@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from solver._kernels.data import WORK
+from solver import _tolerances as tol
+from solver._kernels.records import WORK
 from solver.grid import Array
 
 
@@ -23,7 +24,14 @@ class Status(Enum):
     FRICTION = "the friction forces did not settle; lower wall.friction or shorten solver.step_mm"
     FOLDED = "the wire folded at a joint (turned by more than 90 degrees); use shorter segments or smaller steps"
     LEFT_GRID = "the wire left the wall's grid; give a larger grid, or check entry point and direction"
+    THROUGH_WALL = (
+        "the wire would come through the wall into another vessel; check entry and lumen (vessels that touch), raise "
+        "the wall's stiffness or shorten solver.segment_mm"
+    )
     ENTRY_OUTSIDE = "the entry point lies outside the lumen; check entry_mm and the registration of the wall"
+    ENTRY_IN_SEPTUM = (
+        "the entry point lies in a wall with lumen on both sides: which vessel is not known; move entry_mm into it"
+    )
     TOO_LONG = "the depth needs more joints than allowed; use longer segments or raise max_joints"
     NON_FINITE = "the energy became infinite or undefined; check stiffnesses and loads"
 
@@ -33,18 +41,32 @@ class Status(Enum):
         return self.name.lower()
 
 
+class Snap(NamedTuple):
+    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint."""
+
+    from_mm: float
+    to_mm: float
+    released_N_mm: float
+    moved_mm: float
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A wire at one depth, at rest if ``converged``; otherwise the last good state, and ``sentence`` says why.
 
     joints_mm : (k + 1, 3) from the entry to the tip, read-only.
     frames : (k + 1, 3, 3), columns are material axes 1, 2 and the direction of the segment before the joint.
-    energy_N_mm : total, loads included; bending_energy_N_mm, wall_energy_N_mm, friction_energy_N_mm : its parts.
+    energy_N_mm : total, loads included (the wire's weight as seen from the entry); bending_energy_N_mm,
+    wall_energy_N_mm : its parts.
+    friction_energy_N_mm : what friction took on the way here from the depth before, over all steps; no part of it.
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
-    counts : in the order of ``_kernels.data.COUNTERS``, see ``work``.
+    counts : in the order of ``_kernels.records.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
+    least_pivot : distance to instability, see ``_kernels.records.REPORT``: 1 for a free wire, 0 where it snaps.
+    dissipated_N_mm : the hand's work on the way to this depth less the change of energy.     snaps : on that way.
+    uncertain : the wire snapped, or was about to, here or a few mm before: shorter steps may lead elsewhere.
     """
 
     joints_mm: Array
@@ -64,12 +86,22 @@ class Solution:
     roll_deg: float
     counts: tuple[int, ...]
     start_energy_N_mm: float
+    least_pivot: float
+    dissipated_N_mm: float
+    snaps: tuple[Snap, ...]
+    uncertain: bool
 
     @classmethod
-    def assembled(cls, arrays: list[Array], records: tuple[Any, ...], status: Status, iterations: int) -> "Solution":
-        """A solution from joints, frames and forces, and the contents of ``data.PLACE`` to ``data.COUNTERS``."""
-        (depth, roll, energy, *_), (start, penetration, push, force, torque, *_), parts, counts = records
-        bending, wall, _, friction = parts
+    def assembled(
+        cls, arrays: list[Array], notes: tuple[Any, ...], snaps: Any, ended: tuple[Status, int, float, float]
+    ) -> Self:
+        """A solution from joints, frames and forces, and what the kernels noted.
+
+        notes : the contents of ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of
+        ``records.SNAP``, the first of which count.     ended : status, iterations, depth, mm, and roll, degrees.
+        """
+        place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
+        _, _, energy, *_, dissipated, calm, rubbed, snapped = place
         reaction = np.array(force)
         for array in (*arrays, reaction):
             array.setflags(write=False)
@@ -81,18 +113,22 @@ class Solution:
             energy_N_mm=energy,
             bending_energy_N_mm=bending,
             wall_energy_N_mm=wall,
-            friction_energy_N_mm=friction,
-            status=status,
-            iterations=iterations,
+            friction_energy_N_mm=rubbed,
+            status=ended[0],
+            iterations=ended[1],
             contact_force_N=arrays[2],
             reaction_force_N=reaction,
             reaction_torque_N_mm=float(torque[2]),
             push_force_N=push,
             max_penetration_mm=penetration,
-            depth_mm=depth,
-            roll_deg=roll,
+            depth_mm=ended[2],
+            roll_deg=ended[3],
             counts=counts,
             start_energy_N_mm=start,
+            least_pivot=pivot,
+            dissipated_N_mm=dissipated,
+            snaps=tuple(Snap(*snaps.item(n)) for n in range(snapped)) if snapped else (),
+            uncertain=calm < tol.CALM_MM,
         )
         return solution
 
@@ -104,6 +140,17 @@ class Solution:
         work["wall_look_ups_done_fraction"] = work["wall_look_ups"] / looked if looked else 0.0
         work["start_energy_N_mm"] = self.start_energy_N_mm
         return work
+
+    @property
+    def largest_turn_deg(self) -> float:
+        """Largest angle between two segments that meet, the introducer being the first; 0 for no wire.
+
+        Beyond 30 degrees a chain is no smooth wire: its bending energy is off by 2 % and more.
+        """
+        along = self.frames[:, :, 2]
+        sine = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
+        turns = np.degrees(np.arctan2(sine, np.sum(along[:-1] * along[1:], axis=1)))
+        return float(turns.max(initial=0.0))
 
     @property
     def converged(self) -> bool:

@@ -1,21 +1,28 @@
 """The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
-import math
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from solver import _tolerances as tol
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
+from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
-from solver.grid import Array, Grid
+from solver.grid import Grid
 
 
 def _checked(grid: Grid) -> Array:
     """The distances as float64, or a refusal of what no distance can be."""
+    if grid.values.dtype.kind != "f":
+        found, allowed = Found(f"values of type {grid.values.dtype}"), "floating-point signed distances in mm"
+        refuse(
+            "wall", "distance", found, allowed, "a mask has to be made a distance: negative inside, positive outside"
+        )
     values = np.array(grid.values, dtype=np.float64, order="C")
     if min(values.shape) < 2:
         refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
@@ -24,7 +31,30 @@ def _checked(grid: Grid) -> Array:
         where = [int(i) for i in np.argwhere(bad)[0]]
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
+    least, largest = float(values.min()), float(values.max())
+    # a lumen thinner than a voxel may have no negative value; a mask has but two
+    mask = least >= 0.0 and largest <= 1.0 and bool(np.all((values == 0.0) | (values == 1.0)))
+    if mask or max(-least, largest) > FAR_MM:
+        got, allowed = Found(f"values from {least:g} to {largest:g}"), "signed distances in mm, negative inside"
+        refuse("wall", "grid values", got, allowed, "make a mask a distance")
     return values
+
+
+def creases(values: Array, spacing_mm: Array) -> NDArray[np.uint8]:
+    """Blocks of the grid, ``tol.CREASE_BLOCK`` voxels wide, within two voxels of a crease.
+
+    There, as between two vessels, the distance stops to rise and falls again; elsewhere no wire can change lumens.
+    """
+    found = [np.zeros((0, 3), dtype=np.int64)]
+    for axis, spacing in enumerate(spacing_mm):
+        if values.shape[axis] > 2:
+            found.append(np.argwhere(np.diff(values, 2, axis) < -tol.CREASE * spacing) + np.eye(3, dtype=int)[axis])
+    where = np.concatenate(found)
+    marks = np.zeros([-(-n // tol.CREASE_BLOCK) for n in values.shape], dtype=np.uint8)
+    for corner in product((-2, 2), repeat=3):
+        block = np.clip(where + corner, 0, np.array(values.shape) - 1) // tol.CREASE_BLOCK
+        marks[tuple(block.T)] = 1
+    return marks
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +75,9 @@ class VesselWall:
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
         self._check_law()
-        values = _checked(self.distance)
+        _ = self.samples
+        values = _checked(instance("wall", "distance", self.distance, Grid))
+        marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
         # the ghost layers: c[-1] = 2 c[0] - c[1]
         padded = np.pad(values, 1, mode="reflect", reflect_type="odd")
@@ -53,15 +85,12 @@ class VesselWall:
         coefficients = padded.astype(np.float32)
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
-        object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing))
+        object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
 
     def _check_law(self) -> None:
-        """Refuse a stiffness, a friction or a hull that no wall has."""
-        if not (math.isfinite(self.stiffness_N_mm2) and self.stiffness_N_mm2 > 0):
-            refuse("wall", "stiffness_N_mm2", self.stiffness_N_mm2, "a positive number", "0.1 to 100 is usual")
-        if not (math.isfinite(self.friction) and self.friction >= 0):
-            refuse("wall", "friction", self.friction, "0 or more", "hydrophilic wires have 0.01 to 0.1")
-        _ = self.samples
+        """Refuse a stiffness or a friction that no wall has."""
+        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, Range(1e-9, 1e9, "0.1 to 100 is usual"))
+        number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
 
     def like(self, *, stiffness_N_mm2: float | None = None, friction: float | None = None) -> "VesselWall":
         """The same lumen with another stiffness or friction: its grid is shared, and not filtered again."""
@@ -75,23 +104,28 @@ class VesselWall:
     @cached_property
     def samples(self) -> int:
         """Number of hull points around a joint; 0 is the smooth limit."""
-        if self.hull == "offset":
+        if isinstance(self.hull, str) and self.hull == "offset":
             return 0
-        name, _, count = self.hull.partition(":")
-        if name != "samples" or not count.isdigit() or not 1 <= int(count) <= 256:
+        name, _, count = self.hull.partition(":") if isinstance(self.hull, str) else ("", "", "")
+        if name != "samples" or not (
+            count.isascii() and count.isdigit() and len(count) <= 3 and 1 <= int(count) <= 256
+        ):
             refuse("wall", "hull", self.hull, '"offset" or "samples:N", N from 1 to 256', "samples:16 is usual")
         return int(count)
 
     def hull_points(self, radius_mm: float) -> tuple[Array, float]:
         """Offsets (h, 2) across a wire of this radius where the distance is looked up, and what is added to it."""
+        radius_mm = number("wall", "radius_mm", radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
         if self.samples == 0:
-            return np.zeros((1, 2)), float(radius_mm)
+            return np.zeros((1, 2)), radius_mm
         angle = 2 * np.pi * np.arange(self.samples) / self.samples
         return radius_mm * np.column_stack([np.cos(angle), np.sin(angle)]), 0.0
 
     def look_up(self, points_mm: ArrayLike) -> tuple[Array, Array, Array]:
         """Distance (n,) mm, gradient (n, 3) and Hessian (n, 3, 3) per mm of the interpolant at points (n, 3)."""
-        points = np.atleast_2d(np.asarray(points_mm, dtype=np.float64))
+        points = np.atleast_2d(numbers("wall", "points_mm", points_mm, (..., 3), ANYWHERE_MM))
+        if points.ndim != 2:
+            refuse("wall", "points_mm", points.shape, "points (n, 3)", "reshape them")
         jets = np.zeros((len(points), 10))
         look_up(self.field, points, jets)
         order = [[4, 7, 8], [7, 5, 9], [8, 9, 6]]

@@ -13,7 +13,9 @@ import numpy as np
 
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
-from solver._kernels.insertion import lay_along
+from solver._kernels.septum import through_wall
+from solver._kernels.start import lay_along
+from solver.doors import instance
 from solver.grid import Grid
 from solver.relax import Settings, relax
 from solver.wall import VesselWall
@@ -41,6 +43,7 @@ def warm_up(*, beside: bool = False) -> None:
 
     beside : all but Newton's method and the way to a depth is compiled by a process of its own, at the same time.
     """
+    instance("solver", "beside", beside, bool)
     with no_collection():
         if not beside or untyped.config.DISABLE_JIT:
             relax(WIRE, _wall(), depth_mm=1.0)
@@ -55,7 +58,7 @@ def warm_up(*, beside: bool = False) -> None:
 def compile_beside() -> None:
     """Compile what is kept on disk and can wait there for ``advance``, then what only a wall needs."""
     with no_collection():
-        _compile(closed_form.iterate, lay_along, contact_forces, push_force)
+        _compile(closed_form.iterate, lay_along, contact_forces, push_force, through_wall)
         _wall()
 
 
@@ -65,14 +68,17 @@ def _compile(*kernels: Any) -> None:
     work.clamp(np.zeros(3), np.eye(3))
     known = {
         "problem": work.problem,
+        "field": work.field,
+        "x": work.problem.state.x[0],
         "table": work.table,
         "introducer": work.introducer,
         "limits": work.limits,
         "now": work.problem.scratch.descent[0],
         "report": work.report[0],
         "force": work.force,
+        "weight": np.zeros(3),
         **dict.fromkeys(("slot", "k", "was"), 1),
-        **dict.fromkeys(("first", "ahead", "tolerance"), 1.0),
+        **dict.fromkeys(("first", "ahead", "tolerance", "margin"), 1.0),
     }
     for kernel in kernels:
         names = inspect.signature(kernel.py_func).parameters

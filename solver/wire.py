@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver import _tolerances as tol
 from solver._kernels.chain import segments_at
 from solver._kernels.data import Profile
+from solver.doors import FAR_MM, Array, Range, number, numbers
 from solver.errors import refuse
-from solver.grid import Array, read_only
+from solver.grid import read_only
 
 Quantity = float | ArrayLike | Callable[[Array], ArrayLike]
 
+ANY = Range(-1e12, 1e12, "write a number, [[distance from tip mm, value], ...] or a callable of distances")
+STIFFNESS_N_MM2 = Range(1e-12, 1e12, "0.5 to 40 is usual")
 CALLABLE_REACH_MM = 2000.0
 CALLABLE_STEP = 0.25
 
@@ -23,16 +27,17 @@ def _table(name: str, value: Quantity, segment_mm: float) -> tuple[Array, Array]
     """Abscissae (n,) and values (n,) of a number, a profile array or a callable of the distance from the tip."""
     if callable(value):
         at = np.arange(0.0, CALLABLE_REACH_MM, CALLABLE_STEP * segment_mm)
-        return at, np.broadcast_to(np.asarray(value(at), dtype=np.float64), at.shape).copy()
-    array = np.asarray(value, dtype=np.float64)
-    if array.ndim == 0:
-        return np.zeros(1), array.reshape(1).copy()
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) == 0:
-        allowed = "a number, rows of [distance from tip mm, value], or a callable"
-        refuse("wire", name, array.tolist(), allowed, "write [[0.0, a], [30.0, b]]")
-    if np.any(np.diff(array[:, 0]) < 0) or array[0, 0] < 0:
-        refuse("wire", name, array[:, 0].tolist(), "distances from the tip that never fall, from 0", "sort the rows")
-    return array[:, 0].copy(), array[:, 1].copy()
+        values = value(read_only(at))
+        if np.ndim(values) == 0:
+            return at, np.full(at.shape, number("wire", name, values, ANY))
+        return at, numbers("wire", name, values, at.shape, ANY).copy()
+    if isinstance(value, (list, tuple)) or np.ndim(value) > 0:
+        rows = numbers("wire", name, value, (None, 2), ANY)
+        if len(rows) == 0 or np.any(np.diff(rows[:, 0]) < 0) or rows[0, 0] < 0 or rows[-1, 0] > FAR_MM:
+            allowed = f"distances from the tip that never fall, from 0 to {FAR_MM:g} mm"
+            refuse("wire", name, rows[:, 0].tolist(), allowed, "write [[0.0, a], [30.0, b]]")
+        return rows[:, 0].copy(), rows[:, 1].copy()
+    return np.zeros(1), np.array([number("wire", name, value, ANY)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +48,7 @@ class GuideWire:
     bending_stiffness_N_mm2, rest_curvature_per_mm : a number, rows [distance from tip, value] (linear between,
     constant beyond, two equal distances make a jump), or a callable of an array of distances.
     torsional_stiffness_N_mm2 : inf is ideal torque control (the seed's assumption).
+    weight_N_per_mm : in blood, less what it displaces (7e-6 for 0.36 mm of steel); 0 is left out of everything.
     Positive rest curvature bends the wire towards material axis 1.
     """
 
@@ -51,26 +57,36 @@ class GuideWire:
     bending_stiffness_N_mm2: Quantity
     rest_curvature_per_mm: Quantity = 0.0
     torsional_stiffness_N_mm2: float = math.inf
+    weight_N_per_mm: float = 0.0
     profile: Profile = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check and tabulate the profiles."""
-        if not (math.isfinite(self.segment_mm) and self.segment_mm > 0):
-            refuse("wire", "segment_mm", self.segment_mm, "a positive length", "1.0 is a good start")
-        if not (math.isfinite(self.radius_mm) and self.radius_mm >= 0):
-            refuse("wire", "radius_mm", self.radius_mm, "a length of 0 or more", "0.18 is a 0.014 inch wire")
-        if not self.torsional_stiffness_N_mm2 > 0:
-            refuse("wire", "torsional_stiffness_N_mm2", self.torsional_stiffness_N_mm2, "above 0, or inf", "use inf")
-        bend_at, bend = _table("bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, self.segment_mm)
-        rest_at, rest = _table("rest_curvature_per_mm", self.rest_curvature_per_mm, self.segment_mm)
-        if not np.all(np.isfinite(bend)) or np.any(bend <= 0):
-            refuse("wire", "bending_stiffness_N_mm2", bend.min(), "positive everywhere", "0.5 to 40 is usual")
-        if not np.all(np.isfinite(rest)) or np.any(np.abs(rest) * self.segment_mm > math.pi / 2):
-            allowed = f"up to {math.pi / 2 / self.segment_mm:.3g} per mm at segment_mm = {self.segment_mm:g}"
-            refuse("wire", "rest_curvature_per_mm", np.abs(rest).max(), allowed, "shorten segment_mm")
-        arrays = [read_only(a, np.float64) for a in (bend_at, bend, rest_at, rest)]
-        profile = Profile(arrays[0], arrays[1], arrays[2], arrays[3], float(self.torsional_stiffness_N_mm2))
+        number("wire", "segment_mm", self.segment_mm, Range(1e-3, 1e3, "1.0 is a good start"))
+        number("wire", "radius_mm", self.radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
+        if not (isinstance(self.torsional_stiffness_N_mm2, float) and self.torsional_stiffness_N_mm2 == math.inf):
+            number("wire", "torsional_stiffness_N_mm2", self.torsional_stiffness_N_mm2, STIFFNESS_N_MM2)
+        number("wire", "weight_N_per_mm", self.weight_N_per_mm, Range(0.0, 1.0, "0.36 mm of steel weigh 8e-6"))
+        bend = _table("bending_stiffness_N_mm2", self.bending_stiffness_N_mm2, self.segment_mm)
+        rest = _table("rest_curvature_per_mm", self.rest_curvature_per_mm, self.segment_mm)
+        numbers("wire", "bending_stiffness_N_mm2", bend[1], (None,), STIFFNESS_N_MM2)
+        steepest = math.pi / 2 / self.segment_mm
+        numbers("wire", "rest_curvature_per_mm", rest[1], (None,), Range(-steepest, steepest, "shorten segment_mm"))
+        a, b, c, d = (read_only(array) for array in (*bend, *rest))
+        profile = Profile(a, b, c, d, float(self.torsional_stiffness_N_mm2))
         object.__setattr__(self, "profile", profile)
+        for name, (at, values) in (("bending_stiffness_N_mm2", bend), ("rest_curvature_per_mm", rest)):
+            if np.ndim(getattr(self, name)) > 0:
+                # not the caller's array, which may yet change
+                object.__setattr__(self, name, read_only(np.column_stack([at, values])))
+
+    def __reduce__(self) -> tuple[type["GuideWire"], tuple[Quantity, ...]]:
+        """Pickle the arguments, a callable as the table that was made of it: few callables can be pickled."""
+        p, given = self.profile, (self.bending_stiffness_N_mm2, self.rest_curvature_per_mm)
+        tables = (np.column_stack([p.stiffness_at, p.stiffness]), np.column_stack([p.rest_at, p.rest]))
+        bend, rest = (table if callable(g) else g for g, table in zip(given, tables, strict=True))
+        whole = self.torsional_stiffness_N_mm2, self.weight_N_per_mm
+        return GuideWire, (self.segment_mm, self.radius_mm, bend, rest, *whole)
 
     @property
     def straight(self) -> bool:
@@ -84,7 +100,8 @@ class GuideWire:
 
     def segments_at(self, depth_mm: float) -> tuple[int, float]:
         """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
-        count, first = segments_at(float(depth_mm), float(self.segment_mm))
+        most = Range(0.0, tol.MOST_JOINTS * self.segment_mm, "use longer segments")
+        count, first = segments_at(number("wire", "depth_mm", depth_mm, most), float(self.segment_mm))
         return int(count), float(first)
 
     def arcs_at(self, depth_mm: float) -> Any:

@@ -1,18 +1,23 @@
 """A wire in memory: the arrays that the kernels work on, grown as the wire goes in, and the way into the kernels."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver import _tolerances as tol
 from solver import skips
-from solver._kernels import data
+from solver._compile import hash_of
+from solver._kernels import data, records
 from solver._kernels.chain import lay_out, tabulate
 from solver._kernels.data import CURRENT, Introducer, Limits, Problem, Rule, WireTable
 from solver._kernels.handle import Contents, handle_of
 from solver._kernels.insertion import advance
 from solver._kernels.minimise import CLOSED_FORM
+from solver._kernels.shaft import shaft_forces
+from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
-from solver.grid import Array
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
@@ -40,8 +45,14 @@ def look_up_rule(wire: GuideWire, wall: VesselWall | None, quadrature: str) -> R
     return Rule(hull, reach, at, weight, TIP_ZONE if quadrature == "tip" else 2**62)
 
 
-NO_FIELD = data.Field(np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0)
+_VERSION = hash_of(Path(__file__))
+NO_FIELD = data.Field(
+    np.zeros((4, 4, 4), dtype=np.float32), np.eye(3), np.zeros(3), 0.0, 0.0, 1.0, np.zeros((1, 1, 1), np.uint8)
+)
 """A stand-in where there is no wall; it is never looked up."""
+
+SNAPS_KEPT = 16
+"""Of one depth."""
 
 
 class Workspace:
@@ -53,39 +64,52 @@ class Workspace:
     problem: Problem
     introducer: Introducer | None = None
 
-    def __init__(self, wire: GuideWire, wall: VesselWall | None, quadrature: str, limits: Limits) -> None:
+    def __init__(
+        self,
+        wire: GuideWire,
+        wall: VesselWall | None,
+        quadrature: str,
+        limits: Limits,
+        shaft_mm: float = 0.0,
+        drag_N: float = 0.0,
+    ) -> None:
         if limits.method == CLOSED_FORM and wire.twists:
             name, got = "torsional_stiffness_N_mm2", wire.torsional_stiffness_N_mm2
             refuse("solver", name, got, "inf with method closed_form", "use method newton")
         self.wire, self.wall, self.limits, self.skips = wire, wall, limits, skips.current()
+        self.shaft_mm = float(shaft_mm)
+        springs = np.zeros((1, 3, 3)), np.zeros(2), np.zeros((2, 2))
+        self.shaft = data.Shaft(float(drag_N), float(wire.radius_mm), *springs)
         self.rule = look_up_rule(wire, wall, quadrature)
         self.field = wall.field if wall is not None else NO_FIELD
-        # rolling a straight wire with one bending stiffness and a round hull changes nothing
-        self.round = wire.straight and (wall is None or wall.samples == 0)
+        # rolling a straight wire with one bending stiffness and a round, smooth hull changes nothing
+        smooth = wall is None or (wall.samples == 0 and wall.friction == 0)
+        self.round = wire.straight and smooth and drag_N == 0
         self.k, self.capacity = 0, 0
-        self.counters, self.place = np.zeros(1, data.COUNTERS), np.zeros(1, data.PLACE)
+        self.counters, self.place = np.zeros(1, records.COUNTERS), np.zeros(1, records.PLACE)
         # the same memory without names: to clear a record field by field takes 6 µs
         self.counts = self.counters.view(np.int64)
-        self.place["shrink"] = 1.0
-        self.report = np.zeros(2, data.REPORT)
+        self.place["shrink"], self.place["calm"] = 1.0, np.inf
+        self.snaps = np.zeros(SNAPS_KEPT, records.SNAP)
+        self.report = np.zeros(2, records.REPORT)
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
-        """Make room for more segments, keeping joints, frames and controls of the current state."""
+        """Make room for more segments, keeping the wire that lies there."""
         points = len(self.rule.hull) * (2 * capacity + len(self.rule.tip_at))
         state, scratch = self._empty_state(capacity, points), self._empty_scratch(capacity, points)
+        friction, chain = self._empty_friction(capacity, points), self._empty_chain(capacity, points)
         if self.capacity:
             old = self.problem
-            for new, was in zip(state[:3], old.state[:3], strict=True):
-                new[:, : was.shape[1]] = was
-            scratch.change[: self.capacity] = old.scratch.change
-        friction = float(self.wall.friction) if self.wall is not None else 0.0
-        rubbing = points if friction else 0
+            news, olds = (*state, *chain[:-1], *friction[2:]), (*old.state, *old.chain[:-1], *old.friction[2:])
+            for new, was in zip((*news, scratch.change), (*olds, old.scratch.change), strict=True):
+                new[tuple(slice(0, size) for size in was.shape)] = was
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
-            friction=data.Friction(friction, np.zeros((rubbing, 3)), np.zeros((rubbing, 3)), np.zeros(rubbing)),
-            chain=self._empty_chain(capacity, points),
+            friction=friction,
+            shaft=self.shaft,
+            chain=chain,
             state=state,
             scratch=scratch,
             skips=self.skips,
@@ -95,20 +119,28 @@ class Workspace:
         segment = float(self.wire.segment_mm)
         cells = np.zeros((capacity + 1, 2))
         tabulate(self.wire.profile, segment, cells)
-        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile)
+        self.table = WireTable(self.wire.profile, self.rule, cells, segment, self.skips.profile, self.shaft_mm)
         self.force = np.zeros((capacity + 1, 3))
         self.capacity = capacity
 
     def _empty_state(self, k: int, points: int) -> data.State:
         u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
         penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
-        return data.State(u, x, r, penetration, jet, np.zeros(3, data.ENERGIES))
+        return data.State(u, x, r, penetration, jet, np.zeros(3, records.ENERGIES), np.zeros((3, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor = np.zeros((k, 3, 7)), np.ones((points, 4))
         start, change, keep = np.zeros((3, k, 3))
-        descent = np.zeros(1, data.DESCENT)
-        return data.Scratch(gain, anchor, self.counters, descent, start, change, keep)
+        descent = np.zeros(1, records.DESCENT)
+        return data.Scratch(gain, anchor, self.counters, descent, start, change, keep, self.snaps)
+
+    def _empty_friction(self, k: int, points: int) -> data.Friction:
+        coefficient = float(self.wall.friction) if self.wall is not None else 0.0
+        k, points = (k, points) if coefficient else (-1, 0)
+        held, arm, start, normal, stretch = np.zeros((5, points, 3))
+        load, pressed = np.zeros((2, points))
+        frame = np.zeros((k + 1, 3, 3))
+        return data.Friction(coefficient, self.rule.reach, held, frame, arm, start, normal, load, stretch, pressed)
 
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
@@ -122,20 +154,26 @@ class Workspace:
         frame: Array,
         tip_load: ArrayLike = (0.0, 0.0, 0.0),
         translate: bool = False,
-        step_mm: float = 1.0,
-        roll_step_deg: float = 1.0,
+        steps: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        weight: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``."""
+        """Put the base of the wire into the introducer, see ``_kernels.data.Introducer``.
+
+        steps : longest step, mm, and roll, degrees; the finest step, mm.
+        """
+        step, turn, finest = map(float, steps)
         self.introducer = Introducer(
             entry=entry,
             frame=np.ascontiguousarray(frame),
             load=np.array(tip_load, dtype=np.float64),
             translate=translate,
             idle_roll=self.round and self.skips.roll,
-            step=float(step_mm),
-            turn=float(roll_step_deg),
+            step=step,
+            turn=turn,
             rise=max(tol.RISE_RADII * self.wire.radius_mm, 0.25 * self.field.spacing),
             margin=float(self.wire.radius_mm),
+            weight=np.array(weight, dtype=np.float64),
+            finest=min(finest / step, 1.0),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
         self._bind()
@@ -143,8 +181,8 @@ class Workspace:
     def load(self, load_N: ArrayLike) -> None:
         """Put dead loads on the joints, or one on the tip."""
         k, loads = self.k, self.problem.chain.load
-        load = np.asarray(load_N, dtype=np.float64)
-        if load.shape not in ((3,), (k + 1, 3)) or not np.all(np.isfinite(load)):
+        load = numbers("relax", "load_N", load_N, (..., 3), FORCE_N)
+        if load.shape not in ((3,), (k + 1, 3)):
             allowed = f"(3,) on the tip or ({k + 1}, 3)"
             refuse("relax", "load_N", load.shape, allowed, "see GuideWire.segments_at")
         loads[:] = 0.0
@@ -154,6 +192,23 @@ class Workspace:
         """Take a handle of the arrays, wherever in memory they are now."""
         settings = self.introducer, self.limits
         self.handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a checkpoint holds: the wall has the field already, and numba's handle is of this process."""
+        state = vars(self) | {"problem": self.problem._replace(field=NO_FIELD), "version": _VERSION}
+        return {name: value for name, value in state.items() if name not in ("handle", "counts", "field")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take a checkpoint up, where the solver is the one that made it: its arrays mean the same then."""
+        if state.pop("version") != _VERSION:
+            raise ValueError("insertion: checkpoint: made by another version of the solver; insert the wire anew")
+        vars(self).update(state)
+        # the same arrays, and as read-only as they were: to numba that is a type
+        self.field = self.wall.field if self.wall is not None else NO_FIELD
+        self.problem = self.problem._replace(field=self.field)
+        self.table = self.table._replace(profile=self.wire.profile)
+        self.counts = self.counters.view(np.int64)
+        self._bind()
 
     def reserve(self, depth_mm: float) -> None:
         """Make sure that there is room for the wire at a depth and one point more."""
@@ -174,9 +229,19 @@ class Workspace:
         outcome, iterations, self.k = advance(self.handle, depth_mm, roll_deg, laid)
         return Status[data.OUTCOMES[outcome]], iterations
 
-    def solution(self, status: Status, iterations: int) -> Solution:
+    def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n])]
-        records = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
-        return Solution.assembled(arrays, records, status, iterations)
+        notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
+        solution = Solution.assembled(arrays, notes, self.snaps, (status, iterations, depth_mm, roll_deg))
+        if self.shaft.drag:
+            sliding, turning = shaft_forces(self.shaft)
+            push, torque = solution.push_force_N + sliding, solution.reaction_torque_N_mm + turning
+            vars(solution).update(push_force_N=push, reaction_torque_N_mm=torque)
+        if self.k and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
+            # half of the first segment's weight hangs at the entry, where no joint can move
+            force = solution.reaction_force_N - 0.5 * self.problem.chain.length[0] * self.introducer.weight
+            force.setflags(write=False)
+            vars(solution).update(reaction_force_N=force)
+        return solution

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
@@ -46,3 +47,21 @@ def helix_pitch(stiffness: float, force: float) -> float:
 def helix_contact(stiffness: float, force: float, clearance: float) -> float:
     """Contact load per length of that helix, F² r/(4 EI), N/mm."""
     return force**2 * clearance / (4 * stiffness)
+
+
+def whipped_tip(stiffening: float, friction: float, length: float, hand: float) -> float:
+    """Roll of the free tip of a shaft of constant rest bend in a tube of constant bend, rad, rolled to ``hand``.
+
+    ψ'' = a sin ψ + b, a = EI κ_rest κ_tube/GJ, b = m/GJ, m the torque of friction per mm; ψ' = 0 at the tip ψ_t:
+    ½ ψ'² = a (cos ψ_t - cos ψ) + b (ψ - ψ_t), and the length is the integral of dψ/ψ' from ψ_t to the hand.
+    """
+
+    def excess(tip: float) -> float:
+        def integrand(y: float) -> float:
+            # ψ = ψ_t + y²: the root at the tip cancels
+            half = stiffening * (math.cos(tip) - math.cos(tip + y * y)) + friction * y * y
+            return 2 * y / math.sqrt(2 * half) if y > 0 else 2 / math.sqrt(2 * (stiffening * math.sin(tip) + friction))
+
+        return float(quad(integrand, 0.0, math.sqrt(hand - tip), limit=200)[0]) - length
+
+    return float(brentq(excess, 1e-3, min(hand, math.pi) - 1e-3, xtol=1e-12))

@@ -30,7 +30,7 @@ def way_through(tree: Tree) -> Anatomy:
     others = []
     for k, chain in enumerate(_chains(tree, path)):
         near = np.linalg.norm(tree.points_mm[chain] - middle, axis=1) < reach
-        if near.any() and _length(tree, chain) >= 2.0 * STEP_MM:
+        if near.any() and arc_lengths(tree.points_mm[chain])[-1] >= 2.0 * STEP_MM:
             others.append(_branch(f"branch{k}", tree, chain, path, tube))
     return Anatomy((tube, *others))
 
@@ -61,11 +61,6 @@ def _smooth(points: Array, sigma: float) -> Array:
     return np.asarray(chord + smoothed[len(points) - 1 : 2 * len(points) - 1])
 
 
-def _length(tree: Tree, path: Index) -> float:
-    """Length in mm of a path through the tree."""
-    return float(np.linalg.norm(np.diff(tree.points_mm[path], axis=0), axis=1).sum())
-
-
 def _widest_path(tree: Tree) -> Index:
     """Indices of the path to be taken: from a wide end, at least half of LONGEST_WAY_MM, its narrowest place widest."""
     n, (a, b) = len(tree.points_mm), tree.edges.T
@@ -87,7 +82,8 @@ def _widest_path(tree: Tree) -> Index:
                 walk.append(int(before[walk[-1]]))
             path = _usable(tree, np.array(walk[::-1], dtype=np.int64))
             if len(path) > 3:
-                score = min(_length(tree, path), LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
+                length_mm = float(arc_lengths(tree.points_mm[path])[-1])
+                score = min(length_mm, LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
                 best = max(best, (score, path), key=lambda found: found[0])
     if len(best[1]) < 4:
         raise ValueError(

@@ -22,8 +22,7 @@ def straight(length_mm: float = 40.0, radius_mm: float = 2.0) -> Anatomy:
 def bend(angle_deg: float = 90.0, turn_mm: float = 12.0, radius_mm: float = 2.0) -> Anatomy:
     """A bend towards +x by ``angle_deg`` on a circle of radius ``turn_mm``, then straight on."""
     angle = np.radians(np.linspace(0.0, angle_deg, max(8, int(angle_deg / 6))))
-    zero = np.zeros_like(angle)
-    arc = np.column_stack([turn_mm * (1 - np.cos(angle)), zero, turn_mm * np.sin(angle)])
+    arc = np.column_stack([turn_mm * (1 - np.cos(angle)), 0 * angle, turn_mm * np.sin(angle)])
     out = np.array([np.sin(angle[-1]), 0.0, np.cos(angle[-1])])
     tail = arc[-1] + np.linspace(1.0, 18.0, 12)[:, None] * out
     return Anatomy((sweep("vessel", np.concatenate([_inlet(), arc, tail]), radius_mm),))

@@ -54,9 +54,8 @@ class WillisPlan:
     tortuous_vertebrals: bool = False
 
 
-def circle_of_willis(rng: np.random.Generator, plan: WillisPlan | None = None) -> Anatomy:
+def circle_of_willis(rng: np.random.Generator, plan: WillisPlan) -> Anatomy:
     """A seeded anatomy; the right carotid is the tube ``right.ICA``, entered from below."""
-    plan = plan or WillisPlan()
     mean, sd = np.array(list(DIAMETERS_MM.values())).T
     drawn = mean + sd * np.clip(rng.normal(0.0, plan.spread, len(mean)), -SPREAD_LIMIT, SPREAD_LIMIT)
     radius = dict(zip(DIAMETERS_MM, (0.5 * drawn).tolist(), strict=True))

@@ -1,6 +1,7 @@
 """Scenes from a user's own file: a wire in the vessels of an anatomy, and a wire in the real voxels of a scan."""
 
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -23,28 +24,6 @@ LARGEST_JUMP_MM = 2.0
 """A tip that springs further than this in one step has left the quiet part of the insertion."""
 DEEPEST_MM = 0.25
 """A trial in which the wire is pressed further into the wall than this is stuck: it is not pushed on."""
-
-
-def steer(
-    insertion: TrueInsertion, way_mm: Array, depths_mm: tuple[float, ...], corridor_mm: float
-) -> tuple[float, float]:
-    """The roll in degrees that leads furthest along a way (n, 3), and the depth to which the tip stayed on it.
-
-    The way starts at the entry. corridor_mm : how far the tip may be from the way and still be on it.
-    """
-    trial = replace(insertion, step_mm=COARSE_MM, advance_mm=COARSE_MM)
-    best = (0.0, 0.0)
-    for roll in ROLLS_DEG:
-        reached = 0.0
-        for frame in replay(trial, depths_mm, roll):
-            if not _on_the_way(trial, frame, way_mm, corridor_mm):
-                break
-            reached = frame.depth_mm
-        if reached > best[1]:
-            best = (roll, reached)
-        if best[1] >= depths_mm[-1]:
-            break
-    return best
 
 
 def _on_the_way(insertion: TrueInsertion, frame: TrueFrame, way_mm: Array, corridor_mm: float) -> bool:
@@ -78,8 +57,7 @@ def from_anatomy(path: str | Path) -> NamedScene:
 
     def plan(_rng: np.random.Generator, frames: int) -> Setup:
         depths = spread(8.0, tube.length_mm - ENTRY_ARC_MM - END_MM, frames)
-        setup = Setup(anatomy, tube, ENTRY_ARC_MM, depths, (0.0,) * frames, 0.5 * (low + high))
-        return replace(setup, material_axis=world_axis_across(setup.direction))
+        return Setup(anatomy, tube, ENTRY_ARC_MM, depths, (0.0,) * frames, 0.5 * (low + high))
 
     return NamedScene(
         name=path.name.split(".")[0].replace(" ", "-").replace("(", "").replace(")", "").lower(),
@@ -94,16 +72,24 @@ def from_anatomy(path: str | Path) -> NamedScene:
 
 
 def steered(setup: Setup, first_mm: float, corridor_mm: float) -> Setup:
-    """The roll that leads furthest along the way, and depths from ``first_mm`` to where it led.
+    """The roll that leads furthest along the way from the entry, and depths from ``first_mm`` to where it led.
 
     corridor_mm : how far the tip may be from the way and still be on it.
     """
-    way = setup.tube.points_mm[setup.ahead]
-    trials = tuple(np.arange(SHORTEST_TRIAL_MM, setup.depths_mm[-1], TRIAL_STEP_MM).tolist())
-    roll, reached = steer(setup.insertion(), way, trials, corridor_mm)
+    setup = replace(setup, material_axis=world_axis_across(setup.direction))
+    trial = replace(setup.insertion(), step_mm=COARSE_MM, advance_mm=COARSE_MM)
+    way, furthest, best_roll = setup.tube.points_mm[setup.ahead], 0.0, 0.0
+    depths = np.arange(SHORTEST_TRIAL_MM, setup.depths_mm[-1], TRIAL_STEP_MM).tolist()
+    for roll in ROLLS_DEG:
+        on_the_way = takewhile(lambda frame: _on_the_way(trial, frame, way, corridor_mm), replay(trial, depths, roll))
+        reached = max((frame.depth_mm for frame in on_the_way), default=0.0)
+        if reached > furthest:
+            furthest, best_roll = reached, roll
+        if furthest >= depths[-1]:
+            break
     frames = len(setup.depths_mm)
-    depths = spread(first_mm, max(reached, first_mm + LEAST_PUSH_MM), frames)
-    return replace(setup, depths_mm=depths, rolls_deg=(roll,) * frames)
+    last = max(furthest, first_mm + LEAST_PUSH_MM)
+    return replace(setup, depths_mm=spread(first_mm, last, frames), rolls_deg=(best_roll,) * frames)
 
 
 VESSEL_GREY = 1000.0
@@ -149,7 +135,7 @@ def _plan(values: Volume, grid: ScanGrid, threshold: float, frames: int) -> Setu
     """Enter the vessel that is found, against the wall that the scan itself shows."""
     vessel, way = find_way(values, grid, threshold)
     box, part = _around(way, grid)
-    setup = Setup(
+    return Setup(
         Anatomy((way,)),
         way,
         BACKGROUND_ENTRY_ARC_MM,
@@ -159,7 +145,6 @@ def _plan(values: Volume, grid: ScanGrid, threshold: float, frames: int) -> Setu
         greys=Greys(noise=40.0 * (grid.voxel_mm / 0.3) ** 2, correlation_voxels=0.5),
         wall=iso_wall(np.where(vessel[box], values[box], 0.0).astype(np.float32), part, threshold),
     )
-    return replace(setup, material_axis=world_axis_across(setup.direction))
 
 
 def _around(way: Tube, grid: ScanGrid) -> tuple[tuple[slice, ...], ScanGrid]:

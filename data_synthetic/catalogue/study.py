@@ -9,7 +9,7 @@ import numpy as np
 
 from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory, Setup
-from data_synthetic.geometry import ScanGrid, centred_grid, normal_to, rotate, unit
+from data_synthetic.geometry import ScanGrid, normal_to, rotate, unit
 from data_synthetic.rod.replay import TrueFrame
 from data_synthetic.rod.truth import converged_truth
 from data_synthetic.scanner.phantom import Scan, Wires
@@ -78,8 +78,10 @@ def make_study(scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth
 def scan_grid(setup: Setup, size: int, voxel_mm: float) -> ScanGrid:
     """Voxels of the set-up's proportions about its middle, ``size`` voxels of ``voxel_mm`` along each axis."""
     ratio = np.array(setup.spacing_ratio)
-    shape = tuple(max(2, round(size / r)) for r in ratio)
-    return centred_grid(setup.centre_mm, shape, voxel_mm * ratio, setup.axes)
+    shape, spacing = tuple(max(2, round(size / r)) for r in ratio), voxel_mm * ratio
+    axes = np.eye(3) if setup.axes is None else setup.axes
+    half = axes @ (0.5 * (np.array(shape) - 1) * spacing)
+    return ScanGrid(shape, spacing, setup.centre_mm - half, axes)
 
 
 def describe_case(name: str, setup: Setup, grid: ScanGrid, rng: np.random.Generator) -> dict[str, Any]:

@@ -7,7 +7,7 @@ as that, the wall's energy would depend on where the nodes happen to lie, and th
 import numpy as np
 
 from data_synthetic.geometry import Array, Index
-from data_synthetic.rod.rod import Rod, Wall
+from data_synthetic.rod.rod import Rod, Wall, add_blocks
 
 PLACES, WEIGHTS = (0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(4), (1.0, 0.0), strict=True))
 """Gauss points of an edge, as shares of it, and their weights, which add up to one."""
@@ -47,7 +47,7 @@ def add_wall(rod: Rod, wall: Wall, points: Array, gradient: Array, bands: Array)
     block += np.einsum("na,nb->nab", normal, normal)
     block *= weight[:, None, None]
     for low, high in ((0, 0), (1, 1), (0, 1)):
-        _scatter(bands, edge + low, edge + high, block * (shares[low] * shares[high])[:, None, None])
+        add_blocks(bands, edge + low, edge + high, block * (shares[low] * shares[high])[:, None, None])
     return force
 
 
@@ -71,14 +71,3 @@ def _curvature(wall: Wall, points: Array) -> Array:
     g = wall.distance_and_gradient(stencil)[1].reshape(6, len(points), 3)
     hessian = np.moveaxis((g[:3] - g[3:]) / (2.0 * CURVATURE_STEP_MM), 0, 1)
     return np.asarray(0.5 * (hessian + np.swapaxes(hessian, 1, 2)))
-
-
-def _scatter(bands: Array, low: Index, high: Index, block: Array) -> None:
-    """Add blocks (n, 3, 3) for pairs of nodes low <= high to the lower bands; node 0 is clamped and has no unknowns."""
-    free = low > 0
-    low, high, block = low[free], high[free], block[free]
-    for a in range(3):
-        for b in range(3):
-            row, column = 4 * (high - 1) + 1 + a, 4 * (low - 1) + 1 + b
-            lower = row >= column
-            np.add.at(bands, ((row - column)[lower], column[lower]), block[lower, a, b])

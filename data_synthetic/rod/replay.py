@@ -71,7 +71,7 @@ def replay(
 
     The roll of a frame is reached linearly on the way to its depth; before the first frame it is that frame's roll.
     """
-    depths = [float(d) for d in depths_mm]
+    depths, advance = [float(d) for d in depths_mm], insertion.advance_mm or insertion.step_mm
     rolls = np.broadcast_to(np.array(roll_deg, dtype=np.float64), len(depths)).tolist()
     depth, roll = min((TIP_EDGES + 2) * insertion.step_mm, depths[0]), rolls[0]
     rod = _rod(insertion, depth, roll)
@@ -79,7 +79,10 @@ def replay(
     state = relax(rod, shape_from_points(rod, straight), REPLAY_FORCE_N)
     for target, target_roll in zip(depths, rolls, strict=True):
         jump, effort = 0.0, 0
-        for depth_next, roll_next in _advances(insertion, (depth, target), (roll, target_roll)):
+        way, turn = target - depth, target_roll - roll
+        count = max(int(np.ceil(max(abs(way) / advance, abs(turn) / ROLL_STEP_DEG))), 1)
+        pushes = [(depth + way * i / count, roll + turn * i / count) for i in range(1, count + 1)]
+        for depth_next, roll_next in pushes:
             before = state.shape.points[-1]
             state = _advance(insertion, state, depth, depth_next, roll_next)
             moved = state.shape.points[-1] - before
@@ -97,17 +100,6 @@ def replay(
             jump_mm=jump,
             iterations=effort + state.iterations,
         )
-
-
-def _advances(
-    insertion: TrueInsertion, depths: tuple[float, float], rolls: tuple[float, float]
-) -> Iterator[tuple[float, float]]:
-    """Depths and rolls on the way from one frame to the next, each given as (from, to); the last is the target."""
-    (depth, target), (roll, target_roll) = depths, rolls
-    advance = insertion.advance_mm or insertion.step_mm
-    count = max(int(np.ceil(abs(target - depth) / advance)), int(np.ceil(abs(target_roll - roll) / ROLL_STEP_DEG)), 1)
-    for i in range(1, count + 1):
-        yield depth + (target - depth) * i / count, roll + (target_roll - roll) * i / count
 
 
 def _rod(insertion: TrueInsertion, depth: float, roll_deg: float) -> Rod:

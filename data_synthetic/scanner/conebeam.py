@@ -14,16 +14,8 @@ from scipy.ndimage import gaussian_filter
 
 from data_synthetic.geometry import Array, ScanGrid, Volume
 from data_synthetic.scanner.c_arm import Arc, CArm
-from data_synthetic.scanner.phantom import (
-    Greys,
-    Phantom,
-    Scan,
-    Wires,
-    bone_coverage,
-    lumen_coverage,
-    splat,
-    wire_particles,
-)
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
 
 ENERGY_WEIGHTS = np.array([0.35, 0.40, 0.25])
 """Share of detected photons at 40, 60 and 80 keV: a filtered 90 kVp beam."""
@@ -64,10 +56,8 @@ class ConeBeamScanner:
         """
         greys, share = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         arm = CArm(grid, replace(arc, photons=arc.photons * (FULL.noise / greys.noise) ** 2))
-        bony = np.zeros_like(share)
-        if phantom.bone is not None:
-            bony = bone_coverage(phantom.bone, phantom.anatomy, phantom.bone_gap_mm, grid)
-        return ConeBeamScanner(arm, greys, arm.body_paths(), arm.paths(share), arm.paths(bony), share)
+        bony = arm.paths(bone_coverage(phantom, grid))
+        return ConeBeamScanner(arm, greys, arm.body_paths(), arm.paths(share), bony, share)
 
     def scan(self, wires: Wires, seed: Sequence[int]) -> Scan:
         """One run with wires, its photons and its dose of iodine drawn from ``seed``."""

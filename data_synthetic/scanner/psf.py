@@ -7,17 +7,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from data_synthetic.geometry import Array, ScanGrid, Volume
-from data_synthetic.scanner.phantom import (
-    CUT,
-    Greys,
-    Phantom,
-    Scan,
-    Wires,
-    bone_coverage,
-    lumen_coverage,
-    splat,
-    wire_particles,
-)
+from data_synthetic.scanner.coverage import CUT, bone_coverage, lumen_coverage, splat, wire_particles
+from data_synthetic.scanner.phantom import Greys, Phantom, Scan, Wires
 
 WIRE_STEP_VOXELS = 0.1
 """Distance between the discs of points that fill the wire; blurred by 0.8 voxel, nothing of it is left to see."""
@@ -38,10 +29,8 @@ class PsfScanner:
         greys, sharp = phantom.greys, lumen_coverage(phantom.anatomy, grid)
         sharp *= (1.0 - 0.5 * greys.washout) * (greys.contrast - greys.background)
         sharp += greys.background
-        if phantom.bone is not None:
-            share = bone_coverage(phantom.bone, phantom.anatomy, phantom.bone_gap_mm, grid)
-            # bone shares a voxel with tissue, never with lumen: the gap keeps them apart
-            sharp += share * (greys.bone - sharp)
+        # bone shares a voxel with tissue, never with lumen: the gap keeps them apart
+        sharp += bone_coverage(phantom, grid) * (greys.bone - sharp)
         blurred = gaussian_filter(sharp, _psf_voxels(grid, greys), truncate=CUT, mode="nearest")
         return PsfScanner(grid, greys, sharp, blurred)
 

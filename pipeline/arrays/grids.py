@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from solver.grid import Array, Grid
+from solver.grid import Array, Grid, read_only
 
 MAD = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
@@ -20,7 +20,7 @@ def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
 
 def contiguous(grid: Grid) -> Grid:
     """The grid itself if its values are C-contiguous, otherwise with a copy (of a crop, say) that is."""
-    return grid if grid.values.flags.c_contiguous else grid.with_values(np.ascontiguousarray(grid.values))
+    return grid if grid.values.flags.c_contiguous else grid.with_values(read_only(np.ascontiguousarray(grid.values)))
 
 
 def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
@@ -60,7 +60,7 @@ def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
         grid.values.astype(np.float32), matrix, grid.to_index(like.origin_mm), like.shape,
         output=values, order=1, mode="constant", cval=outside,
     )  # fmt: skip
-    return like.with_values(values)
+    return like.with_values(read_only(values))
 
 
 def spread(values: NDArray[Any]) -> float:

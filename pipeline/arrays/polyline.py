@@ -3,12 +3,10 @@
 import warnings
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import make_splprep
 
-from pipeline.model import arc_length
-
-Array = NDArray[np.float64]
+from pipeline.model import Array, arc_length
 
 
 def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
@@ -47,6 +45,11 @@ def tip_tangent(curve_mm: ArrayLike, over_mm: float = 1.0) -> Array:
     chord = curve[-1] - curve[max(start, 0)]
     norm = np.linalg.norm(chord)
     return np.asarray(chord / norm) if norm > 0 else np.zeros(3)
+
+
+def angle_deg(a: Array, b: Array) -> float:
+    """Angle between two vectors (3,) by atan2: arccos loses half the digits near 0."""
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
 def smooth(path_mm: ArrayLike, sigma_mm: float, step_mm: float = 0.5) -> Array:

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from itertools import chain
@@ -15,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.benchmark import many, scenes
-from pipeline.benchmark.insert import Run, SolverSetting, insert, timed
+from pipeline.benchmark.insert import SolverSetting, insert, timed
 from pipeline.benchmark.reference import reference, shape_error
 from pipeline.benchmark.scenes import BenchScene
 from reports.schema import CLAIMS, ORDERS
@@ -183,12 +182,6 @@ def in_a_sheath() -> Iterator[Claim]:
         yield Claim(name + "a 1 mm step, mean of all", 1e3 * seconds / run.steps, "ms")
 
 
-def _without(skip: str | None, scene: BenchScene, setting: SolverSetting, wall: VesselWall | None) -> Run:
-    """The insertion with all skips, or with all but one."""
-    with off(skip) if skip else nullcontext():
-        return insert(scene, setting, wall)
-
-
 def skips() -> Iterator[Claim]:
     """Every skip off in turn: the same wire, and what the skip saves."""
     for name in Skips._fields:
@@ -198,13 +191,15 @@ def skips() -> Iterator[Claim]:
         wall = scene.wall(hull)
         # wires are compared at a tolerance so tight that where an iteration stops does not show
         tight = SolverSetting(segment, hull=hull, tolerance=1e-13)
-        with_skip, without = (_without(s, scene, tight, wall).last.joints_mm for s in (None, name))
+        # with all skips, and with all but this one
+        runs = [off(*names)(insert) for names in ((), (name,))]
+        with_skip, without = (run(scene, tight, wall).last.joints_mm for run in runs)
         apart = float(np.abs(with_skip - without).max())
         aim = "at most 1e-6 (algebraic skips 1e-12)"
         where = f"skip {name} off ({scene.name}, hull {hull})"
         yield Claim(f"{where}: wire apart", apart, "mm", aim, apart <= 1e-6)
         asked = SolverSetting(segment, hull=hull)
-        seconds = [[timed(partial(_without, s, scene, asked, wall), 1)[0] for s in (None, name)] for _ in range(PAIRS)]
+        seconds = [[timed(partial(run, scene, asked, wall), 1)[0] for run in runs] for _ in range(PAIRS)]
         quick, slow = np.median(seconds, axis=0)
         yield Claim(f"{where}: time, times", float(slow / quick), "1")
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from pipeline.benchmark.scenes import BenchScene
 from pipeline.model import Array
-from solver import Insertion, Solution, VesselWall, relax
+from solver import Insertion, Solution, VesselWall
 
 Result = TypeVar("Result")
 
@@ -47,27 +47,18 @@ class Run:
 
 
 def insert(scene: BenchScene, setting: SolverSetting, wall: VesselWall | None = None) -> Run:
-    """Push the scene's wire in; a free wire is bent by its dead load at once.
+    """Push the scene's wire in; a free wire, whose one step is its length, is bent by its dead load at once.
 
     wall : made already (it costs more than an insertion).
     """
     wall = scene.wall(setting.hull) if wall is None else wall
     wire = scene.wire(setting.segment_mm)
-    if wall is None:
-        solutions = [
-            relax(
-                wire, None, depth_mm=scene.depth_mm, entry_mm=scene.entry_mm, entry_direction=scene.direction,
-                material_axis=scene.material_axis, roll_deg=scene.roll_deg, load_N=scene.load_N,
-                method=setting.method, tolerance=setting.tolerance, max_iterations=setting.max_iterations,
-            )
-        ]  # fmt: skip
-    else:
-        insertion = Insertion(
-            wire, wall, scene.entry_mm, scene.direction, setting.method, material_axis=scene.material_axis,
-            tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
-            quadrature=setting.quadrature,
-        )  # fmt: skip
-        solutions = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
+    insertion = Insertion(
+        wire, wall, scene.entry_mm, scene.direction, setting.method, material_axis=scene.material_axis,
+        tolerance=setting.tolerance, max_iterations=setting.max_iterations, step_mm=scene.step_mm,
+        quadrature=setting.quadrature, tip_load_N=scene.load_N,
+    )  # fmt: skip
+    solutions = list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
     last, work = solutions[-1], Counter[str]()
     for solution in solutions:
         work.update(solution.work)

@@ -46,7 +46,7 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     The error falls with the square of the segment length, so the limit is x(h/2) + (x(h/2) - x(h)) / 3.
     ValueError where none of them reaches it.
     """
-    arcs = arc_samples(scene.depth_mm)
+    arcs = np.linspace(0.0, scene.depth_mm, max(2, round(scene.depth_mm / SAMPLE_MM) + 1))
     for segment in fine_mm * 2.0 ** np.arange(COARSER):
         runs = [insert(scene, SolverSetting(s, quadrature="segments")) for s in (segment, 0.5 * segment)]
         if all(run.reached for run in runs):
@@ -57,11 +57,6 @@ def reference(scene: BenchScene, fine_mm: float = FINE_MM) -> Reference:
     last = next(run.last for run in runs if not run.reached)
     where = f"its reference stopped at {last.depth_mm:.2f} of {scene.depth_mm:g} mm: {last.status.value}"
     raise ValueError(f"benchmark: scene {scene.name}: {where}; allowed: a scene that can be passed; lower its depth")
-
-
-def arc_samples(depth_mm: float) -> Array:
-    """Arc lengths (m,) from 0 to the depth at about SAMPLE_MM."""
-    return np.linspace(0.0, depth_mm, max(2, round(depth_mm / SAMPLE_MM) + 1))
 
 
 def resampled(joints_mm: ArrayLike, arcs_mm: Array, samples_mm: Array, *, smooth: bool = False) -> Array:

@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
     add("--peers", action="store_true", help="other simulators from PyPI on the same work (extra [peers])")
     add("--stress", action="store_true", help="thousands of random scenes, each outcome judged")
+    add("--snaps", action="store_true", help="200 random insertions against steps of 0.05 mm")
     add("--quick", action="store_true", help="few settings, one repeat, 200 stress scenes")
     add("--seed", type=int, default=100, metavar="S", help="of the random scenes (default 100)")
     add("--scenes", type=int, default=0, metavar="N", help="number of stress scenes (default 5000)")
@@ -24,16 +25,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
     from pipeline.benchmark import page, scenes
-    from pipeline.benchmark.claims import measure_claims
+    from pipeline.benchmark.claims import STUDIES, measure_claims
     from pipeline.benchmark.cost import measure_cost
+    from pipeline.benchmark.friction import friction
     from pipeline.benchmark.own_case import NoScene, scene_of
     from pipeline.benchmark.peers.run import measure_peers
+    from pipeline.benchmark.snaps import study_of_steps
     from pipeline.benchmark.stress.run import QUICK_SCENES, SCENES, measure_stress
     from pipeline.load import LoadError
     from pipeline.study.manifest import ManifestError, read_manifest
     from pipeline.study.settings import Config
 
-    plain = not (args.stress or args.peers)
+    plain = not (args.stress or args.peers or args.snaps)
+    snaps = study_of_steps(args.seed, quick=args.quick)
     try:
         cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
@@ -47,12 +51,14 @@ def main(args: argparse.Namespace) -> int:
         sound &= measure_stress(args.out, say, args.seed, count)
     if args.peers:
         measure_peers(args.out, say, quick=args.quick)
+    if args.snaps:
+        sound &= measure_claims(args.out, say, [snaps])
     if plain:
         if args.manifest is None:
             chosen = [scenes.bend(), scenes.siphon()]
             chosen += [] if args.quick else [scenes.willis(args.seed), scenes.cantilever()]
         measure_cost(chosen, args.out, say, quick=args.quick)
         if args.manifest is None:
-            sound &= measure_claims(args.out, say)
+            sound &= measure_claims(args.out, say, (*STUDIES, friction, snaps))
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1

@@ -16,14 +16,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, 2 otherwise."""
+    from pipeline.status import InputError
     from pipeline.study.check import check
-    from pipeline.study.manifest import ManifestError, read_manifest
-    from pipeline.study.settings import SettingsError
+    from pipeline.study.manifest import read_manifest
 
     try:
         manifest, settings = read_manifest(args.manifest), resolved_settings(args)
-    except (ManifestError, SettingsError) as error:
-        return complain(error.problems, str(args.manifest))
+    except InputError as error:
+        return complain(error.problems, error.place or str(args.manifest))
     problems = check(manifest.cases, settings.config)
     if problems:
         return complain(problems, str(args.manifest))

@@ -23,6 +23,8 @@ def main(args: argparse.Namespace) -> int:
     from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
 
     try:
+        if not args.second.is_dir():
+            raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")
         tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
         difference = diff_folders(args.first, args.second, tolerance)
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:

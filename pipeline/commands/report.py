@@ -1,6 +1,7 @@
 """``wireval report OUT``: tables, figures and pages again, from result files alone."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from pipeline.commands import complain, say
@@ -26,8 +27,15 @@ def main(args: argparse.Namespace) -> int:
         problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
         return complain([problem], "OUT")
     totals = aggregate(args.out)
+    drawn = True
     for result in found:
-        if result.frames:
-            render_case(args.out / "cases" / result.case, embed=args.embed)
+        try:
+            if result.frames:
+                render_case(args.out / "cases" / result.case, embed=args.embed)
+            elif result.status == "damaged":
+                sys.stderr.write(f"{result.case}: {result.failures[0]['message']}\n")
+        except (OSError, EOFError, ValueError, KeyError) as error:
+            sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
+            drawn = False
     say(last_line(totals, render_index(args.out, embed=args.embed)))
-    return 0 if totals.all_ok else 1
+    return 0 if totals.all_ok and drawn else 1

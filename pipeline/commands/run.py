@@ -41,17 +41,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed, 2 input wrong."""
     from pipeline.load import LoadError
-    from pipeline.run.launch import UsageError, intention, last_line, launch
-    from pipeline.run.results import found_results
+    from pipeline.run.launch import failure_lines, intention, last_line, launch
+    from pipeline.status import InputError
     from pipeline.study.check import check
-    from pipeline.study.manifest import ManifestError
-    from pipeline.study.settings import SettingsError
 
     try:
         plan = _plan(args)
-    except (ManifestError, SettingsError) as error:
-        return complain(error.problems, str(args.manifest))
-    except (LoadError, UsageError) as error:
+    except InputError as error:
+        return complain(error.problems, error.place or str(args.manifest))
+    except LoadError as error:
         return complain([str(error)], "the command line")
     problems = check(plan.cases, plan.template.settings.config)
     if problems:
@@ -61,10 +59,8 @@ def main(args: argparse.Namespace) -> int:
             say(line)
         return 0
     totals, index = launch(plan, junit=args.junit)
-    for result in found_results(plan.out):
-        for row in result.failures:
-            frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
-            sys.stderr.write(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}\n")
+    for line in failure_lines(plan):
+        sys.stderr.write(f"{line}\n")
     say(last_line(totals, index))
     return 0 if totals.all_ok else 1
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.arrays.polyline import resample
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, pair_of, point_to_curve, rms
+from pipeline.compare.metrics import METRICS, Pair, measured, pair_of, point_to_curve, rms
 from pipeline.model import Array, Curve, Lumen
 from solver import Solution
 
@@ -15,17 +15,13 @@ __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """Errors of one frame: sample_mm (n, 3) of the simulated wire; arc_mm, error_mm, foot_arc_mm (n,), mm.
+class Comparison(Pair):
+    """Errors of one frame: the pair with every metric of it.
 
-    values : every metric by its column's name; ``comparison["rms_mm"]`` is one of them. Point errors are kept, since
+    values : the metrics by their columns' names; ``comparison["rms_mm"]`` is one of them. Point errors are kept, since
     pooled statistics come from points, never from averaged RMSEs.
     """
 
-    sample_mm: Array
-    arc_mm: Array
-    error_mm: Array
-    foot_arc_mm: Array
     values: Mapping[str, float | bool]
 
     def __getitem__(self, name: str) -> float | bool:
@@ -36,8 +32,8 @@ class Comparison:
 def compare(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
     pair = pair_of(simulated, traced, lumen, config)
-    values = {name: metric(pair) for name, metric in METRICS.items()}
-    return Comparison(pair.sample_mm, pair.arc_mm, pair.error_mm, pair.foot_arc_mm, values)
+    values = {name: measured(name, metric, pair) for name, metric in METRICS.items()}
+    return Comparison(**vars(pair), values=values)
 
 
 def compare_truth(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent
+from pipeline.arrays.polyline import angle_deg, at_arc, resample, samples, tip_tangent
 from pipeline.compare.config import CompareConfig
 from pipeline.model import Array, Curve, Lumen, arc_length
 from reports.schema import ERRORS, Column
@@ -115,11 +115,6 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.mean(array**2))) if array.size else float("nan")
 
 
-def _angle_deg(a: Array, b: Array) -> float:
-    """Angle by atan2: arccos loses half the digits near 0."""
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
-
-
 def same_branch(pair: Pair) -> bool:
     """Whether the straight line between the tips stays in the lumen to half a voxel and what the wall gave way.
 
@@ -146,10 +141,18 @@ METRICS: dict[str, Metric] = {
     "arc_rms_mm": lambda pair: rms(pair.by_arc_mm),
     "arc_max_mm": lambda pair: float(pair.by_arc_mm.max()),
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
-    "tip_angle_deg": lambda pair: _angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
+    "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
     "branch_ok": same_branch,
     "coverage": lambda pair: min(1.0, float(pair.arc_mm[-1]) / pair.curve_length_mm),
 }
+
+
+def measured(name: str, metric: Metric, pair: Pair) -> float | bool:
+    """The metric's value; an error says which metric it comes from, since anybody may have registered it."""
+    try:
+        return metric(pair)
+    except Exception as error:
+        raise RuntimeError(f"metric {name!r}: {type(error).__name__}: {error}") from error
 
 
 def register(column: Column, metric: Metric) -> None:

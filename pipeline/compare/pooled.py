@@ -21,7 +21,7 @@ Row = Mapping[str, Any]
 """A row of errors.csv: values by the names of its columns; what does not apply is NaN, None or absent."""
 
 
-def counts(row: Row, error_mm: Array | None) -> bool:
+def is_pooled(row: Row, error_mm: Array | None) -> bool:
     """Whether a frame counts: it is ok and compared.
 
     This is the one population: summary.csv, the last line, ``overall`` in run.json and every figure of a case pool over

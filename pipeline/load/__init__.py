@@ -17,6 +17,7 @@ from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry, unusable
 from pipeline.model import Counters, Volume
+from solver.grid import read_only
 
 __all__ = [
     "SUFFIXES",
@@ -88,7 +89,7 @@ def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig
         raise unusable(header.source, why)
     made_of = Crop(header, (start, stop), config)
     origin = header.grid.to_mm(start)
-    return Volume(values, header.spacing_mm, origin, header.direction, header.assumed, made_of)
+    return Volume(read_only(values), header.spacing_mm, origin, header.direction, header.assumed, made_of)
 
 
 @dataclass(frozen=True)
@@ -146,11 +147,9 @@ class Scans:
 
 def each_volume(header: Header) -> Iterator[Header]:
     """A sequence in one file as one header per volume."""
-    if header.item_count == 1:
-        yield header
-        return
     for item in range(header.item_count):
-        yield replace(header, source=replace(header.source, item=item), item_count=1)
+        source = header.source if header.item_count == 1 else replace(header.source, item=item)
+        yield replace(header, source=source, item_count=1)
 
 
 def read_headers(

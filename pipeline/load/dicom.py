@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import shift as shift_slice
 
 from pipeline.load.config import LoadConfig
-from pipeline.load.files import to_xyz
-from pipeline.load.geometry import Box, Header, Source, unusable
+from pipeline.load.files import reader_of, to_xyz
+from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
 
+SUFFIXES = {".dcm", ".ima"}
 GAP_TOLERANCE = 0.01  # of the slice spacing; scanners write positions to 1e-3 mm
 TILT_TOLERANCE = 0.1  # pixels of in-plane drift per slice
 POSITION, ORIENTATION, PIXEL_SPACING = "0020|0032", "0020|0037", "0028|0030"
@@ -121,6 +122,12 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     sitk.ProcessObject.SetGlobalWarningDisplay(False)
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
+    known = {Path(name).name for files in sizes.values() for name in files}
+    strangers = [p for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
+    lost = [p.name for p in strangers if _may_be_a_slice(p)]
+    if lost:
+        which = f"{len(lost)} of its files cannot be read as DICOM: {', '.join(lost[:5])}. "
+        raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
     images = {uid: files for uid, files in sizes.items() if files and _is_image(Path(files[0]))}
     if wanted:
         images = {uid: files for uid, files in images.items() if uid == wanted}
@@ -133,24 +140,32 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     return [Path(name) for name in next(iter(images.values()))]
 
 
-def _header_of(path: Path) -> sitk.ImageFileReader:
-    reader = sitk.ImageFileReader()
-    reader.SetFileName(str(path))
-    reader.ReadImageInformation()
-    return reader
+def _may_be_a_slice(path: Path) -> bool:
+    """Whether a file that GDCM puts in no series may be a damaged slice: it is not whole, or of a class of images.
+
+    Contours, plans and reports (RTSTRUCT, SR) lie beside the slices that they were made from.
+    """
+    from pydicom import dcmread
+    from pydicom.errors import InvalidDicomError
+
+    try:
+        kind = dcmread(path, stop_before_pixels=True).SOPClassUID
+    except (InvalidDicomError, AttributeError, ValueError, TypeError, EOFError, struct.error):
+        return True
+    return kind.is_private or "Image Storage" in kind.name
 
 
 def _is_image(path: Path) -> bool:
     try:
-        return bool(_header_of(path).HasMetaDataKey(POSITION)) or frames_of(path) is not None
-    except RuntimeError:
+        return bool(reader_of(path).HasMetaDataKey(POSITION)) or frames_of(path) is not None
+    except LoadError:
         return False
 
 
 def read_stack(source: Source) -> Stack:
     """Headers of the one series in a folder, or of one multi-frame file, sorted along the slice normal."""
     files = _series_files(source.path, source.dataset) if source.path.is_dir() else [source.path]
-    headers = [_header_of(path) for path in files]
+    headers = [reader_of(path) for path in files]
     several = frames_of(files[0]) if len(files) == 1 else None
     where = several or _slices(files, headers)
     if several is not None:
@@ -219,7 +234,7 @@ def recognises(path: Path) -> bool:
     """A folder of slices, or one enhanced multi-frame file."""
     if path.is_dir():
         return True
-    return path.suffix.lower() in {".dcm", ".ima", ""} and frames_of(path) is not None
+    return path.suffix.lower() in {*SUFFIXES, ""} and frames_of(path) is not None
 
 
 def parts(_path: Path) -> tuple[Path, ...]:
@@ -249,7 +264,6 @@ def read_header(source: Source, config: LoadConfig) -> Header:
         stack.positions[0],
         np.column_stack([stack.axes, stack.normal]),
         stack.pixel_type,
-        (source.path,),
         assumed=tuple(f"resampled onto a regular grid: {p}" for p in problems),
     )
 
@@ -263,9 +277,7 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     if stack.frames:
         whole = to_xyz(sitk.ReadImage(str(stack.files[0])))
         return np.asfortranarray(whole[x0:x1, y0:y1, list(stack.frames[z0:z1])])
-    reader = sitk.ImageSeriesReader()
-    reader.SetFileNames([str(f) for f in stack.files[z0:z1]])
-    return to_xyz(reader.Execute())[x0:x1, y0:y1]
+    return to_xyz(sitk.ReadImage([str(f) for f in stack.files[z0:z1]]))[x0:x1, y0:y1]
 
 
 def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:

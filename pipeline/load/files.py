@@ -87,15 +87,16 @@ def to_xyz(image: sitk.Image) -> NDArray[Any]:
     return np.asarray(_Pixels(image)).T
 
 
-def _reader(source: Source) -> sitk.ImageFileReader:
+def reader_of(path: Path) -> sitk.ImageFileReader:
+    """A reader that has read the header of a file; LoadError where it cannot."""
     reader = sitk.ImageFileReader()
-    reader.SetFileName(str(source.path))
+    reader.SetFileName(str(path))
     try:
         reader.ReadImageInformation()
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1]
         raise LoadError(
-            f"cannot read {source.path}: {reason}\n  allowed: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .dcm, .h5 "
+            f"cannot read {path}: {reason}\n  allowed: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .dcm, .h5 "
             "or a folder with one DICOM series. Check that the file is complete."
         ) from None
     return reader
@@ -107,7 +108,10 @@ def recognises(_path: Path) -> bool:
 
 
 def parts(path: Path) -> tuple[Path, ...]:
-    """Other files that hold the voxels of a header: those that a MetaImage or NRRD names, and Analyze's other half."""
+    """Other files that hold the voxels of a header: those that a MetaImage or NRRD names, and Analyze's other half.
+
+    Asked of every path that goes into a key: a change of theirs is a change of the scan.
+    """
     if path.suffix.lower() in {".hdr", ".img"}:
         return tuple(p for p in (path.with_suffix(".img"), path.with_suffix(".hdr")) if p != path and p.is_file())
     if path.suffix.lower() not in {".mhd", ".mha", ".nhdr", ".nrrd"}:
@@ -127,7 +131,7 @@ def parts(path: Path) -> tuple[Path, ...]:
 
 def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of one file; a 4-D file is a sequence of volumes along its last axis."""
-    reader = _reader(source)
+    reader = reader_of(source.path)
     size = reader.GetSize()
     if len(size) not in (3, 4) or reader.GetNumberOfComponents() != 1 or min(size) < 1:
         why = (
@@ -149,7 +153,6 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
         np.array(reader.GetOrigin()[:3]),
         direction,
         sitk.GetPixelIDValueAsString(reader.GetPixelID()),
-        (source.path, *parts(source.path)),
         item_count=size[3] if len(size) == 4 else 1,
     )
 
@@ -159,7 +162,7 @@ def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:
     part = None if box == header.box else read_mha_box(header.source.path, box)
     if part is not None:
         return part
-    reader = _reader(header.source)
+    reader = reader_of(header.source.path)
     (start, stop) = box
     index = list(start)
     size = [b - a for a, b in zip(start, stop, strict=True)]

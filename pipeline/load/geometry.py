@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipeline.arrays.grids import corners_mm
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
@@ -51,7 +52,7 @@ class Header:
     """Geometry and type of a scan, read without its voxels.
 
     shape : voxels along x, y, z.     spacing_mm, origin_mm : (3,).     direction : (3, 3), columns are the axes.
-    files : files and folders that it is read from.     item_count : volumes in the file (> 1 for a sequence).
+    item_count : volumes in the file (> 1 for a sequence).
     """
 
     source: Source
@@ -60,7 +61,6 @@ class Header:
     origin_mm: NDArray[np.float64]
     direction: NDArray[np.float64]
     pixel_type: str
-    files: tuple[Path, ...]
     item_count: int = 1
     assumed: tuple[str, ...] = ()
 
@@ -93,20 +93,14 @@ def describe(header: Header) -> str:
     return f"{header.source}: {numbers}"
 
 
-def corner_shift_voxels(a: Header, b: Header) -> float:
-    """Largest distance between the two scans' corners, in voxels of ``a``; inf where the shapes differ."""
-    if a.shape != b.shape:
-        return float("inf")
-    corners = np.array(np.meshgrid(*[(0, n - 1) for n in a.shape])).reshape(3, -1).T
-    shift = np.linalg.norm(a.grid.to_mm(corners) - b.grid.to_mm(corners), axis=1)
-    return float(shift.max() / a.spacing_mm.min())
-
-
 def require_same_geometry(reference: Header, other: Header) -> None:
     """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's."""
-    shift = corner_shift_voxels(reference, other)
+    found, shift = "the shapes differ", float("inf")
+    if reference.shape == other.shape:
+        apart = np.linalg.norm(corners_mm(reference.grid) - corners_mm(other.grid), axis=1)
+        shift = float(apart.max() / reference.spacing_mm.min())
+        found = f"their corners lie {shift:.2f} voxels apart"
     if shift > SAME_VOXELS:
-        found = "the shapes differ" if np.isinf(shift) else f"their corners lie {shift:.2f} voxels apart"
         raise LoadError(
             f"geometry differs between scans of one case: {found}, allowed {SAME_VOXELS} voxel.\n"
             f"  {describe(reference)}\n  {describe(other)}\n"

@@ -46,12 +46,20 @@ def recognises(path: Path) -> bool:
 
 
 def parts(_path: Path) -> tuple[Path, ...]:
-    """All is in the one file."""
+    """A file or a folder is all there is."""
     return ()
 
 
 def read_header(source: Source, _config: LoadConfig) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
+    try:
+        return _header(source)
+    except (OSError, ValueError) as error:
+        why = f"{error}. Check that the file is complete, spacing_mm and origin_mm three numbers, direction nine"
+        raise unusable(source, why) from None
+
+
+def _header(source: Source) -> Header:
     with h5py.File(source.path, "r") as file:
         volumes = _volumes(file, source)
         data = volumes[0]
@@ -62,11 +70,10 @@ def read_header(source: Source, _config: LoadConfig) -> Header:
         return Header(
             source,
             (a, b, c) if _is_xyz(data, source) else (c, b, a),
-            np.array(data.attrs["spacing_mm"], float),
-            np.array(data.attrs.get("origin_mm", np.zeros(3)), float),
+            np.array(data.attrs["spacing_mm"], float).reshape(3),
+            np.array(data.attrs.get("origin_mm", np.zeros(3)), float).reshape(3),
             np.array(data.attrs.get("direction", np.eye(3)), float).reshape(3, 3),
             str(data.dtype),
-            (source.path,),
             item_count=data.shape[0] if data.ndim == 4 else len(volumes),
         )
 

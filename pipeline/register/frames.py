@@ -1,7 +1,7 @@
 """Frames put back into their place: the phantom's motion found, the geometry corrected, and all of it said."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.arrays.grids import sampled
 from pipeline.model import Lumen, Volume
@@ -10,8 +10,8 @@ from pipeline.register.rigid import Motion
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Where frames belong: ``anchor`` None where there is nothing to register to, and ``reason`` says why.
+class Alignment:
+    """How the frames of a case are registered: to ``anchor``, or to nothing, and ``reason`` says why.
 
     skip_voxels : a phantom that moved by less than this everywhere is taken not to have moved.
     """
@@ -21,10 +21,10 @@ class Place:
     reason: str = ""
 
 
-def place_of(
+def alignment_of(
     lumen: Lumen, reference: Volume | None, skip_voxels: float, *, switched_on: bool, own_curves: bool
-) -> Place:
-    """The place of a case's frames. reference : the wire-free scan, at least the box that holds the lumen."""
+) -> Alignment:
+    """The alignment of a case's frames. reference : the wire-free scan, at least the box that holds the lumen."""
     if own_curves:
         reason = "the curves are the manifest's own, taken to lie where the reference does"
     elif not switched_on:
@@ -32,25 +32,24 @@ def place_of(
     elif reference is None:
         reason = "no reference scan; frames are taken to lie where frame 0 does"
     else:
-        return Place(anchor(reference, lumen), skip_voxels)
-    return Place(None, skip_voxels, f"no registration applied: {reason}")
+        return Alignment(anchor(reference, lumen), skip_voxels)
+    return Alignment(None, skip_voxels, f"no registration applied: {reason}")
 
 
 def put_in_place(
-    frame: Volume, place: Place, read_moved: Callable[[Motion], Volume]
+    frame: Volume, alignment: Alignment, read_moved: Callable[[Motion], Volume]
 ) -> tuple[Volume, Volume, Registration | None]:
     """The frame to trace, the frame to look at, and how it lay.
 
     The first keeps its grey values and has the geometry that it would have had the phantom not moved; ``read_moved``
     reads the voxels that the moved lumen asks for. The second is interpolated onto the reference's lattice.
     """
-    found = None if place.anchor is None else register(frame, place.anchor, place.skip_voxels)
+    found = None if alignment.anchor is None else register(frame, alignment.anchor, alignment.skip_voxels)
     if found is None or not found.applied:
         return frame, frame, found
     here = found.motion.undone(read_moved(found.motion))
-    grid = sampled(here, frame, float(frame.values.min()))
-    shown = Volume(grid.values, grid.spacing_mm, grid.origin_mm, grid.direction, frame.assumed)
-    return here, shown, found
+    shown = sampled(here, frame, float(frame.values.min())).values
+    return here, replace(frame, values=shown, made_of=None), found
 
 
 def counters_of(found: Registration | None) -> dict[str, float]:
@@ -60,13 +59,13 @@ def counters_of(found: Registration | None) -> dict[str, float]:
     return {"registration_applied": found.applied, "registration_skipped": not found.applied}
 
 
-def said(place: Place, found: Mapping[int, Registration | None]) -> tuple[list[str], list[str]]:
+def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None]) -> tuple[list[str], list[str]]:
     """Assumptions and warnings of the report: skipped frames in one sentence, registered ones one by one.
 
     found : of each frame, by its number.
     """
-    if place.anchor is None:
-        return [place.reason], []
+    if alignment.anchor is None:
+        return [alignment.reason], []
     known = [(n, r) for n, r in found.items() if r is not None]
     still = [(r.moved_voxels, n) for n, r in known if not r.applied and r.trusted]
     texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied]
@@ -75,7 +74,7 @@ def said(place: Place, found: Mapping[int, Registration | None]) -> tuple[list[s
         texts.insert(
             0,
             f"no registration applied to {len(still)} of {len(found)} frames: the phantom moved {most:.2f} voxel at "
-            f"most (frame {where}), below trace.register_skip_voxels = {place.skip_voxels}",
+            f"most (frame {where}), below trace.register_skip_voxels = {alignment.skip_voxels}",
         )
     return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted]
 

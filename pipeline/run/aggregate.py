@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.pooled import counts, intervals, pooled_rms
+from pipeline.compare.pooled import intervals, is_pooled, pooled_rms
 from pipeline.model import Array
-from pipeline.run.results import Result, found_results, write_json
+from pipeline.run.results import Result, found_results, lost, write_json
 from reports import tables
 from reports.atomic import write_bytes
 from reports.schema import FAILURES, POINTS, SUMMARY
@@ -24,7 +24,10 @@ DRAWS = 2000
 
 @dataclass(frozen=True)
 class Totals:
-    """The numbers of the last line. Errors are those of all points of the frames that count."""
+    """The numbers of the last line. Errors are those of all points of the frames that are pooled.
+
+    sweep_lost : cases that crashed at a point of a sweep, which are none of ``cases``.
+    """
 
     cases: int
     cases_ok: int
@@ -33,23 +36,24 @@ class Totals:
     median_mm: float
     p95_mm: float
     solver_s: float
+    sweep_lost: int = 0
 
     @property
     def all_ok(self) -> bool:
         """The one source of the exit code and of the printed counts."""
-        return self.cases > 0 and self.cases_ok == self.cases
+        return self.cases > 0 and self.cases_ok == self.cases and not self.sweep_lost
 
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write summary.csv and failures.csv over all cases found, and ``name`` where ``run_info`` is given."""
-    found = found_results(out)
+    readable = [_readable(out, result) for result in found_results(out)]
+    found, errors = [result for result, _ in readable], [mm for _, mm in readable]
     rows = [result.summary for result in found]
     failures = [row for result in found for row in result.failures]
     for table, given in ((SUMMARY, rows), (FAILURES, failures)):
         # result files may come from another version, with other columns
         known = [{name: row[name] for name in row.keys() & table.names} for row in given]
         tables.write(out / table.file, table, known)
-    errors = [_point_errors(out, result) for result in found]
     if run_info is not None:
         info = {"cases": [result.case for result in found], "overall": overall(found, errors)}
         write_json(out / name, run_info | info)
@@ -86,6 +90,14 @@ def overall(found: Sequence[Result], errors: Sequence[Array], draws: int = DRAWS
     }
 
 
+def _readable(out: Path, result: Result) -> tuple[Result, Array]:
+    """A result with its point errors; one whose points cannot be read is damaged, and hides no other."""
+    try:
+        return result, _point_errors(out, result)
+    except (OSError, EOFError, ValueError, KeyError) as error:
+        return lost(result.case, "damaged", f"{out / 'cases' / result.case / POINTS.file}: {error}"), np.zeros(0)
+
+
 def _point_errors(out: Path, result: Result) -> Array:
     """Point errors (n,) of the frames of a case that count, mm."""
     path = out / "cases" / result.case / "points.csv.gz"
@@ -93,7 +105,7 @@ def _point_errors(out: Path, result: Result) -> Array:
         return np.zeros(0)
     points = tables.read(path, POINTS)
     frame, error = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
-    good = [entry["frame"] for entry in result.frames if counts(entry, error[frame == entry["frame"]])]
+    good = [entry["frame"] for entry in result.frames if is_pooled(entry, error[frame == entry["frame"]])]
     return np.asarray(error[np.isin(frame, good)])
 
 

@@ -30,11 +30,6 @@ class Outcome(Generic[J, R]):
     error: str = ""
     log: str = ""
 
-    @property
-    def done(self) -> bool:
-        """It ended as it should."""
-        return not self.error
-
 
 def run_all(jobs: Sequence[J], work: Callable[[J], R], workers: int = 1, address: str = "") -> Iterator[Outcome[J, R]]:
     """Run ``work`` on every job, yielding outcomes as they come.

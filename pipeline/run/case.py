@@ -8,11 +8,13 @@ from pathlib import Path
 from time import perf_counter
 
 import solver
+from pipeline.compare.metrics import METRICS
+from pipeline.compare.nulls import NULLS
 from pipeline.run import outputs, results
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import Store, digest
+from pipeline.run.store import Store, code_of, digest
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -46,7 +48,8 @@ class Job:
         """What the result depends on: the case, its files' contents, the settings, the code, what is registered."""
         code = (package_version(), hash_of(Path(__file__)))
         # who registers a metric or a predictor gives its column
-        return digest((self.case, self.settings.config, self.until, code, ERRORS.columns))
+        registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
+        return digest((self.case, self.settings.config, self.until, code, ERRORS.columns, registered))
 
 
 def clear(folder: Path) -> None:
@@ -65,7 +68,7 @@ def finished(job: Job, key: str) -> bool:
         return False
     try:
         result = results.read_result(path)
-    except (ValueError, KeyError):
+    except ValueError:
         return False
     return result.key == key and result.ok
 

@@ -17,7 +17,7 @@ from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
 from pipeline.run.case import Job, clear, finished, run_case
 from pipeline.run.provenance import collect
-from pipeline.run.results import Result, crashed, found_results, write_json
+from pipeline.run.results import LOST, Result, found_results, lost, write_json
 from pipeline.run.store import file_hash
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
@@ -31,9 +31,11 @@ from reports.schema import SWEEP
 class UsageError(InputError):
     """A command line that cannot be carried out."""
 
+    place = "the command line"
+
 
 @dataclass(frozen=True)
-class Point:
+class SweepPoint:
     """One changed setting and the settings that result."""
 
     parameter: str
@@ -41,12 +43,12 @@ class Point:
     settings: Resolved
 
     @property
-    def folder(self) -> str:
-        """Name of its sub-folder."""
-        return f"{self.parameter}={self.value}".replace("/", "_")
+    def folder(self) -> Path:
+        """Its sub-folder of the output."""
+        return Path("sweep", f"{self.parameter}={self.value}".replace("/", "_"))
 
 
-def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[Point]:
+def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
     """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
     points = []
     for text in texts:
@@ -55,21 +57,20 @@ def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[Point]:
             raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
         for value in values.split(","):
             setting = parse_assignment(f"{name}={value}", "sweep")
-            points.append(Point(name.strip(), value.strip(), resolve([*base, setting])))
+            points.append(SweepPoint(name.strip(), value.strip(), resolve([*base, setting])))
     return points
 
 
-def jobs_of(point: Point, jobs: Sequence[Job]) -> list[Job]:
-    """The same cases at one point, in a folder of its own, without pictures."""
-    out = jobs[0].out / "sweep" / point.folder
-    return [replace(job, settings=point.settings, out=out, pictures=False, quiet=True) for job in jobs]
+def _lost_points(plan: "Plan") -> list[tuple[SweepPoint, Result]]:
+    """Cases of which a sweep has no result, and at which point."""
+    return [(p, r) for p in plan.points for r in found_results(plan.out / p.folder) if r.status in LOST]
 
 
-def write_sweep(out: Path, points: Sequence[Point]) -> None:
+def write_sweep(out: Path, points: Sequence[SweepPoint]) -> None:
     """sweep.csv: the plain result first, then every point."""
     rows = [_row("(plain)", "", result) for result in found_results(out)]
     for point in points:
-        rows += [_row(point.parameter, point.value, r) for r in found_results(out / "sweep" / point.folder)]
+        rows += [_row(point.parameter, point.value, r) for r in found_results(out / point.folder)]
     tables.write(out / "sweep.csv", SWEEP, rows)
 
 
@@ -88,7 +89,7 @@ class Plan:
     manifest: Manifest
     cases: tuple[Case, ...]
     template: Job
-    points: tuple[Point, ...] = ()
+    points: tuple[SweepPoint, ...] = ()
     workers: int = 1
     address: str = ""
     shard: str = ""
@@ -155,10 +156,11 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
     run_cases(plan, jobs)
     for point in plan.points:
-        run_cases(plan, jobs_of(point, jobs))
+        here = replace(plan.template, settings=point.settings, out=out / point.folder, pictures=False, quiet=True)
+        run_cases(plan, [replace(here, case=case) for case in plan.cases])
     if plan.points:
         write_sweep(out, plan.points)
-    totals = aggregate(out, info, name)
+    totals = replace(aggregate(out, info, name), sweep_lost=len(_lost_points(plan)))
     if junit:
         write_junit(junit, found_results(out))
     return totals, render_index(out, embed=plan.template.embed)
@@ -169,7 +171,7 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     several = plan.workers > 1 or plan.address
     longest = sorted(jobs, key=lambda job: -job.case.frame_count) if several else jobs
     for outcome in run_all(longest, run_case, plan.workers, plan.address):
-        if not outcome.done:
+        if outcome.error:
             _write_crash(outcome.job, outcome.error, outcome.log)
 
 
@@ -178,7 +180,9 @@ def _write_crash(job: Job, error: str, log: str) -> None:
     clear(job.folder)
     with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
         handle.write(log + "\n")
-    crashed(job.case, error).write(job.folder)
+    case = job.case
+    result = lost(case.id, "crashed", error, role=case.role, group=case.group, frames=case.frame_count)
+    result.write(job.folder)
 
 
 def intention(plan: Plan) -> list[str]:
@@ -187,10 +191,24 @@ def intention(plan: Plan) -> list[str]:
     for job in plan.jobs:
         known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
         lines.append(f"{job.case.id}: {job.case.frame_count} frames, {known} -> {job.folder}")
-    for point in plan.points:
-        where = plan.out / "sweep" / point.folder
-        lines.append(f"sweep {point.parameter} = {point.value}: {len(plan.cases)} case(s) -> {where}")
+    lines += [
+        f"sweep {point.parameter} = {point.value}: {len(plan.cases)} case(s) -> {plan.out / point.folder}"
+        for point in plan.points
+    ]
     return [*lines, "dry run: nothing was computed"]
+
+
+def failure_lines(plan: Plan) -> list[str]:
+    """What went wrong, a line each: every frame or case that is not ok, and what crashed at points of a sweep."""
+    lines = []
+    for result in found_results(plan.out):
+        for row in result.failures:
+            frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
+            lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
+    return lines + [
+        f"{point.folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
+        for point, result in _lost_points(plan)
+    ]
 
 
 def last_line(totals: Totals, index: Path) -> str:
@@ -198,6 +216,8 @@ def last_line(totals: Totals, index: Path) -> str:
     parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+    if totals.sweep_lost:
+        parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
     if totals.frames:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, counts, pooled, skill_of
+from pipeline.compare.pooled import Row, is_pooled, pooled, skill_of
 from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
@@ -35,9 +35,13 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
     head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
-    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and counts(row, mm)]
+    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and is_pooled(row, mm)]
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
-    return head | pooled(scored, draws) | _forces(known.frames) | times
+    wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
+    if wires:
+        head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
+        head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
+    return head | pooled(scored, draws) | times
 
 
 def error_row(frame: Frame, log: Log) -> dict[str, Any]:
@@ -60,16 +64,21 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
     if frame.simulated is not None:
         wire = frame.simulated
         row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
-        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations}
+        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations, "num_mm": frame.num_mm}
+        row |= {"snaps": len(wire.snaps), "uncertain": wire.uncertain, "least_pivot": wire.least_pivot}
     return row
 
 
 def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
-    """Magnitude (n,) of the contact force at the joint nearest to each arc length (n,), N."""
+    """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
+
+    Forces of joints are added up, so that their sum does not depend on the length of the segments.
+    """
     assert frame.simulated is not None
-    force = np.linalg.norm(frame.simulated.contact_force_N, axis=1)
     arc = arc_length(frame.simulated.joints_mm)
-    return np.asarray(force[np.abs(arc_mm[:, None] - arc[None, :]).argmin(axis=1)])
+    force = np.zeros((len(arc_mm), 3))
+    np.add.at(force, np.abs(arc_mm[None, :] - arc[:, None]).argmin(axis=1), frame.simulated.contact_force_N)
+    return np.asarray(np.linalg.norm(force, axis=1))
 
 
 def point_columns(frames: Sequence[Frame]) -> dict[str, NDArray[Any]]:
@@ -91,17 +100,6 @@ def _points(frame: Frame) -> dict[str, NDArray[Any]]:
     }
 
 
-def _forces(frames: Sequence[Frame]) -> dict[str, float]:
-    """Largest penetration and push force over all simulated frames."""
-    done = [f.simulated for f in frames if f.simulated is not None]
-    if not done:
-        return {}
-    return {
-        "max_penetration_mm": max(s.max_penetration_mm for s in done),
-        "push_force_max_N": max(s.push_force_N for s in done),
-    }
-
-
 def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
     """Rows of failures.csv: the case itself, or each frame that is not ok."""
     log = f"cases/{case}/log.txt"
@@ -119,7 +117,12 @@ def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
 
 def write_frames(path: Path, known: Known) -> None:
     """frames.h5: curves of every frame, projections of its scan, and the lumen's outline."""
-    scan = None if known.lumen is None else _scan_of(known.lumen)
+    scan = None
+    if known.lumen is not None:
+        grid = known.lumen.distance
+        inside = Volume((grid.values < 0).astype(np.uint8), grid.spacing_mm, grid.origin_mm, grid.direction)
+        outlines = dict(enumerate(projections(inside, (0.0, 1.0))))
+        scan = frames_file.ScanCrop(grid.spacing_mm, grid.origin_mm, grid.direction, grid.shape, outlines)
     frames_file.write_frames(path, scan, map(_arrays_of, known.frames))
 
 
@@ -129,14 +132,6 @@ def write_view(folder: Path, known: Known) -> None:
         _write_lumen(folder, known.lumen)
     for frame in known.frames:
         _write_wires(folder, frame)
-
-
-def _scan_of(lumen: Lumen) -> frames_file.ScanCrop:
-    """Geometry of the crop, with the lumen's silhouettes for outlines."""
-    grid = lumen.distance
-    inside = Volume((grid.values < 0).astype(np.uint8), grid.spacing_mm, grid.origin_mm, grid.direction)
-    silhouettes = dict(enumerate(projections(inside, (0.0, 1.0))))
-    return frames_file.ScanCrop(grid.spacing_mm, grid.origin_mm, grid.direction, grid.shape, silhouettes)
 
 
 def _arrays_of(frame: Frame) -> frames_file.FrameArrays:

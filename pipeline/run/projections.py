@@ -10,12 +10,8 @@ def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np
     """Maximum-intensity projections along the three array axes, 8 bit within the grey-value ``window``."""
     low, high = window
     scale = 255.0 / max(high - low, 1e-9)
-
-    def project(axis: int) -> NDArray[np.uint8]:
-        peak = volume.values.max(axis=axis).astype(np.float32)
-        return np.asarray(np.clip((peak - low) * scale, 0, 255), dtype=np.uint8)
-
-    return project(0), project(1), project(2)
+    peaks = (volume.values.max(axis=axis).astype(np.float32) for axis in range(3))
+    return tuple(np.clip((peak - low) * scale, 0, 255).astype(np.uint8) for peak in peaks)
 
 
 def grey_window(volume: Volume) -> tuple[float, float]:

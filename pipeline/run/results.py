@@ -5,9 +5,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from pipeline.load import Scans
 from pipeline.register.frames import record
@@ -19,7 +20,26 @@ from pipeline.run.store import file_hash
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
 
-CRASHED = "the case ended in an unexpected error; its log has the traceback"
+LOST = {
+    "crashed": "the case ended in an unexpected error; its log has the traceback",
+    "damaged": "a result file cannot be read; run the case again with --fresh",
+}
+"""What may have become of a case that has no result of its own, and the sentences that say so."""
+
+
+Row = dict[str, Any]
+
+
+def has(*names: str) -> AfterValidator:
+    """Refuses a row that lacks one of these values."""
+
+    def checked(row: Row) -> Row:
+        lacking = [name for name in names if row.get(name) is None]
+        if lacking:
+            raise ValueError(f"a row lacks {', '.join(lacking)}")
+        return row
+
+    return AfterValidator(checked)
 
 
 @dataclass(frozen=True)
@@ -36,9 +56,9 @@ class Result:
     group: str
     status: str
     sentence: str
-    frames: list[dict[str, Any]]
-    failures: list[dict[str, Any]]
-    summary: dict[str, Any]
+    frames: list[Annotated[Row, has("frame", "status", "sentence", "message")]]
+    failures: list[Annotated[Row, has("case", "status", "sentence", "message")]]
+    summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
@@ -53,17 +73,25 @@ class Result:
         write_json(folder / "result.json", {"schema": 1, **own, **self.details})
 
 
+RESULT = TypeAdapter(Result)
+
+
 def read_result(path: Path) -> Result:
-    """Read a result.json; ValueError or KeyError where it is not one."""
-    content = json.loads(path.read_text(encoding="utf-8"))
-    names = [f.name for f in fields(Result) if f.name != "details"]
-    details = {name: value for name, value in content.items() if name not in (*names, "schema")}
-    return Result(**{name: content[name] for name in names}, details=details)
+    """Read a result.json, without its details; ValueError where it is not one."""
+    return RESULT.validate_json(path.read_bytes())
 
 
 def found_results(out: Path) -> list[Result]:
-    """The result of every case below an output folder, by id."""
-    return [read_result(path) for path in sorted((out / "cases").glob("*/result.json"))]
+    """The result of every case below an output folder, by id; one that is damaged says so and hides no other."""
+    return [_found(path) for path in sorted((out / "cases").glob("*/result.json"))]
+
+
+def _found(path: Path) -> Result:
+    try:
+        return read_result(path)
+    except (ValidationError, OSError) as error:
+        why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
+        return lost(path.parent.name, "damaged", f"{path}: {why}")
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
@@ -71,6 +99,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     frames = [
         {name: getattr(f, name) for name in ("status", "sentence", "stage", "message")}
         | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
+        | _events(f)
         for f in known.frames
     ]
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
@@ -79,21 +108,20 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     return Result(*head, frames, failure_rows(case.id, known), summary, key, details)
 
 
-def crashed(case: Case, reason: str) -> Result:
-    """The result of a case that could not be finished."""
-    count, status = case.frame_count, "crashed"
-    summary: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
-    summary |= {"frames": count, "frames_ok": 0, "frames_failed": count}
-    failure = {"case": case.id, "status": status, "sentence": CRASHED, "message": reason}
-    failure["log"] = f"cases/{case.id}/log.txt"
-    return Result(case.id, case.role, case.group, status, CRASHED, [], [failure], summary)
+def lost(name: str, status: str, reason: str, *, role: str = "", group: str = "", frames: int = 0) -> Result:
+    """The result of a case that could not be finished, or whose result cannot be read (see LOST)."""
+    sentence = LOST[status]
+    summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
+    summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
+    failure = {"case": name, "status": status, "sentence": sentence, "message": reason, "log": f"cases/{name}/log.txt"}
+    return Result(name, role, group, status, sentence, [], [failure], summary)
 
 
 def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     """What the pages show beside the tables."""
     clamp: dict[str, Any] = {"entry_mm": case.entry_mm, "entry_direction": case.entry_direction}
-    if known.entry is not None:
-        clamp |= {"used_mm": known.entry.entry_mm, "used_direction": known.entry.direction}
+    if known.clamp is not None:
+        clamp |= {"used_mm": known.clamp.entry_mm, "used_direction": known.clamp.direction}
     return {
         "seconds": log.seconds,
         "assumptions": log.assumptions,
@@ -105,6 +133,14 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "inputs": _inputs(known.scans),
         "counters": log.counters,
     }
+
+
+def _events(frame: Frame) -> dict[str, Any]:
+    """Where the simulated wire gave way since the frame before, and the hand's work that is not in wire and wall."""
+    wire = frame.simulated
+    if wire is None:
+        return {}
+    return {"snaps": [snap._asdict() for snap in wire.snaps], "dissipated_N_mm": wire.dissipated_N_mm}
 
 
 def _marked(frame: Frame) -> dict[str, float]:

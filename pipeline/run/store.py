@@ -16,24 +16,33 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
+from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from pipeline.load import parts_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
 from solver._compile import hash_of
-from solver.grid import Grid
+from solver.grid import Grid, read_only
 
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
 
 def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
     """Key of what ``stage(*inputs)`` returns: its sources, and its inputs' contents."""
-    code = hash_of(Path(inspect.getfile(inspect.unwrap(stage))))
-    return hashlib.sha256(f"{stage.__qualname__} {code} {digest(inputs)}".encode()).hexdigest()
+    return hashlib.sha256(f"{stage.__qualname__} {code_of(stage)} {digest(inputs)}".encode()).hexdigest()
+
+
+def code_of(function: Callable[..., Any]) -> str:
+    """SHA-256 of the sources behind a function; of its own byte code where it stands in no file, as in a notebook."""
+    function = inspect.unwrap(getattr(function, "func", function))  # a partial is what it calls
+    code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
+    if code is None:  # a function of C
+        return repr(function)
+    file = Path(code.co_filename)
+    return hash_of(file) if file.is_file() else hashlib.sha256(code.co_code + repr(code.co_consts).encode()).hexdigest()
 
 
 def digest(value: Any) -> str:
@@ -99,11 +108,6 @@ def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
-Arrays = dict[str, NDArray[Any]]
-Packed = tuple[Arrays, dict[str, Any]]
-"""Arrays, and a part that JSON can hold."""
-
-
 def default_root() -> Path:
     """``$WIREVAL_CACHE``, else the user's cache folder."""
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
@@ -125,11 +129,14 @@ class Store:
         if path is None or not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in data.files if name != "json"}
-                unpack = unpack_lumen if stage == "segment" else unpack_curve
-                return unpack(arrays, json.loads(str(data["json"])))
-        except (OSError, ValueError, KeyError, EOFError):
+            # a file that is opened here is closed here: numpy leaves a damaged one open
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+                arrays: dict[str, Any] = {name: read_only(data[name]) for name in data.files if name != "json"}
+                rest = json.loads(str(data["json"]))
+            if stage == "segment":
+                return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
+            return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
+        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
             path.unlink(missing_ok=True)
             return None
 
@@ -138,11 +145,14 @@ class Store:
         path = self._path(stage, key)
         if path is None:
             return
-        arrays, meta = pack_lumen(result) if isinstance(result, Lumen) else pack_curve(result)
+        named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
+        arrays = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
+        rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}
+        text = json.dumps(rest, default=lambda status: status.name)
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
         with temporary.open("wb") as handle:
-            np.savez(handle, json=np.array(json.dumps(meta)), **arrays)  # type: ignore[arg-type]
+            np.savez(handle, json=np.array(text), **arrays)  # type: ignore[arg-type]
         temporary.replace(path)
 
     def entries(self) -> list[Path]:
@@ -156,37 +166,3 @@ class Store:
         for path in found:
             path.unlink(missing_ok=True)
         return len(found), size
-
-
-def pack_lumen(lumen: Lumen) -> Packed:
-    """Arrays and JSON part of a lumen."""
-    grid = lumen.distance
-    arrays = {
-        "distance": grid.values,
-        "mask": np.packbits(np.asarray(lumen.mask.values, bool)),
-        "spacing": grid.spacing_mm,
-        "origin": grid.origin_mm,
-        "direction": grid.direction,
-    }
-    names = ("wall_level", "warnings", "counters", "levels")
-    return arrays, {name: getattr(lumen, name) for name in names}
-
-
-def unpack_lumen(arrays: Arrays, meta: dict[str, Any]) -> Lumen:
-    """The inverse of :func:`pack_lumen`."""
-    distance = Grid(arrays["distance"], arrays["spacing"], arrays["origin"], arrays["direction"])
-    mask = np.unpackbits(arrays["mask"], count=distance.values.size).reshape(distance.shape)
-    return Lumen(distance, distance.with_values(mask), **meta | {"warnings": tuple(meta["warnings"])})
-
-
-def pack_curve(curve: Curve) -> Packed:
-    """Arrays and JSON part of a traced curve."""
-    arrays = {name: value for name, value in vars(curve).items() if isinstance(value, np.ndarray)}
-    meta = {name: value for name, value in vars(curve).items() if name not in arrays}
-    return arrays, meta | {"status": curve.status.name}
-
-
-def unpack_curve(arrays: Arrays, meta: dict[str, Any]) -> Curve:
-    """The inverse of :func:`pack_curve`."""
-    fields: dict[str, Any] = {**arrays, **meta, "status": FrameStatus[meta["status"]]}
-    return Curve(**fields)

@@ -11,6 +11,7 @@ from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.levels import scanner_blur
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
+from solver.grid import read_only
 
 __all__ = ["segment"]
 
@@ -32,14 +33,13 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     site = prepare(grid, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
-    touching = contacts(site.grid.with_values(wall.values))
+    touching = contacts(site.grid.with_values(read_only(wall.values)))
     if len(region.thin):
         found = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
-    distance = reorder(site.grid.with_values(wall.values), axes)
-    mask = distance.with_values((distance.values < 0).view(np.uint8))
+    distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
-        distance, mask, wall.level, warning(touching),
+        distance, wall.level, warning(touching),
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
         {"noise": region.levels.noise, "blur_mm": wall.blur_mm, "scanner_blur_mm": blur},
     )  # fmt: skip

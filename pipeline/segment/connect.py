@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL, READ, Affinity, Search, flood, strengths
 from pipeline.segment._kernels.tiles import CELLS, GREY_STEPS, SIDE
+from pipeline.segment.config import SegmentConfig
 from pipeline.segment.levels import GreyLevels, Index
 from solver.grid import Grid
 
@@ -32,19 +33,15 @@ def noise_after(taps: NDArray[Any]) -> float:
     return float(np.sqrt(np.sum(np.asarray(taps, float) ** 2)) ** 3)
 
 
-def estimate_affinity(
-    levels: GreyLevels,
-    homogeneity_sigma: float | None = None,
-    feature_sigma: float | None = None,
-    scale: int | None = None,
-) -> Affinity:
-    """The tables for an object with these levels; a sigma that is given (grey values) replaces the estimate."""
+def estimate_affinity(levels: GreyLevels, config: SegmentConfig = SegmentConfig()) -> Affinity:
+    """The tables for an object with these levels; sigmas (grey values) and scale that are set replace the estimates."""
+    scale = config.scale
     if scale is None:  # a kernel of sigma 0.7 voxel where contrast is above 5 noises, 1.0 below
         scale = 1 if levels.noise / levels.contrast < 0.2 else 2
     taps = binomial_taps(scale)
     spread = NOISE_SPREAD * levels.noise * noise_after(taps)
-    s_h = homogeneity_sigma or max(HOMOGENEITY_SPREAD * levels.contrast, spread)
-    s_o = feature_sigma or HALF_HEIGHT_SPREAD * levels.contrast
+    s_h = config.homogeneity_sigma or max(HOMOGENEITY_SPREAD * levels.contrast, spread)
+    s_o = config.feature_sigma or HALF_HEIGHT_SPREAD * levels.contrast
     low = levels.outside - levels.contrast
     high = levels.inside + 2.0 * levels.contrast
     step = (high - low) / (GREY_STEPS - 1)

@@ -49,7 +49,7 @@ def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Regi
     grid : C-contiguous grey, brighter inside the vessel.
     """
     levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
-    affinity = estimate_affinity(levels, config.homogeneity_sigma, config.feature_sigma, config.scale)
+    affinity = estimate_affinity(levels, config)
     order, read = _connected(grid, seeds, affinity, config)
     thin, more = thin_branches(grid, seeds, order, levels, affinity)
     total = float(np.prod(grid.shape))

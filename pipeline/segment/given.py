@@ -22,8 +22,7 @@ LABEL_TAPS = np.array([0.25, 0.5, 0.25], np.float32)
 
 
 def _lumen(distance: Grid, note: str) -> Lumen:
-    mask = distance.with_values((distance.values < 0).astype(np.uint8))
-    return Lumen(distance, mask, warnings=(note,), counters={"voxels_total": float(distance.values.size)})
+    return Lumen(distance, warnings=(note,), counters={"voxels_total": float(distance.values.size)})
 
 
 def _empty(low: NDArray[Any], high: NDArray[Any], margin: float) -> Grid:

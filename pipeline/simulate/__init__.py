@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, Lumen, Wall, Wire
 from pipeline.ranges import Profile
-from pipeline.simulate.config import SimulateConfig, SolverConfig
+from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from solver import GuideWire, Insertion, Solution, VesselWall
 
 REACH_MM = 8.0
@@ -44,8 +44,7 @@ def measured_clamp(curves: Sequence[Curve], given: Clamp) -> Clamp:
     tangent = np.median([t for _, t in starts], axis=0)
     tangent /= np.linalg.norm(tangent)
     moved = float(np.linalg.norm(point - given.entry_mm))
-    sine = float(np.linalg.norm(np.cross(tangent, given.direction)))
-    turned = float(np.degrees(np.arctan2(sine, tangent @ given.direction)))
+    turned = angle_deg(tangent, given.direction)
     offset = f"{moved:.2f} mm and {turned:.1f} degrees from the manifest's"
     if moved > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
@@ -74,21 +73,16 @@ def _scaled(profile: Profile, factor: float) -> float | NDArray[np.float64]:
     return np.array(profile, dtype=np.float64) * (1.0, factor)
 
 
-def guide_wire(wire: Wire, segment_mm: float, bending_scale: float = 1.0) -> GuideWire:
-    """The manifest's wire as the solver takes it."""
+def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> GuideWire:
+    """The manifest's wire as the solver takes it; "auto" are the longest segments that ``resolution`` begins with."""
     return GuideWire(
-        segment_mm=segment_mm,
+        segment_mm=COARSEST_MM if segment_mm == "auto" else segment_mm,
         radius_mm=wire.radius_mm,
         bending_stiffness_N_mm2=_scaled(wire.bending_stiffness_N_mm2, bending_scale),
         rest_curvature_per_mm=_scaled(wire.rest_curvature_per_mm, 1.0),
         torsional_stiffness_N_mm2=wire.torsional_stiffness_N_mm2,
+        weight_N_per_mm=wire.weight_N_per_mm,
     )
-
-
-def vessel_wall(wall: Wall, lumen: Lumen, hull: str, stiffness_scale: float = 1.0) -> VesselWall:
-    """The lumen's signed distance as an elastic wall."""
-    stiffness = wall.stiffness_N_mm2 * stiffness_scale
-    return VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=hull)
 
 
 def simulate(insertion: Insertion, depths_mm: Sequence[float], roll_deg: Sequence[float]) -> Iterator[Solution]:
@@ -108,9 +102,10 @@ def insertion_of(
     config: SimulateConfig = SimulateConfig(),
 ) -> Insertion:
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
+    stiffness = wall.stiffness_N_mm2 * config.wall_scale
     return Insertion(
         guide_wire(wire, solver.segment_mm, config.bending_scale),
-        vessel_wall(wall, lumen, solver.hull, config.wall_scale),
+        VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=solver.hull),
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,
@@ -119,4 +114,6 @@ def insertion_of(
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
         step_mm=solver.step_mm,
+        down=clamp.down,
+        finest_mm=solver.finest_mm,
     )

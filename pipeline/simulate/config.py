@@ -8,6 +8,10 @@ from pydantic import AfterValidator, Field
 from pipeline.ranges import Finite, Positive, PositiveCount
 from solver._kernels.minimise import METHODS
 
+Segment = Positive | Literal["auto"]
+COARSEST_MM = 1.0
+"""Length of the segments that ``auto`` begins with at most."""
+
 
 def _known(method: str) -> str:
     if method not in METHODS:
@@ -21,8 +25,8 @@ class SolverConfig:
 
     method: Annotated[str, AfterValidator(_known)] = "newton"
     """newton, or the seed's closed_form."""
-    segment_mm: Positive = 1.0
-    """Length of the wire's rigid segments."""
+    segment_mm: Segment = "auto"
+    """Length of the wire's rigid segments; auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d*)$")] = "offset"
     """offset (the smooth limit) or samples:N."""
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
@@ -31,6 +35,8 @@ class SolverConfig:
     """Iterations allowed for one relaxation."""
     step_mm: Positive = 1.0
     """Longest insertion step; shortened where the scene asks for it."""
+    finest_mm: Positive = 0.05
+    """Steps in which the wire gives way are taken again, down to this length; step_mm or more: never."""
     initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
 

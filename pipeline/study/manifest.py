@@ -49,11 +49,6 @@ def _source(value: Any, info: ValidationInfo) -> Source:
     return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
 
 
-def _path(value: Any, info: ValidationInfo) -> Path:
-    """A file, relative to the manifest."""
-    return _source(value, info).path
-
-
 def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
     """A list of sources, or a pattern whose matches come in natural order."""
     if isinstance(value, list):
@@ -92,7 +87,7 @@ def _not_yet(value: Any, info: ValidationInfo) -> Any:
 
 SourceText = Annotated[Source, BeforeValidator(_source)]
 Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(_path)]
+PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
 
 
 class Strict(BaseModel):
@@ -122,6 +117,7 @@ class Case(Strict):
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
     truth: PathText | None = None
     wall: Wall = Wall()
+    down: Axis | None = None
 
     @property
     def frame_count(self) -> int:
@@ -133,11 +129,6 @@ class Case(Strict):
         """What must have one entry per frame."""
         return {"insertion_mm": self.insertion_mm, "roll_deg": self.roll_deg, "traces": self.traces}
 
-    @property
-    def _one_file(self) -> bool:
-        """A single file may hold many volumes; their number is known once its header is read."""
-        return len(self.frames) == 1 and self.frames[0].path.is_file()
-
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
         if not self.frames and self.insertion_mm is None:
@@ -147,8 +138,17 @@ class Case(Strict):
         return self
 
     @model_validator(mode="after")
+    def _down_for_a_weight(self) -> "Case":
+        if self.wire.weight_N_per_mm > 0 and self.down is None:
+            problem = f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
+            raise _problem(problem)
+        return self
+
+    @model_validator(mode="after")
     def _one_per_frame(self) -> "Case":
-        if problems := () if self._one_file else not_one_per_frame(self.lists, self.frame_count):
+        # a single file may hold many volumes; their number is known once its header is read
+        one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
+        if problems := () if one_file else not_one_per_frame(self.lists, self.frame_count):
             raise _problem(*problems)
         return self
 

@@ -35,6 +35,8 @@ class Config:
 class SettingsError(InputError):
     """Settings that cannot be used."""
 
+    place = "the settings"
+
 
 @dataclass(frozen=True)
 class Resolved:

@@ -13,7 +13,7 @@ from pipeline.trace.explain import explained, missed_mm
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import near_rotation_plane
 
-__all__ = ["trace"]
+__all__ = ["of_length", "trace"]
 
 BACK_END = explained
 """How the curve is found: (subtraction, entry, previous, config) -> Curve."""
@@ -48,8 +48,14 @@ def trace(
     in_plane = near_rotation_plane(curve.points_mm, axis, config.in_plane_deg)
     in_plane_mm = float(in_plane.mean()) * curve.length_mm
     curve = replace(curve, in_plane=in_plane, counters={**curve.counters, "in_plane_mm": in_plane_mm})
-    if curve.status is FrameStatus.OK and missed_mm(curve.length_mm, entry, config) > 0:
-        note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
-        note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest"
-        return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)
-    return curve
+    return of_length(curve, expected_mm, config)
+
+
+def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
+    """The curve, traced or given; one that is ok but too far from the expected length has that as its status."""
+    if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
+        return curve
+    note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
+    note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
+    note += "trace.length_tolerance_mm"
+    return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

@@ -11,7 +11,7 @@ from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.link import Path, cut_at_tip, link, resampled, with_doubles
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
-from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, spline_through, tint_nodes
+from pipeline.trace.tube import Tube, fit_tube, predicted, spline_through, tint_nodes
 
 ENTRY_REACH_MM = 4.0
 """How far from the manifest's entry the wire may pass."""
@@ -89,10 +89,6 @@ def first_tube(image: Subtraction, points: Array) -> Tube:
     return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0)
 
 
-def _data(image: Subtraction, start_plane: tuple[Array, Array] | None = None) -> TubeData:
-    return TubeData(image.grey, image.spacing, image.noise, start_plane)
-
-
 def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find_tip: bool = True) -> Tube | None:
     """The tube along a path; None where the path is so wrong that its equations have no solution.
 
@@ -104,7 +100,7 @@ def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find
         if find_tip:
             line = cut_at_tip(image, line, FIRST_BLUR * h)
         plane = (line[0] + 2.0 * h * direction, direction) if cut else None
-        return fit_tube(_data(image, plane), first_tube(image, line))
+        return fit_tube(image, replace(first_tube(image, line), start_plane=plane))
     except (np.linalg.LinAlgError, ValueError):
         return None
 
@@ -183,7 +179,7 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
     if tube is None:
         return None
     line = dense(tube, 0.5 * h)
-    voxels, model = predicted(_data(image), tube)
+    voxels, model = predicted(image, tube)
     with image.showing(voxels, image.grey.reshape(-1)[voxels] - model.astype(np.float32)):
         rest = find_crests(image, crests_voxel)
     heading = line[-1] - line[-max(2, min(8, len(line) // 2))]
@@ -207,7 +203,7 @@ def misfit(image: Subtraction, attempts: list[Attempt]) -> list[float]:
     out = []
     for attempt in attempts:
         left = image.grey.reshape(-1)[voxels].astype(float)
-        own, model = predicted(_data(image), attempt.tube)
+        own, model = predicted(image, attempt.tube)
         at = slot.reshape(-1)[own] - 1
         left[at[at >= 0]] -= model[at >= 0]
         out.append(float(np.sum(left**2)) / image.noise**2)

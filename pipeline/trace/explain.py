@@ -84,11 +84,11 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 
 
-def missed_mm(length_mm: float, entry: EntryPose, config: TraceConfig) -> float:
+def missed_mm(length_mm: float, expected_mm: float | None, config: TraceConfig) -> float:
     """How far a length is beyond what may differ from the expected depth, mm."""
-    if entry.expected_mm is None:
+    if expected_mm is None:
         return 0.0
-    return max(0.0, abs(length_mm - entry.expected_mm) - config.length_tolerance_mm)
+    return max(0.0, abs(length_mm - expected_mm) - config.length_tolerance_mm)
 
 
 def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, config: TraceConfig) -> bool:
@@ -99,7 +99,7 @@ def _doubtful(image: Subtraction, found: list[Candidate], entry: EntryPose, conf
     weak = attempt.cnr(image) < SURE_CNR or best.verdict.status is not FrameStatus.OK
     unclear = best.verdict.faint_mm + best.verdict.double_mm
     doubts = unclear > 1.5 or attempt.leftover_mm > 1.5 or attempt.path.bridges > 0
-    return weak or doubts or missed_mm(best.length_mm, entry, config) > 0
+    return weak or doubts or missed_mm(best.length_mm, entry.expected_mm, config) > 0
 
 
 def _best(image: Subtraction, found: list[Candidate], entry: EntryPose, config: TraceConfig) -> Candidate:
@@ -114,7 +114,7 @@ def _best(image: Subtraction, found: list[Candidate], entry: EntryPose, config: 
     for n, c in enumerate(found):
         worth = c.attempt.cnr(image) ** 2 * np.pi * (c.attempt.tube.sigma / h) ** 2 / h
         doubtful = float(c.verdict.flagged.sum()) * h
-        costs[n] += worth * (0.5 * missed_mm(c.length_mm, entry, config) + 0.1 * doubtful)
+        costs[n] += worth * (0.5 * missed_mm(c.length_mm, entry.expected_mm, config) + 0.1 * doubtful)
     return found[int(np.argmin(costs))]
 
 

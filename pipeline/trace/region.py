@@ -14,7 +14,7 @@ from scipy.special import ndtr
 from pipeline.arrays.grids import contiguous, corners_mm, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Lumen, Volume
-from pipeline.trace._kernels.runs import WallModel, denoised, modelled, residual
+from pipeline.trace._kernels.runs import WallModel, denoised, modelled, subtract
 from solver.grid import Grid
 
 HALO_VOXELS = 4.0
@@ -32,7 +32,7 @@ SMOOTH_VOXELS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class SearchRegion:
     """The part of the frames' lattice that is looked at: the lumen's box and its voxels, in memory order.
 
     box : float32 signed distance on the frames' lattice.  corner : index in the frame of its voxel (0, 0, 0).
@@ -73,7 +73,7 @@ def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
     return sampled(distance, box, float(np.max(distance.values))), low
 
 
-def _region(frame: Grid, distance: Grid) -> Region:
+def _region(frame: Grid, distance: Grid) -> SearchRegion:
     box, corner = _onto(frame, distance)
     box = contiguous(box)
     # float64: rounded to float32 the limit may take in the distances that were cut off there
@@ -83,14 +83,14 @@ def _region(frame: Grid, distance: Grid) -> Region:
     allowed = (box.values < INSIDE_MM).view(np.uint8)
     within = np.flatnonzero(allowed)
     within = within[:: max(1, len(within) // SAMPLE)]
-    return Region(box, corner, np.column_stack([edges[::2], edges[1::2, 2]]), within, allowed)
+    return SearchRegion(box, corner, np.column_stack([edges[::2], edges[1::2, 2]]), within, allowed)
 
 
-_regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, Region]] = weakref.WeakKeyDictionary()
+_regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()
 """The last region of each lumen: frames share it, and it hangs on nothing but the lumen and the frames' lattice."""
 
 
-def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> Region:
+def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> SearchRegion:
     """The region for frames of this lattice (their axes reordered by ``axes``)."""
     lattice = (frame.shape, axes, frame.spacing_mm, frame.origin_mm, frame.direction)
     key = np.concatenate([np.ravel(part) for part in lattice]).tobytes()
@@ -107,7 +107,7 @@ def wall_blur(lumen: Lumen, voxel: float) -> float:
     return found if np.isfinite(found) and found > 0.3 * voxel else 0.9 * voxel
 
 
-def _wall_model(scan: Grid, corner: NDArray[np.int64], region: Region, lumen: Lumen) -> WallModel:
+def _wall_model(scan: Grid, corner: NDArray[np.int64], region: SearchRegion, lumen: Lumen) -> WallModel:
     """Grey over signed distance: the medians well inside and 2 to 4 voxels outside, joined by a blurred step."""
     voxel = float(np.min(scan.spacing_mm))
     # every hundredth run or so is enough for two medians
@@ -121,7 +121,7 @@ def _wall_model(scan: Grid, corner: NDArray[np.int64], region: Region, lumen: Lu
     return WallModel(region.box.values, region.runs, table, TABLE_STEP * voxel)
 
 
-def _on_box(reference: Volume, region: Region, axes: tuple[int, int, int]) -> tuple[Grid, NDArray[np.int64]]:
+def _on_box(reference: Volume, region: SearchRegion, axes: tuple[int, int, int]) -> tuple[Grid, NDArray[np.int64]]:
     """The reference, and where in it the region's box starts; interpolated onto the box if lattices differ."""
     grid = reorder(reference, axes)
     corner = integer_offset(grid, region.box)
@@ -130,24 +130,26 @@ def _on_box(reference: Volume, region: Region, axes: tuple[int, int, int]) -> tu
     return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
 
 
-def _smoothed(reference: Volume, region: Region, lumen: Lumen, axes: tuple[int, int, int]) -> NDArray[Any]:
+def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]) -> NDArray[Any]:
     scan, corner = _on_box(reference, region, axes)
     wall = _wall_model(scan, corner, region, lumen)
     kind = np.int16 if scan.values.dtype.kind in "iu" and scan.values.dtype.itemsize <= 2 else np.float32
     rough, out = sparse_zeros(region.box.shape, kind), sparse_zeros(region.box.shape, kind)
-    residual(scan.values, corner, wall, rough)
+    model = sparse_zeros(region.box.shape, np.float64)
+    modelled(wall, model)
+    subtract(scan.values, model, corner, region.runs, rough)
     variance = spread(rough.reshape(-1)[region.within].astype(float)) ** 2
     taps = np.exp(-0.5 * (np.arange(-2, 3) / SMOOTH_VOXELS) ** 2)
     denoised(rough, wall, taps, HALO_VOXELS * float(np.min(scan.spacing_mm)), variance, out)
     return out
 
 
-_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[Region, NDArray[Any]]] = weakref.WeakKeyDictionary()
+_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, NDArray[Any]]] = weakref.WeakKeyDictionary()
 """The last background of each reference, which frames share; it hangs on the reference and the lumen's region alone."""
 
 
 def background_of(
-    frame: Grid, reference: Volume | None, region: Region, lumen: Lumen, axes: tuple[int, int, int]
+    frame: Grid, reference: Volume | None, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]
 ) -> NDArray[Any]:
     """The grey of the lumen without wire, on the region's box: the reference's there, its noise smoothed away.
 

@@ -20,7 +20,7 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
 from pipeline.trace._kernels.tube import active_voxels
-from pipeline.trace.region import HALO_VOXELS, Region, background_of, region_of, voxels_of, wall_blur
+from pipeline.trace.region import HALO_VOXELS, SearchRegion, background_of, region_of, voxels_of, wall_blur
 
 BLUR_VOXELS = 0.8
 """The scanner's blur over the smallest voxel, from which the shape of the blur in thick slices is taken."""
@@ -47,7 +47,7 @@ class Subtraction:
     ``spacing``.
     """
 
-    region: Region
+    region: SearchRegion
     grey: NDArray[np.float32]
     noise: float
     modelled: bool

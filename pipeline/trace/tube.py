@@ -1,7 +1,6 @@
 """The wire fitted as a whole: a B-spline line source blurred by a Gaussian, against the raw voxels around it."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
+from pipeline.trace.subtraction import Subtraction
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
@@ -36,6 +36,7 @@ class Tube:
     """Control points (k, 3) in kernel coordinates, amplitude nodes, blur (mm) and offset; covariance when fitted.
 
     voxels, rest : those that were fitted (flat), and the grey that the fit leaves of them.
+    start_plane : (point, direction) before which voxels are ignored, since wire goes on there that is not modelled.
     """
 
     controls: Array
@@ -47,6 +48,7 @@ class Tube:
     iterations: int = 0
     voxels: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     rest: Array = field(default_factory=lambda: np.zeros(0))
+    start_plane: tuple[Array, Array] | None = None
 
     @property
     def intervals(self) -> int:
@@ -66,24 +68,6 @@ class Tube:
     def blob(self, voxel: float) -> Blob:
         """What one of its points looks like."""
         return Blob(self.sigma, WINDOW * max(self.sigma, 0.5 * voxel), self.offset)
-
-
-@dataclass(frozen=True, eq=False)
-class TubeData:
-    """What is fitted: grey above background (box), voxel size, noise of one voxel, and where the wire is cut off.
-
-    start_plane : (point, direction) before which voxels are ignored, since wire goes on there that is not modelled.
-    """
-
-    grey: NDArray[Any]
-    spacing: Array
-    noise: float
-    start_plane: tuple[Array, Array] | None = None
-
-    @property
-    def voxel(self) -> float:
-        """Smallest edge of a voxel, mm."""
-        return float(self.spacing.min())
 
 
 def weights_at(u: Array, intervals: int) -> tuple[NDArray[np.int64], Array, Array]:
@@ -144,35 +128,35 @@ def spline_through(points: Array, knot: float) -> Array:
     return np.stack([substitute(*factors, np.ascontiguousarray(right[:, a])) for a in range(3)], axis=1)
 
 
-def _prior(tube: Tube, data: TubeData) -> Array:
+def _prior(tube: Tube, image: Subtraction) -> Array:
     """Normal matrix of the smoothness prior on the control points."""
-    count, knot, voxel = len(tube.controls), tube.knot_mm, data.voxel
+    count, knot, voxel = len(tube.controls), tube.knot_mm, image.voxel
     third = np.diff(np.eye(count), n=3, axis=0)
     loose = STIFFNESS * min(1.0, knot / (FULL_KNOT * voxel)) ** 3
-    block = third.T @ third * (data.noise / (loose * voxel)) ** 2
+    block = third.T @ third * (image.noise / (loose * voxel)) ** 2
     if knot < FULL_KNOT * voxel:
         second = np.diff(np.eye(count), n=2, axis=0)
-        block += second.T @ second * (data.noise * TIGHTEST * voxel / knot**2) ** 2
+        block += second.T @ second * (image.noise * TIGHTEST * voxel / knot**2) ** 2
     return np.asarray(np.kron(block, np.eye(3)))
 
 
-def _claim(data: TubeData, curve: Array, radius: float, slot: NDArray[np.int32]) -> Claim:
-    """The voxels near the curve; those before the start plane have no weight."""
-    voxels = kernels.active_voxels(slot, data.spacing, curve, radius)
-    if data.start_plane is None:
+def _claim(image: Subtraction, tube: Tube, curve: Array, slot: NDArray[np.int32]) -> Claim:
+    """The voxels near the tube's curve (n, 3); those before its start plane have no weight."""
+    voxels = kernels.active_voxels(slot, image.spacing, curve, tube.blob(image.voxel).radius)
+    if tube.start_plane is None:
         return Claim(voxels, slot, np.ones(len(voxels)))
-    point, direction = data.start_plane
-    index = np.stack(np.unravel_index(voxels, data.grey.shape), axis=1) * data.spacing
+    point, direction = tube.start_plane
+    index = np.stack(np.unravel_index(voxels, image.grey.shape), axis=1) * image.spacing
     return Claim(voxels, slot, np.where((index - point) @ direction > 0, 1.0, 0.0))
 
 
 def _equations(
-    data: TubeData, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
+    image: Subtraction, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
 ) -> tuple[Equations, Claim, Line]:
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
-    line, blob, k = sampled(tube, samples), tube.blob(data.voxel), len(tube.controls)
-    claim = _claim(data, line.curve, blob.radius, slot)
-    e = kernels.normal_equations(data.grey, data.spacing, claim, line, blob, k, len(tube.tint))
+    line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
+    claim = _claim(image, tube, line.curve, slot)
+    e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
     slot.reshape(-1)[claim.voxels] = 0
     e.right[: 3 * k] -= prior @ tube.controls.ravel()
     e.normal[: 3 * k, : 3 * k] += prior
@@ -228,28 +212,28 @@ def _moved(tube: Tube, step: Array, voxel: float, line: Line) -> tuple[Tube, flo
     return moved, scale * moved_by
 
 
-def fit_tube(data: TubeData, tube: Tube, iterations: int = 12, tolerance: float = 0.02) -> Tube:
+def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: float = 0.02) -> Tube:
     """Gauss-Newton on the voxels within WINDOW blurs of the curve.
 
     Stops when no point of the curve moves by more than ``tolerance`` voxel. The result carries the covariance of its
-    columns (controls, amplitudes, blur, offset), for the noise of ``data``.
+    columns (controls, amplitudes, blur, offset), for the noise of the image.
     """
-    samples, prior = sampling(tube, data.voxel), _prior(tube, data)
-    slot = sparse_zeros(data.grey.shape, np.int32)
+    samples, prior = sampling(tube, image.voxel), _prior(tube, image)
+    slot = sparse_zeros(image.grey.shape, np.int32)
     done = 0
     for done in range(1, iterations + 1):
-        found, _, line = _equations(data, tube, samples, prior, slot)
+        found, _, line = _equations(image, tube, samples, prior, slot)
         normal, right = _damped(found.normal, tube, SLIDING), found.right
         if done <= BLUR_HELD:
             normal[-2], normal[:, -2], right[-2] = 0.0, 0.0, 0.0
             normal[-2, -2] = 1.0
-        tube, size = _moved(tube, substitute(*_factors(normal), right), data.voxel, line)
-        if size < tolerance * data.voxel and done > BLUR_HELD:
+        tube, size = _moved(tube, substitute(*_factors(normal), right), image.voxel, line)
+        if size < tolerance * image.voxel and done > BLUR_HELD:
             break
-    found, claim, _ = _equations(data, tube, samples, prior, slot)
+    found, claim, _ = _equations(image, tube, samples, prior, slot)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
     factors = _factors(_damped(found.normal, tube, POLISHED))
-    covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * data.noise**2
+    covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * image.noise**2
     return replace(
         tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=claim.voxels, rest=found.residual
     )
@@ -270,9 +254,9 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
     return np.sqrt(np.maximum(across, 0.0)), float(np.sqrt(max(0.0, along[-1])))
 
 
-def predicted(data: TubeData, tube: Tube) -> tuple[NDArray[np.int64], Array]:
+def predicted(image: Subtraction, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     """Voxels (flat) that the tube lights up and the grey it gives them."""
-    line, blob = sampled(tube, sampling(tube, data.voxel)), tube.blob(data.voxel)
-    slot = sparse_zeros(data.grey.shape, np.int32)
-    voxels = kernels.active_voxels(slot, data.spacing, line.curve, blob.radius)
-    return voxels, kernels.render(slot, data.spacing, len(voxels), line, blob)
+    line, blob = sampled(tube, sampling(tube, image.voxel)), tube.blob(image.voxel)
+    slot = sparse_zeros(image.grey.shape, np.int32)
+    voxels = kernels.active_voxels(slot, image.spacing, line.curve, blob.radius)
+    return voxels, kernels.render(slot, image.spacing, len(voxels), line, blob)

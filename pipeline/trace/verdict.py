@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
@@ -144,8 +145,7 @@ def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> 
         return np.zeros(len(points_mm), bool)
     normal = np.asarray(axis, float) / np.linalg.norm(np.asarray(axis, float))
     arc = arc_length(points_mm)
-    ends = (np.clip(arc + sign * 0.5 * TANGENT_MM, 0.0, arc[-1]) for sign in (-1, 1))
-    back, ahead = (np.stack([np.interp(s, arc, points_mm[:, a]) for a in range(3)], axis=1) for s in ends)
-    chord = ahead - back
+    ends = (np.clip(arc + sign * 0.5 * TANGENT_MM, 0.0, arc[-1]) for sign in (1, -1))
+    chord = np.subtract(*(at_arc(points_mm, s) for s in ends))
     climb = np.abs(chord / (np.linalg.norm(chord, axis=1)[:, None] + 1e-12) @ normal)
     return np.asarray(climb < np.sin(np.radians(limit_deg)))

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reports.atomic import write_bytes
-from reports.export.slicer import checked_points
+from reports.export.slicer import Array, checked_points
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 _TYPES = {"Float64": "<f8", "Int64": "<i8"}
 _LENGTH_BYTES = 8  # header_type UInt64

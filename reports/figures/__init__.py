@@ -10,7 +10,7 @@ from typing import Any
 from reports.figures._drawing import Drawing
 from reports.figures.run import RunFiles
 
-__all__ = ["CASE_FIGURES", "RUN_FIGURES", "Drawing", "RunFiles", "declared", "figures_of"]
+__all__ = ["Drawing", "RunFiles", "declared", "figures_of"]
 
 
 @cache
@@ -25,7 +25,3 @@ def figures_of(page: str) -> Mapping[str, Callable[[Any], Drawing | None]]:
     """The functions of a page's figures by name, in the order of sections.toml."""
     modules = {e["figure"]: importlib.import_module(f"{__name__}.{e['module']}") for e in declared(page)}
     return {figure: getattr(module, figure) for figure, module in modules.items()}
-
-
-CASE_FIGURES = figures_of("case")
-RUN_FIGURES = figures_of("run")

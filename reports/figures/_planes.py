@@ -8,12 +8,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from reports.figures._drawing import Look, new_figure
-from reports.frames_file import FrameArrays, ScanCrop
-
-Array = NDArray[np.float64]
+from reports.figures._drawing import new_figure
+from reports.figures._style import Look
+from reports.frames_file import Array, FrameArrays, ScanCrop
 
 
 class Plane(NamedTuple):

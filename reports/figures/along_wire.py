@@ -2,13 +2,12 @@
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from scipy.interpolate import interp1d
 
 from reports.case_files import CaseFiles
 from reports.figures._drawing import Drawing, heat_map, new_figure, whole_numbers
 from reports.tables import has
 
-Array = NDArray[np.float64]
 _CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
 
 
@@ -47,9 +46,10 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     step = _step(kept)
     grid = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan)
     for frame, samples in kept.groupby("frame"):
-        row = _nearest(samples["arc_mm"].to_numpy(), samples[column].to_numpy(), step)
-        grid[int(str(frame)) - frames[0], : len(row)] = row
-    figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.4, 7.0)))
+        at = np.arange(int(samples["arc_mm"].max() / step + 0.5) + 1) * step
+        nearest = interp1d(samples["arc_mm"], samples[column], kind="nearest", fill_value="extrapolate")
+        grid[int(str(frame)) - frames[0], : len(at)] = nearest(at)
+    figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
     heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, bar={}, rasterized=True)
@@ -60,14 +60,6 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     row_of, place = np.nonzero(np.isfinite(grid))
     table = {"frame": frames[row_of], "arc_mm": place * step, column: grid[row_of, place]}
     return Drawing(figure, pd.DataFrame(table))
-
-
-def _nearest(arc_mm: Array, values: Array, step: float) -> Array:
-    """Values of the nearest samples at arc lengths 0, step, 2 step, ... up to the last sample."""
-    order = np.argsort(arc_mm, kind="stable")
-    at = np.arange(int(arc_mm.max() / step + 0.5) + 1) * step
-    middles = 0.5 * (arc_mm[order][1:] + arc_mm[order][:-1])
-    return np.asarray(values[order][np.searchsorted(middles, at)])
 
 
 def _step(points: pd.DataFrame) -> float:

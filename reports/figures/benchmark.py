@@ -9,18 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.figures._drawing import (
-    BLUE,
-    GREY,
-    PALETTE,
-    Drawing,
-    Look,
-    lattice,
-    legend,
-    new_figure,
-    plain,
-    plain_decades,
-)
+from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, plain_decades
+from reports.figures._style import BLUE, GREY, PALETTE, Look
 from reports.tables import has
 
 _STYLES = tuple(zip((*PALETTE, "black", GREY), "osD^vPX*", strict=True))

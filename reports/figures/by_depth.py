@@ -8,20 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.case_files import CaseFiles
-from reports.figures._drawing import (
-    GREY,
-    SIMULATED,
-    TRACED,
-    VERMILION,
-    Drawing,
-    Look,
-    legend,
-    lines,
-    new_figure,
-    plain,
-    positive_axis,
-    predictors,
-)
+from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
+from reports.figures._style import GREY, SIMULATED, TRACED, VERMILION, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
 

@@ -11,8 +11,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from reports.case_files import GOOD, CaseFiles, thinned
-from reports.figures._drawing import GREEN, ORANGE, SKY, VERMILION, Drawing, Look, new_figure
+from reports.figures._drawing import Drawing, new_figure
 from reports.figures._planes import PLANES, WIDTH_INCH, Plane, View, around, points_table, whole
+from reports.figures._style import GREEN, ORANGE, SKY, VERMILION, Look
 from reports.frames_file import FrameArrays, ScanCrop
 
 _LARGE: dict[str, Look] = {

@@ -10,21 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.case_files import GOOD
-from reports.figures._drawing import (
-    GREY,
-    PALETTE,
-    SIMULATED,
-    VERMILION,
-    Drawing,
-    Look,
-    heat_map,
-    lattice,
-    legend,
-    new_figure,
-    plain,
-    predictors,
-    whole_numbers,
-)
+from reports.figures._drawing import Drawing, heat_map, lattice, legend, new_figure, plain, whole_numbers
+from reports.figures._style import GREY, PALETTE, SIMULATED, VERMILION, Look, predictors
 from reports.tables import has
 
 _CLIP_PERCENTILE = 98.0  # one lost frame must not turn the others dark

@@ -5,7 +5,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
-from reports.figures._drawing import STAGE_COLOURS, Drawing, legend, new_figure, plain, whole_numbers
+from reports.figures._drawing import Drawing, legend, new_figure, plain, whole_numbers
+from reports.figures._style import STAGE_COLOURS
 from reports.tables import has
 
 

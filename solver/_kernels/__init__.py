@@ -10,7 +10,10 @@ newton           the step, by a Riccati recursion       newton_straight  the sam
 newton_method    one iteration of Newton's method       closed_form      one sweep of the seed's eq. 8-10
 minimise         the loop around either method          crossing         whether a way passes through a wall
 start            the wire laid along a curve            insertion        the steps to a depth
-handle           all that these work on, behind one pointer
+handle           what these work on, behind one pointer shaft            the wire between hand and entry
+septum           whether the wire left its lumen        snaps            energy that a step released
+saddle           the way off a saddle                   trial            a share of the step, and the energy there
+records          what the kernels note
 
 Several wires side by side, in the processor's vectors, with the same formulas:
 lanes            numbers of eight wires as one type     bare             arrays without reference counts

@@ -35,7 +35,7 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.friction import friction_derivatives
+from solver._kernels.friction import friction_derivatives, lever_of
 from solver._kernels.lanes import anywhere, select, select3
 from solver._kernels.rotation import jacobian_curvature
 
@@ -118,7 +118,9 @@ def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Thr
             f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
         if problem.friction.coefficient > 0.0 and problem.friction.load[p] > 0.0:
             force, _ = friction_derivatives(problem, slot, n, p, frame)
-            f, g = add3(f, force), add3(g, cross(load3(chain.offset, p), force))
+            f, g = add3(f, force), add3(g, cross(lever_of(problem, p), force))
+    if n == 1:
+        g = add3(g, load3(state.held[slot], 0))
     return f, g
 
 
@@ -132,20 +134,22 @@ def node_hessian(problem: Problem, slot: int, n: int, frame: Nine, project: bool
         rubbing = problem.friction.coefficient > 0.0 and problem.friction.load[i] > 0.0
         if d == 0.0 and not rubbing:
             continue
-        force, hessian = ZERO3, ZERO6
         if d != 0.0:
             jet, weight = state.jet[slot, i], chain.weight[i]
             law = wall_law.force(stiffness, weight, d), wall_law.curvature(stiffness, weight, d)
             normal = apply_transposed(frame, (jet[1], jet[2], jet[3]))
             force, hessian = scaled(law[0], normal), wall_hessian(frame, jet, normal, law, project)
+            p = add6(p, hessian)
+            offset = load3(chain.offset, i)
+            if offset != ZERO3:
+                dc, dh = lever(offset, force, hessian)
+                c, h = add9(c, dc), add6(h, dh)
         if rubbing:
-            more, stiffer = friction_derivatives(problem, slot, n, i, frame)
-            force, hessian = add3(force, more), add6(hessian, stiffer)
-        p = add6(p, hessian)
-        offset = load3(chain.offset, i)
-        if offset != ZERO3:
-            dc, dh = lever(offset, force, hessian)
-            c, h = add9(c, dc), add6(h, dh)
+            rub, stiffer = friction_derivatives(problem, slot, n, i, frame)
+            dc, dh = lever(lever_of(problem, i), rub, stiffer)
+            p, c, h = add6(p, stiffer), add9(c, dc), add6(h, dh)
+    if n == 1:
+        h = add6(h, load3(state.held[slot], 1) + load3(state.held[slot], 2))
     return p, c, h
 
 
@@ -221,6 +225,13 @@ def note_direction(q: Six, j: int, least: float, report: Any) -> None:
     angle = 0.5 * math.atan2(q[3], half) + 0.5 * math.pi
     report.bend[0], report.bend[1], report.twist = math.cos(angle), math.sin(angle), 0.0
     report.curvature = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
+
+
+@inlined
+def note_pivot(lowest: float, first_free: int, damping: float, report: Any) -> None:
+    """Keep the least pivot of a sweep; one that left joints near the base out knows only of the others."""
+    if damping == 0.0:
+        report.pivot = lowest if first_free == 0 else min(lowest, report.pivot)
 
 
 @inlined

@@ -83,8 +83,24 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
         else:
             compliance, chain.rest[j] = cells[k - j, 0], cells[k - j, 1]
         chain.bend[j] = 1.0 / compliance
-        chain.twist[j] = profile.twist / (outer - inner)
+        chain.twist[j] = profile.twist / (outer - inner + (table.shaft if j == 0 else 0.0))
     place_points(chain, table.rule, k)
+
+
+@kernel
+def weigh(chain: Chain, weight: Any, k: int) -> None:
+    """Add the wire's own weight, (3,) N/mm, to the loads: half of each segment's to either end, exact for a rigid one.
+
+    Node 0, which stays where it is, gets the opposite of all the others': so the energy counts from the entry, and
+    what comes in there brings none.
+    """
+    if weight[0] == 0.0 and weight[1] == 0.0 and weight[2] == 0.0:
+        return
+    for n in range(1, k + 1):
+        length = 0.5 * chain.length[n - 1] + (0.5 * chain.length[n] if n < k else 0.0)
+        for a in range(3):
+            chain.load[n, a] += length * weight[a]
+            chain.load[0, a] -= length * weight[a]
 
 
 @kernel

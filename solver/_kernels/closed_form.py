@@ -143,7 +143,7 @@ def settled(problem: Problem, slot: int, k: int, tolerance: float, report: Any) 
 
 @cached
 def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -> int:
-    """Do one sweep; return how the relaxation ended, or UNFINISHED. now is the record ``data.DESCENT``."""
+    """Do one sweep; return how the relaxation ended, or UNFINISHED. now is the record ``records.DESCENT``."""
     if now.iterations == now.next_check or now.iterations == 0:
         now.next_check += now.next_check // 4
         if settled(problem, now.slot, k, tolerance, report):

@@ -1,86 +1,19 @@
-"""What the kernels hand to each other: named tuples of arrays and scalars, and records of named numbers.
+"""What the kernels hand to each other: named tuples of arrays and scalars. What they note: see ``records``.
 
 Units: mm, N, rad unless something else is said. k is the number of segments, p the number of look-up points.
 """
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from solver.skips import Skips
 
 # how a relaxation or a step ends, by the names of ``solution.Status``
-OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID")
-CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID = range(7)
-UNFINISHED = -1
-"""It goes on."""
+OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID", "THROUGH_WALL")
+CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
+UNFINISHED, ROUGH = -1, -2
+"""It goes on. And of a step: it is to be taken again in shorter ones."""
 CURRENT, TRIAL, LAST_GOOD = range(3)
 """Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes."""
-
-
-def record(*fields: tuple[Any, ...]) -> np.dtype[Any]:
-    """The type of a record: kernels read and write its fields by name."""
-    return np.dtype((np.record, list(fields)))
-
-
-ENERGIES = record(*((name, float) for name in ("bending", "wall", "load", "friction")))
-"""The parts of a state's energy, N mm."""
-WORK = (
-    "wall_look_ups",
-    "wall_look_ups_cheap",
-    "wall_look_ups_proven_unnecessary",
-    "sweeps",
-    "rollouts",
-    "levenberg",
-    "rest_shapes",
-    "rolls_proven_idle",
-    "sweeps_without_roll",
-    "starts_foreseen",
-    "joints_left_still",
-    "starts_at_rest",
-    "relaxations_without_friction",
-    "relaxations_without_twist",
-    "joints_without_profile_look_up",
-)
-"""What is counted, by the keys of ``Solution.work``."""
-COUNTERS = record(*((name, np.int64) for name in (*WORK, "passed")))
-"""passed : joints and look-up points that the iterations of a depth have gone through, see ``tol.WORK``."""
-REPORT = record(
-    ("start", float),
-    ("penetration", float),
-    ("push", float),
-    ("force", float, 3),
-    ("torque", float, 3),
-    ("turned", float, (2, 3)),
-    ("moment", float),
-    ("decrement", float),
-    ("joint", np.int64),
-    ("bend", float, 2),
-    ("curvature", float),
-    ("twist", float),
-)
-"""What a relaxation found out.
-
-start : energy at the beginning, N mm.     penetration : deepest of all points, mm.     push : the hand's force, N.
-force, torque : gradient of the energy with respect to the entry point, N, and to turning the base frame, N mm.
-turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
-decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
-joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
-"""
-DESCENT = record(
-    *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
-    *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
-)
-"""What one iteration of a relaxation hands to the next.
-
-slot : of the current state; the trial is in 1 - slot.     energy : of the current state, N mm.
-Newton's method. first_free : joints before it are left alone.     damping : Levenberg's term.     last_damping : the
-one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
-Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
-"""
-PLACE = record(*((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")))
-"""Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm (0 after a roll)."""
 
 
 class Field(NamedTuple):
@@ -88,6 +21,7 @@ class Field(NamedTuple):
 
     coefficients : (nx + 2, ny + 2, nz + 2) float32.     to_index : (3, 3), index per mm.     origin : (3,) mm.
     gap : bound on |trilinear look-up - spline|, mm.     slope : bound on |gradient|.     spacing : the least, mm.
+    creases : uint8, for each block of the grid whether the distance has a crease near it, see ``wall.creases``.
     """
 
     coefficients: Any
@@ -96,6 +30,7 @@ class Field(NamedTuple):
     gap: float
     slope: float
     spacing: float
+    creases: Any
 
 
 class Profile(NamedTuple):
@@ -128,6 +63,7 @@ class WireTable(NamedTuple):
     """What a wire of any depth is cut from.
 
     cells : (m, 2), see ``chain.tabulate``.     segment : length of one, mm.     tabled : whether ``cells`` is used.
+    shaft : length of the wire between hand and entry, mm: it twists with the first joint.
     """
 
     profile: Profile
@@ -135,6 +71,7 @@ class WireTable(NamedTuple):
     cells: Any
     segment: float
     tabled: bool
+    shaft: float
 
 
 class Chain(NamedTuple):
@@ -162,7 +99,8 @@ class State(NamedTuple):
 
     u : (3, k, 3) controls, rad.   x : (3, k + 1, 3) joints, mm.   r : (3, k + 1, 3, 3) frames, whose columns are
     material axes 1, 2 and the direction.   penetration : (3, p) mm.   jet : (3, p, 10), see ``field``, per mm.
-    energies : (3,) of ``ENERGIES``.
+    energies : (3,) of ``records.ENERGIES``.   held : (3, 3, 3), see ``shaft.shaft_energy``; 0 where the shaft
+    does not rub.
     """
 
     u: Any
@@ -171,15 +109,16 @@ class State(NamedTuple):
     penetration: Any
     jet: Any
     energies: Any
+    held: Any
 
 
 class Scratch(NamedTuple):
     """Work space.
 
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
-    distance there.     counters, descent : (1,), see ``COUNTERS`` and ``DESCENT``.     start : (k, 3) controls that the
-    step began with.     change : (k, 3) what relaxing them added in the last step, from the tip inwards.
-    keep : (k, 3) controls to come back to.
+    distance there.     counters, descent : (1,), see ``records``.     start : (k, 3) controls that the step began
+    with.     change : (k, 3) what relaxing them added in the last step, from the tip inwards.
+    keep : (k, 3) controls to come back to.     snaps : (n,) of ``records.SNAP``.
     """
 
     gain: Any
@@ -189,31 +128,58 @@ class Scratch(NamedTuple):
     start: Any
     change: Any
     keep: Any
+    snaps: Any
 
 
 class Friction(NamedTuple):
     """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
 
-    coefficient : 0 is no friction at all.
-    start : (p, 3) where each point was before the step, mm.     normal : (p, 3).     load : (p,) N.
+    coefficient : 0 is no friction at all.     radius : of a smooth hull, mm, else 0.
+    Before the step: held : (p, 3), what each point holds on to, moved to the axis, mm.     frame : (k + 1, 3, 3).
+    In the step: arm : (p, 3), where it rubs, mm from the point, in the frame of its node.     start : (p, 3), what it
+    holds on to.     normal : (p, 3).     load : (p,) N.
+    After the step, counted from the tip's last point: stretch : (p, 3) of the spring, mm.     pressed : (p,) load, N.
     """
 
     coefficient: float
+    radius: float
+    held: Any
+    frame: Any
+    arm: Any
     start: Any
     normal: Any
     load: Any
+    stretch: Any
+    pressed: Any
+
+
+class Shaft(NamedTuple):
+    """The wire between the hand and the entry, straight and guided; its length is in ``WireTable``.
+
+    drag : what it takes to slide or turn it, N, half of it at the entry, half in the hand.     radius : mm.
+    frame : (1, 3, 3) of the wire at the entry before the step.     step : (2,), mm that the hand pushes it in the step
+    and turns its surface.     stretch : (2, 2) of the springs that hold it after the step, mm: at the entry and in the
+    hand, along and around it.
+    """
+
+    drag: float
+    radius: float
+    frame: Any
+    step: Any
+    stretch: Any
 
 
 class Problem(NamedTuple):
     """A wire in a wall.
 
     stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     twisting : the torsional stiffness is finite.
-    straight : no rest bend, one bending stiffness, a round hull and no twist: a direction is all of a frame.
+    straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: a direction is all of a frame.
     """
 
     field: Field
     stiffness: float
     friction: Friction
+    shaft: Shaft
     chain: Chain
     state: State
     scratch: Scratch
@@ -229,6 +195,8 @@ class Introducer(NamedTuple):
     load : (3,) dead force on the tip, N.     translate : the seed's start shape instead of sliding.
     idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : how much deeper in
     the wall a step may lead the tip, mm.     margin : how far a joint may leave the grid, mm.
+    weight : (3,) of the wire, N per mm of it.
+    finest : share of the longest step down to which a rough one is taken again.
     """
 
     entry: Any
@@ -240,6 +208,8 @@ class Introducer(NamedTuple):
     turn: float
     rise: float
     margin: float
+    weight: Any
+    finest: float
 
 
 class Limits(NamedTuple):

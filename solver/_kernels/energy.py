@@ -12,6 +12,7 @@ from solver._kernels.data import Chain, Problem
 from solver._kernels.field import depth_in_grid, indices, jet_at, locate, store_jet, trilinear, value
 from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.friction import friction_energy
+from solver._kernels.shaft import shaft_energy
 
 FLOOR = tol.ENERGY_FLOOR_ANGLE**2
 
@@ -27,6 +28,8 @@ def total_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     parts.wall = wall_energy(problem, slot, first_free, k) if problem.stiffness > 0.0 else 0.0
     parts.load = load_energy(problem.chain, state.x[slot], k)
     parts.friction = friction_energy(problem, slot, k) if problem.friction.coefficient > 0.0 else 0.0
+    if problem.shaft.drag > 0.0:
+        parts.friction += shaft_energy(problem, slot)
     return energy_of(problem, slot)
 
 
@@ -150,8 +153,12 @@ def scale_of(problem: Problem, slot: int, k: int) -> float:
 
 @kernel
 def noise_of(problem: Problem, slot: int, scale: float) -> float:
-    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``."""
-    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load)))
+    """Energy below which a difference is rounding, N mm. scale : see ``scale_of``.
+
+    A weight's energy counts from the entry: it is the difference of two that count from the origin.
+    """
+    at_entry = dot(load3(problem.chain.load, 0), load3(problem.state.x[slot], 0))
+    return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load) + abs(at_entry)))
 
 
 @kernel

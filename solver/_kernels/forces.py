@@ -8,7 +8,7 @@ from solver._kernels import wall_law
 from solver._kernels.algebra import dot, load3, load9, store3, store9
 from solver._kernels.data import CURRENT, Chain, Field, Problem, WireTable
 from solver._kernels.flags import cached, kernel, merged
-from solver._kernels.friction import slide
+from solver._kernels.friction import friction_force
 from solver._kernels.rotation import turn
 
 
@@ -16,10 +16,10 @@ from solver._kernels.rotation import turn
 def contact_forces(problem: Problem, k: int, force: Any) -> float:
     """Add the wall's force on the wire to each joint, force (k + 1, 3), N; return the deepest penetration, mm.
 
-    A point inside a segment belongs to its two ends in proportion. Friction acts against the way slid.
+    A point inside a segment belongs to its two ends in proportion. Friction is that of the last step.
     """
-    chain, state, friction = problem.chain, problem.state, problem.friction
-    deepest = 0.0
+    chain, state, rubs = problem.chain, problem.state, problem.friction.coefficient > 0.0
+    deepest, end = 0.0, chain.first[k + 1] - 1
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
             share = -chain.offset[p, 2] / chain.length[n - 1]
@@ -30,12 +30,11 @@ def contact_forces(problem: Problem, k: int, force: Any) -> float:
                 for a in range(3):
                     force[n, a] += (1 - share) * size * state.jet[CURRENT, p, 1 + a]
                     force[n - 1, a] += share * size * state.jet[CURRENT, p, 1 + a]
-            if friction.coefficient > 0.0 and friction.load[p] > 0.0:
-                length, way = slide(problem, CURRENT, n, p)
-                size = -friction.coefficient * friction.load[p] / length
+            if rubs:
+                rub = friction_force(problem, end - p)
                 for a in range(3):
-                    force[n, a] += (1 - share) * size * way[a]
-                    force[n - 1, a] += share * size * way[a]
+                    force[n, a] += (1 - share) * rub[a]
+                    force[n - 1, a] += share * rub[a]
     return deepest
 
 
@@ -52,11 +51,12 @@ def profile_at(at: Any, value: Any, s: float) -> float:
 
 
 @cached
-def push_force(problem: Problem, table: WireTable, k: int, report: Any) -> float:
+def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: Any) -> float:
     """dU/d(depth) at the minimum, N: the hand's axial force where the introducer guides without friction.
 
     The depth grows by the first segment alone: all joints move along it, and compliance, rest bend and wall
     share of the first two cells change. The first cell is [depth - l/2, depth], the second ends where it begins.
+    weight : (3,) N per mm of wire, of which the first segment gains.
     """
     chain, profile, u = problem.chain, table.profile, problem.state.u[CURRENT]
     depth = 0.0
@@ -64,6 +64,7 @@ def push_force(problem: Problem, table: WireTable, k: int, report: Any) -> float
         depth += chain.length[j]
     ahead = problem.state.r[CURRENT, 1]
     force = report.force[0] * ahead[0, 2] + report.force[1] * ahead[1, 2] + report.force[2] * ahead[2, 2]
+    force -= 0.5 * chain.length[0] * (weight[0] * ahead[0, 2] + weight[1] * ahead[1, 2] + weight[2] * ahead[2, 2])
     inner = depth - 0.5 * chain.length[0]
     flexible = 1.0 / profile_at(profile.stiffness_at, profile.stiffness, inner)
     rest = profile_at(profile.rest_at, profile.rest, inner)

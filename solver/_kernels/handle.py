@@ -12,8 +12,8 @@ from solver._kernels.flags import entry_point
 class Contents(NamedTuple):
     """What is behind a handle.
 
-    problem, table, introducer, limits : see ``data``.     place, report : (1,), (2,) records of ``data.PLACE`` and
-    ``data.REPORT``; the second report is that of the last good state.     force : (k + 1, 3) contact forces, N.
+    problem, table, introducer, limits : see ``data``.     place, report : (1,), (2,) records of ``records.PLACE`` and
+    ``records.REPORT``; the second report is that of the last good state.     force : (k + 1, 3) contact forces, N.
     """
 
     problem: Any

@@ -8,14 +8,17 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import data
-from solver._kernels.chain import lay_out, segments_at
+from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
-from solver._kernels.flags import cached, inlined, kernel, merged, released
+from solver._kernels.flags import inlined, kernel, merged, released
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
-from solver._kernels.friction import anchor_friction, anchor_friction_behind
+from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
-from solver._kernels.start import extrapolate_start, follow, note_change
+from solver._kernels.septum import through_wall
+from solver._kernels.shaft import anchor_shaft, settle_shaft
+from solver._kernels.snaps import account
+from solver._kernels.start import extrapolate_start, lay_along, note_change, put_load
 
 
 @released
@@ -26,11 +29,11 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
     outcome, iterations = go(handle, to_depth, to_roll, laid)
-    return outcome, iterations, sum_up(handle)
+    return outcome, iterations, sum_up(handle, laid)
 
 
 @kernel
-def sum_up(handle: Any) -> int:
+def sum_up(handle: Any, laid: int) -> int:
     """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
     problem, report, force = handle.problem, handle.report[0], handle.force
@@ -40,7 +43,8 @@ def sum_up(handle: Any) -> int:
     if k > 0 and problem.stiffness > 0.0:
         report.penetration = contact_forces(problem, k, force)
     if k > 0:
-        report.push = push_force(problem, handle.table, k, report)
+        weight = handle.introducer.weight
+        report.push = push_force(problem, handle.table, weight, k, report) if laid > 0 else handle.place[0].push
     return k
 
 
@@ -65,6 +69,7 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
 def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
     """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
     at, introducer = handle.place[0], handle.introducer
+    at.rubbed, at.dissipated, at.snaps = 0.0, 0.0, 0
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
@@ -84,14 +89,15 @@ def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[boo
     at = handle.place[0]
     if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
         return False, data.MAX_ITERATIONS
-    if outcome == data.CONVERGED:
-        at.shrink = min(1.0, 2 * at.shrink)
-        return True, outcome
     # outside the grid or without a finite energy a shorter step does not help
     helps = at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE
-    if helps:
+    if outcome == data.CONVERGED:
+        at.shrink = min(1.0, 2 * at.shrink)
+    elif outcome == data.ROUGH:
+        at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
+    elif helps:
         at.shrink *= 0.5
-    return helps, outcome
+    return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
 
 
 @merged
@@ -103,33 +109,55 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     problem, at = handle.problem, handle.place[0]
     depth, roll, k = to_depth, to_roll, laid
     if laid > 0:
-        anchor_friction(problem, k)
+        if problem.friction.coefficient > 0.0:
+            copy_state(problem, data.CURRENT, data.LAST_GOOD, k)
+            anchor_friction(problem, k, k, 0.0, 0.0)
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, energy = data.CONVERGED, 0, 0.0
+    outcome, used, energy, held = data.CONVERGED, 0, 0.0, problem.scratch.counters[0].levenberg
     if k > 0:
+        weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy)
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
-    return settle(handle, (depth, roll), k, outcome, energy, laid), used
+    hard = used > tol.EASY or problem.scratch.counters[0].levenberg > held
+    return settle(handle, (depth, roll, energy), k, outcome, laid, hard), used
 
 
 @kernel
-def settle(handle: Any, place: tuple[float, float], k: int, outcome: int, energy: float, laid: int) -> int:
-    """Keep the wire where a step led it, or take the step back where it failed; return the outcome."""
-    problem, at = handle.problem, handle.place[0]
-    walled = laid == 0 and outcome == data.CONVERGED and problem.stiffness > 0.0
-    if walled and furthest_outside(problem.field, problem.state.x[data.CURRENT], k) > handle.introducer.margin:
-        outcome = data.LEFT_GRID
+def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, hard: bool) -> int:
+    """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
+
+    reached : depth, mm, roll, degrees, and energy, N mm.     hard : see ``snaps.account``.
+    """
+    problem, at, (depth, roll, energy) = handle.problem, handle.place[0], reached
+    energy -= problem.state.energies[data.CURRENT].friction
+    if outcome == data.CONVERGED and problem.stiffness > 0.0:
+        outcome = where(problem, handle.introducer.margin, k, laid)
+    if outcome == data.CONVERGED and laid == 0:
+        outcome = account(handle, k, (depth, roll, energy), hard)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
-        at.last_step = place[0] - at.inserted if place[1] == at.roll else 0.0
-        at.inserted, at.roll, at.energy = place[0], place[1], energy
+        at.last_step = depth - at.inserted if roll == at.roll else 0.0
+        at.inserted, at.roll, at.energy = depth, roll, energy
+        if problem.friction.coefficient > 0.0:
+            at.rubbed += settle_friction(problem, k)
+        if problem.shaft.drag > 0.0:
+            at.rubbed += settle_shaft(problem, k)
     else:
         take_back(handle)
     return outcome
+
+
+@merged
+def where(problem: Problem, margin: float, k: int, laid: int) -> int:
+    """Judge the place of a wire at rest: out of the grid, through a wall, or CONVERGED where it may lie."""
+    field, x = problem.field, problem.state.x[data.CURRENT]
+    if laid == 0 and furthest_outside(field, x, k) > margin:
+        return data.LEFT_GRID
+    return data.THROUGH_WALL if through_wall(field, x, k, margin) else data.CONVERGED
 
 
 @merged
@@ -180,6 +208,8 @@ def set_out(handle: Any, depth: float, roll: float) -> int:
     handle.report[1] = report
     k, first = segments_at(depth, table.segment)
     clamp(problem, introducer, roll)
+    if problem.shaft.drag > 0.0:
+        anchor_shaft(problem, was, depth - inserted, math.radians(roll - handle.place[0].roll))
     if k > 2 and table.tabled:
         problem.scratch.counters[0].joints_without_profile_look_up += k - 2
     if k > 0:
@@ -198,6 +228,7 @@ def take_back(handle: Any) -> None:
     was, first = segments_at(handle.place[0].inserted, handle.table.segment)
     if was > 0:
         lay_out(handle.problem.chain, handle.table, was, first)
+        put_load(handle.problem.chain, handle.introducer, was)
     copy_state(handle.problem, data.LAST_GOOD, data.CURRENT, was)
     handle.report[0] = handle.report[1]
 
@@ -212,64 +243,3 @@ def clamp(problem: Problem, introducer: Introducer, roll: float) -> None:
         x[0, a] = introducer.entry[a]
         one, two = introducer.frame[a, 0], introducer.frame[a, 1]
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, introducer.frame[a, 2]
-
-
-@cached
-def lay_along(
-    problem: Problem, table: WireTable, introducer: Introducer, was: int, k: int, first: float, ahead: float
-) -> None:
-    """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
-    chain, state = problem.chain, problem.state
-    before = chain.length[0]
-    lay_out(chain, table, k, first)
-    if problem.twisting:
-        # twist stays with the material, which is counted from the tip
-        for j in range(k):
-            common = j >= k - min(was, k)
-            state.u[data.CURRENT, j, 2] = state.u[data.LAST_GOOD, was - k + j, 2] if common else 0.0
-    for n in range(k + 1):
-        for a in range(3):
-            chain.load[n, a] = introducer.load[a] if n == k else 0.0
-    source, count = data.LAST_GOOD, was + 1
-    if was == 0:
-        source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
-    elif introducer.translate and ahead != 0.0:
-        source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
-    # moved on by whole segments, the joints of a straight wire lie where joints lay, and are there already
-    lies = problem.straight and source == data.LAST_GOOD and abs(chain.length[0] - before) < tol.SAME_LENGTH_MM
-    joints = (min(was, k) if lies and same_base(state.r) else 0, k)
-    follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], joints)
-    if problem.friction.coefficient > 0.0:
-        anchor_friction_behind(problem, state.x[data.LAST_GOOD], was, k, ahead)
-
-
-@inlined
-def same_base(r: Any) -> bool:
-    """Whether the base is turned as in the last good state."""
-    same = True
-    for a in range(3):
-        for b in range(3):
-            same = same and r[data.CURRENT, 0, a, b] == r[data.LAST_GOOD, 0, a, b]
-    return same
-
-
-@merged
-def begin(introducer: Introducer, curve: Any) -> int:
-    """Straight on from the entry, as two points."""
-    for a in range(3):
-        curve[0, a] = introducer.entry[a]
-        curve[1, a] = introducer.entry[a] + introducer.frame[a, 2]
-    return 2
-
-
-@kernel
-def moved(introducer: Introducer, table: WireTable, x: Any, was: int, first: float, ahead: float) -> int:
-    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
-    curve, count = x[data.TRIAL], begin(introducer, x[data.TRIAL]) - 1
-    for n in range(was + 1):
-        arc = first + (n - 1) * table.segment if n > 0 else 0.0
-        if ahead > 0.0 or arc > -ahead:
-            for a in range(3):
-                curve[count, a] = x[data.LAST_GOOD, n, a] + ahead * introducer.frame[a, 2]
-            count += 1
-    return max(count, 2)

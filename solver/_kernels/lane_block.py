@@ -11,14 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver._kernels.algebra import load3, load9, store3, store9
-from solver._kernels.data import CURRENT, Problem, record
+from solver._kernels.data import CURRENT, Problem
 from solver._kernels.flags import inlined, kernel
+from solver._kernels.records import record
 
 NUMBERS = (
     *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted"),
     *(
         "decrement",
         "definite",
+        "pivot",
         "bending",
         "wall",
         "load",
@@ -33,10 +35,11 @@ NUMBERS = (
 )
 """Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
 Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0). Answered: the fall
-foretold; whether all blocks were positive; energies of the trial; whether a joint of it went so far that a wall may lie
-between; largest moment left, and in the wire; first joint that the accepted step turned; counts of look-ups."""
+foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
+that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
+look-ups."""
 (
-    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, BENDING, WALL, LOAD, JUMP,
+    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
     MOMENT, LARGEST, STILL, FULL, CHEAP, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
@@ -50,7 +53,7 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``data.REPORT``.     asked : (4,) a place that is
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (4,) a place that is
     looked up, and how clear of the wall it was.     number : see ``NUMBERS``.
     """
 
@@ -80,8 +83,12 @@ SHAPES = (
 """Of the arrays of a block: k joints, n nodes, p points."""
 LANE = record(
     *((name, float) for name in ("depth", "roll", "clamped", "limit", "tolerance", "stiffest", "scale", "noise")),
+    *((name, float) for name in ("accuracy", "pivot")),
     *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load")),
-    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "filled")),
+    *(
+        (name, np.int64)
+        for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "filled", "held")
+    ),
 )
 """Where a lane is.
 

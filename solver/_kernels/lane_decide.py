@@ -1,6 +1,6 @@
 """What a lane does next: the decisions of ``newton_method.iterate``, one at a time, on nothing but its records.
 
-me, now, counters : records of ``lane_block.LANE``, ``data.DESCENT`` and ``data.COUNTERS``.     number :
+me, now, counters : records of ``lane_block.LANE``, ``records.DESCENT`` and ``records.COUNTERS``.     number :
 ``Block.number``, in which the lane's column is read.
 """
 
@@ -11,7 +11,20 @@ from solver import _tolerances as tol
 from solver._kernels.data import CONVERGED
 from solver._kernels.energy import FLOOR
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lane_block import ACCEPTED, BENDING, DECREMENT, DEFINITE, LARGEST, LOAD, MOMENT, START, STILL, WALL
+from solver._kernels.lane_block import (
+    ACCEPTED,
+    BENDING,
+    DECREMENT,
+    DEFINITE,
+    LARGEST,
+    LOAD,
+    MOMENT,
+    PIVOT,
+    START,
+    STILL,
+    WALL,
+)
+from solver._kernels.newton_method import whole
 
 IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE = range(12)
 """Phases of a lane: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
@@ -30,7 +43,11 @@ def next_iteration(me: Any, now: Any) -> None:
 def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> None:
     """Decide what to do with new gains, as ``newton_method.iterate`` does."""
     me.decrement = number[DECREMENT, lane]
-    definite = number[DEFINITE, lane] > 0.0 and math.isfinite(me.decrement)
+    definite = number[DEFINITE, lane] > 0.0
+    if definite and now.damping == 0.0:
+        me.pivot = number[PIVOT, lane] if now.first_free == 0 else min(number[PIVOT, lane], me.pivot)
+    definite = definite and math.isfinite(me.decrement)
+    me.accuracy = me.tolerance * (tol.SOFT_TOLERANCE if me.pivot < tol.SOFT else 1.0)
     counters.sweeps += 1
     counters.joints_left_still += now.first_free
     me.before, me.tries, me.fraction = now.energy, 0, 1.0
@@ -39,7 +56,7 @@ def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> Non
     if now.first_free > 0 and not definite:
         now.first_free = 0
         next_iteration(me, now)
-    elif definite and now.damping == 0.0 and me.decrement <= max(me.tolerance * me.scale, me.noise):
+    elif definite and now.damping == 0.0 and me.decrement <= max(me.accuracy * me.scale, me.noise):
         me.phase = LAST
     elif definite and now.damping > 0.0 and me.decrement <= me.noise and now.released < tol.SEARCHES:
         me.phase = ALONE
@@ -71,8 +88,8 @@ def take(me: Any, now: Any, number: Any, lane: int) -> None:
     missed = now.energy - trial - me.decrement
     now.energy = trial
     if me.phase == SEARCH:
-        foretold = tol.FORETOLD * missed * missed <= me.tolerance * me.scale * me.decrement
-        me.phase = FORETOLD if foretold and now.damping == 0.0 else TAKEN
+        foretold = tol.FORETOLD * missed * missed <= me.accuracy * me.scale * me.decrement
+        me.phase = FORETOLD if foretold and now.damping == 0.0 and whole(now, me) else TAKEN
 
 
 @kernel
@@ -119,7 +136,7 @@ def after_costate(me: Any, now: Any, counters: Any, number: Any, lane: int) -> N
     if me.phase not in (LAST, JUDGE, FORETOLD):
         return
     rests = number[MOMENT, lane] <= tol.MOMENT * number[LARGEST, lane]
-    if rests and me.phase != JUDGE:
+    if rests and me.phase != JUDGE and whole(now, me):
         counters.starts_at_rest += me.phase == LAST and now.iterations == 0
         now.iterations += me.phase == FORETOLD
         me.outcome, me.phase = CONVERGED, RESTED

@@ -11,14 +11,14 @@ from solver._kernels import data
 from solver._kernels.bare import bare
 from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
-from solver._kernels.flags import kernel, merged, released
-from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
+from solver._kernels.flags import inlined, kernel, merged, released
+from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
 from solver._kernels.lane_decide import ALONE, DONE, IDLE, READY, RESTED, STOPPED, SWEEP
 from solver._kernels.lane_relax import Team, do_round, hand_over, take_over
 from solver._kernels.lanes import WIDTH, in_lanes
-from solver._kernels.minimise import begin
+from solver._kernels.minimise import begin, shape_of
 from solver._kernels.newton_method import rests
 from solver._kernels.start import extrapolate_start
 
@@ -29,7 +29,7 @@ class Plan(NamedTuple):
     goal : (WIDTH, d, 2) depth, mm, and roll, degrees.     count : (WIDTH,) how many of them.
     row : (WIDTH, d) where a solution's joints begin in x, r and force, (WIDTH, rows, ...).
     ended : (WIDTH, d, 3) outcome, iterations, segments.     place, report, energies, counters : (WIDTH, d) records.
-    blank : (1,), counters at 0.
+    snaps : (WIDTH, d, n) records.     blank : (1,), counters at 0.
     """
 
     goal: Any
@@ -43,6 +43,7 @@ class Plan(NamedTuple):
     report: Any
     energies: Any
     counters: Any
+    snaps: Any
     blank: Any
 
 
@@ -105,7 +106,7 @@ def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
         hand_over(team, raw, lane, problem, report)
     while me.phase != IDLE:
         if relaxed:
-            end_step(me, now, wire, problem)
+            end_step(me, now, wire, problem, levenbergs(team, lane))
         depth, roll = plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1]
         relaxed = False
         if me.phase == STOPPED or arrived(at, depth, roll):
@@ -114,15 +115,21 @@ def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
             continue
         me.depth, me.roll = next_place(wire, depth, roll)
         me.k = set_out(wire, me.depth, me.roll)
-        me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
+        me.outcome, now.iterations, now.energy, me.held = data.CONVERGED, 0, 0.0, levenbergs(team, lane)
         if me.k > 0 and start_relaxing(me, now, wire, problem, report):
             shift = raw.length.shape[0] - me.k
             fill_up(raw, lane, problem, min(me.filled, shift) if me.roll == me.clamped else 0, shift)
-            take_over(team, raw, lane, problem)
+            take_over(team, raw, lane, problem, report)
             me.filled, me.clamped, me.stiffest = shift, me.roll, stiffest(problem.chain, me.k)
             me.phase = SWEEP if me.allowed > 0 else ALONE
             return
         relaxed = True
+
+
+@inlined
+def levenbergs(team: Team, lane: int) -> int:
+    """How often a wire was held back on its way to a depth, in its lane and alone."""
+    return int(team.counts[lane].levenberg + team.wires[lane].problem.scratch.counters[0].levenberg)
 
 
 @merged
@@ -134,7 +141,7 @@ def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) 
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
     begin(now, start, energy_of(problem, start))
-    report.start = now.energy
+    report.start, report.pivot = now.energy, 1.0
     resting = rests(problem, k, now)
     if resting:
         forget_forces(report)
@@ -147,14 +154,14 @@ def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) 
 
 
 @merged
-def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
+def end_step(me: Any, now: Any, wire: Any, problem: Problem, levenberg: int) -> None:
     """Keep a step or take it back, as in ``minimise.relax_with_friction``, ``insertion.step`` and ``go``."""
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
     if me.k > 0 and me.outcome == data.CONVERGED:
-        folded = least_turn_cosine(problem.state.r[CURRENT], me.k) < tol.FOLD_COSINE
-        me.outcome = data.FOLDED if folded else me.outcome
+        me.outcome = shape_of(problem, CURRENT, me.k)
     me.iterations += now.iterations
-    outcome = settle(wire, (me.depth, me.roll), me.k, me.outcome, now.energy, 0)
+    hard = now.iterations > tol.EASY or levenberg > me.held
+    outcome = settle(wire, (me.depth, me.roll, now.energy), me.k, me.outcome, 0, hard)
     goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
 
@@ -165,7 +172,7 @@ def write_down(team: Team, plan: Plan, number: Any, lane: int) -> None:
     me, wire = team.lanes[lane], team.wires[lane]
     state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
     wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)
-    k = sum_up(wire)
+    k = sum_up(wire, 0)
     counted = team.counts[lane]
     counters.sweeps += counted.sweeps
     counters.rollouts += counted.rollouts
@@ -180,6 +187,8 @@ def write_down(team: Team, plan: Plan, number: Any, lane: int) -> None:
     plan.ended[lane, goal, 0], plan.ended[lane, goal, 1], plan.ended[lane, goal, 2] = me.outcome, me.iterations, k
     plan.place[lane, goal], plan.report[lane, goal] = wire.place[0], wire.report[0]
     plan.energies[lane, goal], plan.counters[lane, goal] = state.energies[CURRENT], counters
+    for n in range(wire.place[0].snaps):
+        plan.snaps[lane, goal, n] = wire.problem.scratch.snaps[n]
     x, r, row = state.x[CURRENT], state.r[CURRENT], plan.row[lane, goal]
     for n in range(k + 1):
         for a in range(3):

@@ -3,6 +3,7 @@
 A joint has two controls, so that what is a matrix of three rows there is two rows here, one for each of them.
 """
 
+import math
 from typing import Any
 
 from solver import _tolerances as tol
@@ -39,6 +40,7 @@ from solver._kernels.lane_block import (
     DEFINITE,
     LARGEST,
     MOMENT,
+    PIVOT,
     START,
     STIFFNESS,
     WEIGHT,
@@ -148,7 +150,7 @@ def sweep(b: Block, first: Any, base: int) -> None:
     """``newton.sweep`` of every lane, from the tip to joint ``base``: the gains, and what they foretell."""
     k, u, r, damping, start = b.length.shape[0], b.u[CURRENT], b.r[CURRENT], b.number[DAMPING], b.number[START]
     zero, touch = spread(0.0), b.touch
-    value, decrement, definite = at_tip(b, k, load9(r, k)), zero, zero == 0.0
+    value, decrement, definite, lowest = at_tip(b, k, load9(r, k)), zero, zero == 0.0, spread(math.inf)
     for n in range(k, base, -1):
         j = n - 1
         frame, bend, v = load9(r, n), b.bend[j], (u[j, 0], u[j, 1], zero)
@@ -162,6 +164,7 @@ def sweep(b: Block, first: Any, base: int) -> None:
         q_uu, q_up, q_ur, moment = joint_rows(bend * (1.0 + 0.01 * damping), v, value)
         floor, least, free = tol.CURVATURE_FLOOR * bend, least_bending(q_uu), start <= float(j)
         definite = definite & ((least > -floor) | ~free)
+        lowest = select(free & (least < lowest * bend), least / bend, lowest)
         more = select(least < floor, 2 * floor, zero)
         q_uu = (q_uu[0] + more, q_uu[1] + more, zero, q_uu[3], zero, zero)
         w = (moment[0] + bend * v[0], moment[1] + bend * v[1])
@@ -170,7 +173,7 @@ def sweep(b: Block, first: Any, base: int) -> None:
         feed = gains[0]
         decrement = decrement - select(free, 0.5 * (w[0] * feed[0] + w[1] * feed[1]), zero)
         value = cross_joint(turn_of(b, j, v), value, (q_up, q_ur), gains)
-    b.number[DECREMENT], b.number[DEFINITE] = decrement, select(definite, 1.0, 0.0)
+    b.number[DECREMENT], b.number[DEFINITE], b.number[PIVOT] = decrement, select(definite, 1.0, 0.0), lowest
 
 
 @kernel

@@ -44,8 +44,8 @@ loses an eighth of one."""
 class Team(NamedTuple):
     """Wires side by side.
 
-    wires : a handle for each lane.     lanes, nows, counts : (WIDTH,) records of ``lane_block.LANE``, ``data.DESCENT``
-    and ``data.COUNTERS``.     first : (size + 2,) first look-up point of each node.
+    wires : a handle for each lane.     lanes, nows, counts : (WIDTH,) records ``lane_block.LANE``, ``DESCENT`` and
+    ``COUNTERS`` of ``records``.     first : (size + 2,) first look-up point of each node.
     """
 
     wires: Any
@@ -155,19 +155,19 @@ def hand_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     problem.scratch.descent[0] = team.nows[lane]
     parts = problem.state.energies[CURRENT]
     parts.bending, parts.wall, parts.load, parts.friction = me.bending, me.wall, me.load, 0.0
-    report.moment = raw.number[MOMENT, lane]
+    report.moment, report.pivot = raw.number[MOMENT, lane], me.pivot
     for a in range(3):
         report.force[a], report.torque[a] = raw.force[a, lane], raw.torque[a, lane]
         report.turned[0, a], report.turned[1, a] = raw.turned[0, a, lane], raw.turned[1, a, lane]
 
 
 @merged
-def take_over(team: Team, raw: Block, lane: int, problem: Problem) -> None:
+def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) -> None:
     """Take a wire's current state into its lane."""
     me, parts = team.lanes[lane], problem.state.energies[CURRENT]
     put_in(raw, team.first, lane, problem, me.k)
     team.nows[lane] = problem.scratch.descent[0]
-    me.bending, me.wall, me.load = parts.bending, parts.wall, parts.load
+    me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
 
 
 @kernel
@@ -186,5 +186,5 @@ def go_alone(team: Team, raw: Block, lane: int) -> None:
         copy_state(problem, now.slot, CURRENT, me.k)
         now.slot = CURRENT
     if me.outcome == UNFINISHED:
-        take_over(team, raw, lane, problem)
+        take_over(team, raw, lane, problem, report)
         next_iteration(me, team.nows[lane])

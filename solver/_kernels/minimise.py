@@ -10,7 +10,7 @@ from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
 from solver._kernels.data import CONVERGED, FOLDED, FRICTION, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import merged
+from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.friction import take_loads
 from solver._kernels.newton import costate
@@ -28,7 +28,7 @@ def minimise(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -
     """
     now = problem.scratch.descent[0]
     begin(now, slot, energy_of(problem, slot))
-    report.start = now.energy
+    report.start, report.pivot = now.energy, 1.0
     if limits.method == NEWTON and newton_method.rests(problem, k, now):
         forget_forces(report)
         return CONVERGED, 0, now.slot, now.energy
@@ -65,8 +65,6 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
     counters.relaxations_without_friction += not rubs
     counters.relaxations_without_twist += not problem.twisting
     if rubs:
-        for p in range(problem.friction.load.size):
-            problem.friction.load[p] = 0.0
         take_loads(problem, slot, k)
     outcome, iterations, energy = FRICTION, 0, 0.0
     cost = k + problem.chain.first[k + 1]
@@ -83,6 +81,14 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
         if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
             break
         outcome = FRICTION
-    if outcome == CONVERGED and least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
-        outcome = FOLDED
-    return outcome, iterations, energy
+    return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, energy
+
+
+@kernel
+def shape_of(problem: Problem, slot: int, k: int) -> int:
+    """Judge the shape of a wire at rest: NON_FINITE, FOLDED, or CONVERGED where there is nothing wrong with it."""
+    tip = problem.state.x[slot, k]
+    # whatever is undefined along the wire is so at its tip
+    if not math.isfinite(tip[0] + tip[1] + tip[2]):
+        return NON_FINITE
+    return FOLDED if least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE else CONVERGED

@@ -44,6 +44,7 @@ from solver._kernels.blocks import (
     node_gradient,
     node_hessian,
     note_direction,
+    note_pivot,
     solve_block,
     stiffened,
     store_gains,
@@ -119,7 +120,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
     bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
     value = (ZERO6, ZERO9, ZERO6, ZERO3, ZERO3)
-    decrement = 0.0
+    decrement, lowest = 0.0, math.inf
     for n in range(k, first_free, -1):
         j = n - 1
         frame = load9(state.r[slot], n)
@@ -134,6 +135,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
         q_uu = joint_hessian(chain, j, u, jac, (h, g), twisting, 0.01 * damping)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
+        lowest = min(lowest, least / bend[j])
         if not least > -floor:
             note_direction(q_uu, j, least, report)
             return False
@@ -150,6 +152,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
         value = cross_joint(turn(rest[j], u), value, q_up, q_ur, (feed, gain_p, gain_r))
     report.decrement = decrement
+    note_pivot(lowest, first_free, damping, report)
     return math.isfinite(decrement)
 
 

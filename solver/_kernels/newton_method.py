@@ -3,7 +3,7 @@
 The step comes from ``newton``, and the total energy decides whether it is taken, in part, or after a few whole ones.
 
 Where it does not help, Levenberg's term holds the wire back; where the Hessian is not positive and no force is left,
-the wire is led out of its saddle. now is the record ``data.DESCENT``: the current state and its
+the wire is led out of its saddle. now is the record ``records.DESCENT``: the current state and its
 energy; a trial is in the other slot.
 """
 
@@ -15,18 +15,12 @@ from solver._kernels.algebra import ZERO3, load3, store3
 from solver._kernels.crossing import admissible
 from solver._kernels.data import CONVERGED, STALLED, UNFINISHED, Problem
 from solver._kernels.energy import energy_of, noise_of, scale_of, stiffest, total_energy
-from solver._kernels.flags import cached, kernel, merged
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import at_rest, rounding_moment, unloaded
 from solver._kernels.newton import costate, sweep
-from solver._kernels.rollout import copy_base, place, rollout
-
-
-@kernel
-def step(problem: Problem, slot: int, first_free: int, k: int, fraction: float) -> float:
-    """Take a fraction of Newton's step; return the energy of the trial state, N mm."""
-    rollout(problem, slot, first_free, k, fraction)
-    problem.scratch.counters[0].rollouts += 1
-    return total_energy(problem, 1 - slot, first_free, k)
+from solver._kernels.rollout import copy_base, place
+from solver._kernels.saddle import off_saddle
+from solver._kernels.trial import step
 
 
 @kernel
@@ -76,29 +70,6 @@ def watchdog(problem: Problem, k: int, now: Any, rise: float, report: Any) -> bo
     sweep(problem, start, 0, k, 0.0, report)
     counters.sweeps += 1
     return False
-
-
-@merged
-def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) -> float:
-    """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
-    j, slot, gain = int(report.joint), now.slot, problem.scratch.gain
-    for a in range(3):
-        for b in range(7):
-            gain[j, a, b] = 0.0
-    for i in range(j + 1, k):
-        gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
-    size, least = 0.3, 0.1 * abs(report.curvature)
-    # joints further on may answer with a thousand times as much: nothing but rounding ends the search
-    while least * size * size > noise:
-        for side in (1.0, -1.0):
-            for a in range(2):
-                gain[j, a, 0] = side * size * report.bend[a]
-            gain[j, 2, 0] = side * size * report.twist
-            trial = step(problem, slot, j, k, 1.0)
-            if trial < now.energy - least * size * size and admissible(problem, slot, k):
-                return trial
-        size *= 0.25
-    return math.inf
 
 
 @merged
@@ -201,6 +172,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     definite = sweep(problem, now.slot, now.first_free, k, now.damping, report)
     counters.sweeps += 1
     counters.joints_left_still += now.first_free
+    tolerance *= tol.SOFT_TOLERANCE if report.pivot < tol.SOFT else 1.0
     scale = scale_of(problem, now.slot, k)
     noise = noise_of(problem, now.slot, scale)
     if now.first_free > 0 and not definite:
@@ -211,11 +183,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         if outcome != UNDECIDED:
             return outcome
     if definite and now.damping > 0.0 and report.decrement <= noise and now.released < tol.SEARCHES:
-        # nothing left to gain with the wire held back: look at it free, then held less, before it is judged
-        damped_polish(problem, k, now, noise, report)
-        now.damping, now.patience, now.released = 0.0, 0, now.released + 1
-        now.last_damping *= tol.SOFTER
-        return UNFINISHED
+        return release(problem, k, now, noise, report)
     trial = math.inf
     if definite:
         trial = search(problem, k, now, 1.0, noise, report)
@@ -227,13 +195,23 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
     elif now.damping == 0.0:
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):
-            trial = leave_saddle(problem, k, now, noise, report)
+            nearly = abs(report.curvature) <= tol.NEUTRAL * stiffest(problem.chain, k)
+            trial = off_saddle(problem, k, now, noise, report)
             if trial == math.inf:
-                # the way down is shorter than rounding can tell
-                return CONVERGED
+                # the way down is shorter than rounding can tell, unless it is steep, or the sweep overflowed
+                return CONVERGED if nearly else STALLED
     if trial <= now.energy:
         return take(problem, k, now, trial, definite and now.damping == 0.0, tolerance, report)
     return hold_back(problem, k, now, report)
+
+
+@merged
+def release(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int:
+    """Nothing is left to gain with the wire held back: look at it free, then held less, before it is judged."""
+    damped_polish(problem, k, now, noise, report)
+    now.damping, now.patience, now.released = 0.0, 0, now.released + 1
+    now.last_damping *= tol.SOFTER
+    return UNFINISHED
 
 
 @merged
@@ -243,7 +221,7 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
     last_step(problem, k, now, noise, report)
     if now.iterations == 0 and not problem.skips.rest:
         return UNFINISHED
-    if at_rest(problem, now.slot, k, report):
+    if whole(now, report) and at_rest(problem, now.slot, k, report):
         problem.scratch.counters[0].starts_at_rest += now.iterations == 0
         return CONVERGED
     if now.first_free > 0:
@@ -257,13 +235,19 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
     return UNFINISHED if now.energy < before else UNDECIDED
 
 
+@inlined
+def whole(now: Any, report: Any) -> bool:
+    """Whether the last sweep says enough of the whole wire: of all joints, or of a wire that is not soft."""
+    return bool(now.first_free == 0 or report.pivot > tol.SOFT)
+
+
 @merged
 def take(problem: Problem, k: int, now: Any, trial: float, free: bool, tolerance: float, report: Any) -> int:
     """Take the step to the trial state, of energy ``trial``. free : Newton's own step, not held back."""
     missed = now.energy - trial - report.decrement
     foretold = tol.FORETOLD * missed * missed <= tolerance * scale_of(problem, now.slot, k) * report.decrement
     now.slot, now.energy = 1 - now.slot, trial
-    if foretold and free:
+    if foretold and free and whole(now, report):
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):
             now.iterations += 1

@@ -32,6 +32,7 @@ from solver._kernels.blocks import (
     node_gradient,
     node_hessian,
     note_direction,
+    note_pivot,
     stiffened,
     store_gains,
 )
@@ -149,7 +150,7 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
     """``newton.sweep`` of a straight wire; same arguments, gains, report and result."""
     chain, gain = problem.chain, problem.scratch.gain
     bend, length, controls, frames = chain.bend, chain.length, problem.state.u[slot], problem.state.r[slot]
-    value, decrement = (ZERO6, ZERO6, ZERO3, ZERO3, (0.0, 0.0)), 0.0
+    value, decrement, lowest = (ZERO6, ZERO6, ZERO3, ZERO3, (0.0, 0.0)), 0.0, math.inf
     for n in range(k, first_free, -1):
         j = n - 1
         frame, u = load9(frames, n), (controls[j, 0], controls[j, 1])
@@ -159,6 +160,7 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
         value = cross_segment(length[j], add_node(value, gradient, hessian, held))
         turn, q_uu = joint_block(bend[j] * (1.0 + 0.01 * damping), u, value)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, False)
+        lowest = min(lowest, least / bend[j])
         # written so that NaN, from an overflow in a long compressed chain, fails too
         if not least > -floor:
             note_direction(q_uu, j, least, report)
@@ -170,4 +172,5 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
         store_gains(gain, j, gains)
         decrement -= fall
     report.decrement = decrement
+    note_pivot(lowest, first_free, damping, report)
     return math.isfinite(decrement)

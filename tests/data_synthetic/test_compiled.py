@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from data_synthetic import _compile
-from data_synthetic.scanner import phantom
+from data_synthetic.scanner import coverage
 
 PACKAGE = Path(_compile.__file__).parent
 
@@ -16,5 +16,5 @@ def test_every_compiled_function_is_kept_by_the_one_mechanism() -> None:
 
 
 def test_a_caller_depends_on_the_files_of_what_it_calls() -> None:
-    behind = {str(p.relative_to(PACKAGE)) for p in _compile.sources_of(Path(phantom.__file__))}
-    assert {"scanner/phantom.py", "anatomy/_kernels.py", "geometry.py"} <= behind
+    behind = {str(p.relative_to(PACKAGE)) for p in _compile.sources_of(Path(coverage.__file__))}
+    assert {"scanner/coverage.py", "anatomy/_kernels.py", "geometry.py"} <= behind

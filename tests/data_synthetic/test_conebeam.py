@@ -10,9 +10,10 @@ import pytest
 pytest.importorskip("itk", reason="needs the extra [conebeam]")
 
 from data_synthetic.anatomy.tubes import Anatomy, sweep
-from data_synthetic.geometry import ScanGrid, centred_grid
+from data_synthetic.geometry import ScanGrid
 from data_synthetic.scanner import Greys, Phantom
 from data_synthetic.scanner.conebeam import Arc, ConeBeamScanner
+from tests.data_synthetic.grids import centred_grid
 
 ARC = Arc(projections=60, pixels=96, photons=1e5)
 VESSEL = Anatomy((sweep("v", [[5.0, -3.0, -20.0], [5.0, -3.0, 24.0]], 2.5),))

@@ -9,9 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from data_synthetic.anatomy.tubes import Anatomy, ball, sweep
-from data_synthetic.geometry import ScanGrid, centred_grid
+from data_synthetic.geometry import ScanGrid
 from data_synthetic.scanner import Greys, Phantom, PsfScanner
-from data_synthetic.scanner.phantom import bone_coverage, lumen_coverage, splat, wire_particles
+from data_synthetic.scanner.coverage import bone_coverage, lumen_coverage, splat, wire_particles
+from tests.data_synthetic.grids import centred_grid
 from tests.naive.tubes import inside_share
 
 QUIET = Greys(noise=0.0, drift=0.0)
@@ -76,7 +77,7 @@ def test_noise_has_the_sd_asked_for_and_its_correlation(grid: ScanGrid, vessel: 
 
 def test_bone_keeps_its_gap(grid: ScanGrid, vessel: Anatomy) -> None:
     bone = Anatomy((ball("bone", [4.0, 0.0, 0.0], 3.5),))
-    share = bone_coverage(bone, vessel, 1.2, grid)
+    share = bone_coverage(Phantom(vessel, bone=bone), grid)
     assert share.max() == 1.0
     index = np.argwhere(share > 0.5)
     assert vessel.distance(grid.to_mm(index)).min() > 1.15

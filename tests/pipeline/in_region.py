@@ -24,7 +24,7 @@ def box_lumen(volume: Volume, low_mm: ArrayLike, high_mm: ArrayLike) -> Lumen:
         depths.append(depth.reshape([-1 if a == axis else 1 for a in range(3)]))
     depth = np.minimum(np.minimum(depths[0], depths[1]), depths[2])
     distance = Grid((-depth).astype(np.float32), volume.spacing_mm, volume.to_mm(low), volume.direction)
-    return Lumen(distance, distance.with_values(np.ones(distance.shape, np.uint8)))
+    return Lumen(distance)
 
 
 def trace_region(

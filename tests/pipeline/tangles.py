@@ -80,7 +80,7 @@ def tank(points, margin=3.0):
     x = index * VOXEL
     depth = np.minimum(x - low, high - x).min(axis=-1)
     distance = Grid((-depth).astype(np.float32), [VOXEL] * 3, origin)
-    return origin, shape, Lumen(distance, distance.with_values((depth > 0).astype(np.uint8)))
+    return origin, shape, Lumen(distance)
 
 
 def clean_frame(wire: Tangle, origin, shape):

@@ -33,7 +33,7 @@ def check(outcomes: dict[int, batch.Outcome[int, None]], folder: Path) -> None:
     assert outcomes[2].error == "RuntimeError: burst pipe"
     assert "in work" in outcomes[2].log
     assert outcomes[3].error == LOST
-    assert [job for job, outcome in sorted(outcomes.items()) if outcome.done] == [0, 1, 4, 5, 6, 7]
+    assert [job for job, outcome in sorted(outcomes.items()) if not outcome.error] == [0, 1, 4, 5, 6, 7]
     assert sorted(p.name for p in folder.glob("done *")) == [f"done {j}" for j in (0, 1, 4, 5, 6, 7)]
 
 
@@ -75,4 +75,4 @@ def test_one_worker_runs_here_and_in_order(tmp_path: Path) -> None:
     seen: list[int] = []
     outcomes = list(run_all([3, 1, 2], seen.append))
     assert seen == [3, 1, 2]
-    assert all(outcome.done for outcome in outcomes)
+    assert all(not outcome.error for outcome in outcomes)

@@ -75,7 +75,7 @@ def test_a_curve_is_cut_or_continued_straight() -> None:
 
 def open_space() -> Lumen:
     grid = Grid(np.full((40, 40, 40), -5.0, np.float32), np.ones(3), np.full(3, -10.0))
-    return Lumen(grid, grid.with_values(np.ones((40, 40, 40), np.uint8)))
+    return Lumen(grid)
 
 
 def simulated(joints: np.ndarray) -> Solution:
@@ -124,7 +124,7 @@ def test_tips_with_a_wall_between_them_are_in_different_branches() -> None:
     values = np.full((40, 40, 40), -3.0, np.float32)
     values[:, 18:22, :] = 2.0
     grid = Grid(values, np.ones(3), np.array([0.0, -20.0, -20.0]))
-    lumen = Lumen(grid, grid.with_values((values < 0).astype(np.uint8)))
+    lumen = Lumen(grid)
     assert not compare(simulated(line(20.0, 4.0)), traced(line(20.0, -4.0)), lumen)["branch_ok"]
     assert compare(simulated(line(20.0, 4.0)), traced(line(20.0, 5.0)), lumen)["branch_ok"]
 

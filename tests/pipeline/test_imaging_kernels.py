@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -11,7 +13,7 @@ from pipeline.arrays.jets import Blurred, jet
 from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.surface import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
-from pipeline.trace.tube import Tube, TubeData, fit_tube, predicted, sampled, sampling, tint_nodes
+from pipeline.trace.tube import Tube, fit_tube, predicted, sampled, sampling, tint_nodes
 
 
 def test_spline_derivatives_are_those_of_its_value():
@@ -78,10 +80,11 @@ def test_tube_fit_finds_a_noise_free_tube_again():
     truth = Tube(controls, np.full(tint_nodes(6), 700.0), 0.27, 0.0)
     shape = (30, 30, 40)
     grey = np.zeros(shape, np.float32)
-    voxels, model = predicted(TubeData(grey, spacing, 1.0), truth)
+    image = SimpleNamespace(grey=grey, spacing=spacing, noise=1.0, voxel=0.3)
+    voxels, model = predicted(image, truth)
     grey.reshape(-1)[voxels] = model
     start = Tube(controls + 0.2 * np.sin(np.arange(27)).reshape(9, 3), truth.tint * 0.8, 0.3, 0.0)
-    fit = fit_tube(TubeData(grey, spacing, 1.0), start, iterations=30, tolerance=1e-4)
+    fit = fit_tube(image, start, iterations=30, tolerance=1e-4)
     u = np.linspace(0, 6, 60)
     dense, found = truth.at(np.linspace(0, 6, 6000)), fit.at(u)
     off = np.min(np.linalg.norm(found[:, None] - dense[None], axis=2), axis=1)

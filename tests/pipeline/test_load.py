@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pydicom
 import pytest
 import SimpleITK as sitk
 
@@ -119,6 +120,24 @@ def test_a_key_opens_no_header_of_a_series(tmp_path: Path, monkeypatch: pytest.M
     assert file_hash(tmp_path) == file_hash(tmp_path)
 
 
+def test_a_format_from_outside_says_what_else_belongs_to_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Vox:
+        """Voxels in a .vox file, their geometry in a .json beside it."""
+
+        @staticmethod
+        def parts(path: Path) -> tuple[Path, ...]:
+            return (path.with_suffix(".json"),) if path.suffix == ".vox" else ()
+
+    monkeypatch.setattr("pipeline.load.FORMATS", (Vox,))
+    (tmp_path / "a.vox").write_bytes(b"voxels")
+    (tmp_path / "a.json").write_text("1")
+    before = file_hash(tmp_path / "a.vox")
+    (tmp_path / "a.json").write_text("22")
+    assert file_hash(tmp_path / "a.vox") != before
+
+
 def test_loaded_voxels_outlive_the_image_that_holds_them(tmp_path: Path) -> None:
     sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
     volumes = [load(read_header(tmp_path / "scan.mha")) for _ in range(3)]
@@ -171,6 +190,21 @@ def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -
         read_header(Source(path, "/wrong"))
 
 
+@pytest.mark.parametrize(
+    ("damage", "found"),
+    [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "cannot reshape")],
+)
+def test_a_damaged_hdf5_file_is_said(tmp_path: Path, damage: object, found: str) -> None:
+    path = tmp_path / "study.h5"
+    with h5py.File(path, "w") as file:
+        spacing = SPACING if damage else SPACING[:2]
+        file.create_dataset("volume", data=numbered().T).attrs["spacing_mm"] = spacing
+    if callable(damage):
+        damage(path)
+    with pytest.raises(LoadError, match=rf"study\.h5: .*({found}).*Check that the file is complete"):
+        read_header(path)
+
+
 def test_a_four_dimensional_file_is_a_sequence(tmp_path: Path) -> None:
     both = sitk.JoinSeries([image_of(numbered(), np.eye(3)), image_of(numbered() + 1, np.eye(3))])
     sitk.WriteImage(both, str(tmp_path / "both.nrrd"))
@@ -208,6 +242,27 @@ def test_a_dicom_series_is_sorted_by_position(tmp_path: Path) -> None:
     np.testing.assert_allclose(header.origin_mm, ORIGIN)
     np.testing.assert_array_equal(load(header).values, numbered())
     np.testing.assert_array_equal(load(header, ((1, 2, 3), (4, 6, 8))).values, numbered()[1:4, 2:6, 3:8])
+
+
+@pytest.mark.parametrize("content", [b"", b"no DICOM", None])
+def test_a_damaged_slice_is_named_wherever_it_lies(tmp_path: Path, content: bytes | None) -> None:
+    """Without its last slice a series is a shorter one, in which nothing is missing."""
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    last = tmp_path / "series" / f"slice{(8 * 7) % 11:02d}.dcm"
+    last.write_bytes(last.read_bytes()[:200] if content is None else content)
+    with pytest.raises(LoadError, match=rf"1 of its files cannot be read as DICOM: {last.name}"):
+        read_header(tmp_path / "series")
+
+
+def test_contours_beside_the_slices_are_no_damaged_slice(tmp_path: Path) -> None:
+    """The archive of a planning system holds an RTSTRUCT in the folder of its slices; GDCM lists it in no series."""
+    write_series(tmp_path / "series", numbered(), straight_stack())
+    contours = pydicom.Dataset()
+    contours.SOPClassUID, contours.SOPInstanceUID = "1.2.840.10008.5.1.4.1.1.481.3", "1.2.3.4"
+    contours.file_meta = pydicom.dataset.FileMetaDataset()
+    contours.file_meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+    contours.save_as(tmp_path / "series" / "RS.dcm", enforce_file_format=True)
+    np.testing.assert_array_equal(load(read_header(tmp_path / "series")).values, numbered())
 
 
 def test_a_missing_slice_is_named(tmp_path: Path) -> None:

@@ -61,3 +61,10 @@ def test_two_stacks_in_one_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "scan.dcm").write_bytes(enhanced(twice, SPACING, straight_stack() * 2))
     with pytest.raises(LoadError, match="repeated position"):
         read_header(tmp_path / "scan.dcm", LoadConfig(resample=True))
+
+
+def test_a_damaged_file_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "scan.dcm"
+    path.write_bytes(enhanced(numbered(), SPACING, straight_stack())[:-100])
+    with pytest.raises(LoadError, match=r"cannot read .*scan\.dcm.*\n.*Check that the file is complete"):
+        read_header(path)

@@ -14,7 +14,7 @@ VOXEL, RADIUS, BEND = 0.4, 2.0, 15.0
 
 def lumen_of(distance: np.ndarray, origin: np.ndarray) -> Lumen:
     grid = Grid(distance.astype(np.float32), np.full(3, VOXEL), origin)
-    return Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+    return Lumen(grid)
 
 
 @pytest.fixture(scope="module")

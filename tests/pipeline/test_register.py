@@ -12,7 +12,7 @@ from data_synthetic.catalogue.study import Study
 from data_synthetic.scanner import PsfScanner
 from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Motion, Registration, anchor, register
-from pipeline.register.frames import place_of, record, said
+from pipeline.register.frames import alignment_of, record, sentences_of
 from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion
 from pipeline.segment import segment
@@ -81,8 +81,8 @@ def test_a_small_motion_is_measured_said_and_not_applied(
     assert not found.applied
     assert found.moved_voxels == pytest.approx(voxels, abs=0.05)
     np.testing.assert_array_equal(found.motion.rotation, np.eye(3))
-    place = place_of(lumen, fixed.reference, SKIP, switched_on=True, own_curves=False)
-    texts, warnings = said(place, {0: found})
+    alignment = alignment_of(lumen, fixed.reference, SKIP, switched_on=True, own_curves=False)
+    texts, warnings = sentences_of(alignment, {0: found})
     assert texts[0].startswith("no registration applied to 1 of 1 frames: the phantom moved 0.0")
     assert not warnings
 
@@ -139,8 +139,8 @@ def test_what_is_not_registered_is_said(
     fixed: Anchor, lumen: Lumen, register_: str, reference: bool, own: bool, reason: str
 ) -> None:
     scan = fixed.reference if reference else None
-    place = place_of(lumen, scan, SKIP, switched_on=register_ == "auto", own_curves=own)
-    texts, _ = said(place, {})
+    alignment = alignment_of(lumen, scan, SKIP, switched_on=register_ == "auto", own_curves=own)
+    texts, _ = sentences_of(alignment, {})
     assert texts[0].startswith("no registration applied: ")
     assert reason in texts[0]
 

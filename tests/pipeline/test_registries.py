@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +14,68 @@ import pytest
 from pipeline.arrays.polyline import to_length
 from pipeline.cli import main
 from pipeline.compare import metrics, nulls
+from pipeline.compare.metrics import Pair
 from pipeline.compare.nulls import Clues
 from pipeline.model import Array
+from pipeline.run.case import Job
+from pipeline.study.manifest import read_manifest
+from pipeline.study.settings import resolve
 from reports.schema import ERRORS, SUMMARY, Column
+
+MANIFEST = """
+schema = 1
+[wires.w]
+radius_mm = 0.18
+bending_stiffness_N_mm2 = 10.0
+[[case]]
+id = "tube"
+lumen = "none.stl"
+entry_mm = [0.0, 0.0, 0.0]
+entry_direction = [0.0, 0.0, 1.0]
+wire = "w"
+insertion_mm = [6.0]
+"""
+
+
+def test_a_metric_that_raises_is_named() -> None:
+    with pytest.raises(RuntimeError, match="metric 'near_share': ZeroDivisionError: division by zero"):
+        metrics.measured("near_share", lambda _: 1 / 0, None)  # type: ignore[arg-type]
+
+
+def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path) -> None:
+    """Its module is a file outside, or none at all, as in a notebook."""
+    keys = set()
+    for where, text in ((tmp_path / "own.py", "pair.error_mm.max()"), (tmp_path / "gone.py", "pair.error_mm.min()")):
+        source = f"own = lambda pair: float({text})"
+        where.write_text(source)
+        names: dict[str, Any] = {}
+        exec(compile(source, where, "exec"), names)
+        if where.stem == "gone":
+            where.unlink()
+        metrics.METRICS["own_mm"] = names["own"]
+        keys.add(job_key(tmp_path))
+    assert len(keys) == 2
+    assert job_key(tmp_path) in keys
+
+
+class Scaled:
+    """A metric that is no function."""
+
+    def __call__(self, pair: Pair) -> float:
+        return 2.0 * float(pair.error_mm.max())
+
+
+@pytest.mark.parametrize("metric", [partial(lambda factor, _: factor, 2.0), Scaled(), len])
+def test_whatever_can_be_called_may_be_a_metric(as_before: None, tmp_path: Path, metric: Any) -> None:
+    metrics.METRICS["own_mm"] = metric
+    assert job_key(tmp_path) == job_key(tmp_path)
+
+
+def job_key(folder: Path) -> str:
+    """Key of a case without files."""
+    manifest = folder / "manifest.toml"
+    manifest.write_text(MANIFEST)
+    return Job(read_manifest(manifest).cases[0], resolve([]), folder).key
 
 
 @pytest.fixture

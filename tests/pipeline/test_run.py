@@ -14,10 +14,14 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.model import Curve
+from pipeline.run.aggregate import aggregate
+from pipeline.run.case import Job, run_case
+from pipeline.run.results import found_results
 from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
+from reports.html import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY
 from solver import Status
 
@@ -278,6 +282,13 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     assert main(["diff", str(worse), str(finished)]) == 0
 
 
+def test_a_folder_that_is_not_there_is_no_regression(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["diff", str(finished), str(tmp_path / "nothere")]) == 2
+    assert "nothere: no such folder" in capsys.readouterr().err
+
+
 def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     shutil.copytree(study, folder)
     text = (folder / "manifest.toml").read_text(encoding="utf-8")
@@ -362,10 +373,85 @@ def test_the_entry_is_inferred_where_the_wire_comes_in(study: Path, finished: Pa
     assert np.degrees(np.arccos(np.dot(found[1], case["entry_direction"]))) < 8.0
 
 
+def test_a_crash_in_a_sweep_is_said_and_counted(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def burst(job: Job) -> None:
+        if job.settings.config.simulate.wall_scale == 2.0:
+            raise RuntimeError("burst pipe")
+        run_case(job)
+
+    monkeypatch.setattr("pipeline.run.launch.run_case", burst)
+    assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2") == 1
+    said = capsys.readouterr()
+    assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
+    assert "1 crashed in the sweep" in said.out
+
+
+def test_a_damaged_result_hides_no_other(
+    finished: Path, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    (out / "cases" / "other").mkdir()
+    damaged = out / "cases" / "other" / "result.json"
+    damaged.write_text("{")
+    for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
+        assert main(words) == 1
+        said = capsys.readouterr()
+        assert f"{damaged}: " in said.err
+        assert "2 cases" in said.out
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
+    assert (out / "index.html").read_text(encoding="utf-8").count("a result file cannot be read") <= 1
+    damaged.rename(out / "cases" / "bifurcation" / "result.json")
+    assert run(study, out) == 0  # a case of the manifest is computed again
+
+
+SOUND = {"case": "other", "role": "", "group": "", "status": "ok", "sentence": "", "failures": []}
+COUNTS = {"case": "other", "status": "ok", "frames": 1, "frames_ok": 1}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[]",
+        '{"case": "other"}',
+        json.dumps(SOUND | {"frames": [], "summary": {}}),
+        json.dumps(SOUND | {"frames": [{}], "summary": COUNTS}),
+        json.dumps(SOUND | {"frames": [], "summary": COUNTS | {"frames": None}}),
+    ],
+)
+def test_a_result_with_other_contents_is_damaged(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "cases" / "other" / "result.json"
+    path.parent.mkdir(parents=True)
+    path.write_text(content)
+    (found,) = found_results(tmp_path)
+    assert found.status == "damaged"
+    assert str(path) in found.failures[0]["message"]
+    assert aggregate(tmp_path).cases_ok == 0
+    assert "other" in render_index(tmp_path).read_text(encoding="utf-8")
+
+
+def test_points_cut_short_hide_no_other_case(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
+    result = out / "cases" / "other" / "result.json"
+    result.write_text(result.read_text().replace('"bifurcation"', '"other"'))
+    points = out / "cases" / "other" / "points.csv.gz"
+    points.write_bytes(points.read_bytes()[:-200])
+    assert main(["report", str(out)]) == 1
+    assert "other: its page cannot be drawn" in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
         (["--set", "solver.segmnt_mm=1"], "did you mean 'segment_mm'"),
+        (["--set", "solver.segmnt_mm=1"], "1 problem in the settings; nothing was run"),
         (["--only", "bifurcatoin"], "did you mean 'bifurcation'"),
         (["--shard", "3/2"], "expected I/N"),
         (["--until", "simulat"], "did you mean 'simulate'"),

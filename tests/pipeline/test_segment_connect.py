@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.morphology import reconstruction
 
+from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import (
     Affinity,
     binomial_taps,
@@ -47,7 +48,7 @@ def noisy(seed, shape=(9, 10, 11)):
 @given(seed=st.integers(0, 10_000), adjacency=st.sampled_from([6, 26]), threshold=st.sampled_from([0.02, 0.3, 0.6]))
 def test_strengths_equal_naive_dijkstra_on_every_voxel(seed, adjacency, threshold):
     values = noisy(seed)
-    tables = estimate_affinity(LEVELS, 150.0, 300.0, scale=0)
+    tables = estimate_affinity(LEVELS, SegmentConfig(homogeneity_sigma=150.0, feature_sigma=300.0, scale=0))
     seeds = np.argwhere(values == values.max())[:1]
     offsets = neighbours(adjacency)
     got, order = strength_map(Grid(values), seeds, tables, threshold, offsets)
@@ -73,7 +74,7 @@ def test_the_flood_is_the_alpha_cut_of_the_strengths(adjacency):
 @pytest.mark.parametrize("shape", [(9, 10, 11), (25, 16, 30), (3, 2, 40)])
 def test_smoothing_tile_by_tile_is_smoothing_everything_first(scale, shape):
     values = noisy(scale, shape)
-    tables = estimate_affinity(LEVELS, scale=scale)
+    tables = estimate_affinity(LEVELS, SegmentConfig(scale=scale))
     whole = naive.smoothed(values, tables.taps)
     seeds = np.argwhere(whole == whole.max())[:1]
     offsets = neighbours(6)

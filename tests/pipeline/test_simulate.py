@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from pipeline.model import Clamp, Lumen
+from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import rolls
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
-from pipeline.study.manifest import Case, read_manifest
+from pipeline.study.manifest import Case, ManifestError, read_manifest
 from solver import Solution
 from solver.grid import Grid
 
@@ -43,13 +44,31 @@ def case(tmp_path: Path) -> Case:
 def wide_open() -> Lumen:
     """Space without a wall nearby: the rest shape shows."""
     grid = Grid(np.full((20, 20, 20), -30.0, np.float32), np.full(3, 2.0), np.full(3, -19.0))
-    return Lumen(grid, grid.with_values(np.ones((20, 20, 20), np.uint8)))
+    return Lumen(grid)
 
 
 def run(case: Case, roll: float, depths: tuple[float, ...] = (6.0, 12.0)) -> list[Solution]:
     clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis))
     insertion = insertion_of(case.wire, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
     return list(simulate(insertion, depths, [roll] * len(depths)))
+
+
+def test_a_study_can_give_the_wire_a_weight(case: Case) -> None:
+    """Sag of a free tip of 12 mm under its weight, beside what its hook does; beam theory to 1 %."""
+    heavy = replace(case.wire, weight_N_per_mm=1e-5, rest_curvature_per_mm=0.0, bending_stiffness_N_mm2=0.6)
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array(case.material_axis), np.array([0.0, 2.0, 0.0]))
+    insertion = insertion_of(heavy, case.wall, wide_open(), clamp, SolverConfig(segment_mm=0.5))
+    last = list(simulate(insertion, [12.0], [0.0]))[-1]
+    assert last.joints_mm[-1, 1] == pytest.approx(1e-5 * 12.0**4 / (8 * 0.6), rel=0.01)
+
+
+def test_a_weight_without_down_is_a_problem_of_the_manifest(tmp_path: Path) -> None:
+    path, weighed = tmp_path / "manifest.toml", MANIFEST.replace("radius_mm", "weight_N_per_mm = 8e-6\nradius_mm")
+    path.write_text(weighed)
+    with pytest.raises(ManifestError, match=r"case 'tube': down is missing: wire 'w' has a weight; \[0, 1, 0\]"):
+        read_manifest(path)
+    path.write_text(weighed.replace("wire = ", "down = [0, 1, 0]\nwire = "))
+    assert read_manifest(path).cases[0].down == (0.0, 1.0, 0.0)
 
 
 def test_positive_rest_curvature_bends_towards_the_material_axis(case: Case) -> None:
@@ -91,3 +110,22 @@ def test_scales_reach_the_wire(case: Case) -> None:
 def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:
     assert rolls(15.0, 2) == (15.0, 15.0)
     assert rolls((10.0, 20.0), 2) == (10.0, 20.0)
+
+
+def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:
+    """Two vessels with 0.6 mm between them, and a tip that is bent towards the other one."""
+    axes = [np.arange(a, b, 0.3) for a, b in ((-4, 7), (-4, 4), (-3, 20))]
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    distance = np.minimum(np.hypot(x, y), np.hypot(x - 3.0, y)) - 1.2
+    grid = Grid(distance.astype(np.float32), np.full(3, 0.3), np.array([-4.0, -4.0, -3.0]))
+    lumen = Lumen(grid, grid.with_values((distance < 0).astype(np.uint8)))
+    bent = replace(case.wire, rest_curvature_per_mm=[(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)])
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    wall = replace(case.wall, stiffness_N_mm2=1.0)
+    *_, last = simulate(
+        insertion_of(bent, wall, lumen, clamp, SolverConfig(segment_mm=0.5)), [4.0, 8.0, 15.0], [0.0] * 3
+    )
+    frame = Frame(0, depth_mm=15.0, simulated=last).failed("simulate", last.status)
+    assert frame.status == "through_wall"
+    assert "through the wall" in frame.sentence
+    assert not frame.ok

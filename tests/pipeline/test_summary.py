@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, blocks, counts, intervals, pooled, skill_of
+from pipeline.compare.pooled import Row, blocks, intervals, is_pooled, pooled, skill_of
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 
@@ -41,9 +41,9 @@ def test_the_order_of_frames_does_not_matter_to_the_statistics() -> None:
 
 def test_failed_frames_are_not_pooled_and_nothing_gives_nothing() -> None:
     row, errors = frame(np.full(5, 100.0))
-    assert counts(row, errors)
-    assert not counts({**row, "status": FrameStatus.LENGTH_MISMATCH.identifier}, errors)
-    assert not counts({**row, "status": FrameStatus.SIMULATED.identifier}, None)
+    assert is_pooled(row, errors)
+    assert not is_pooled({**row, "status": FrameStatus.LENGTH_MISMATCH.identifier}, errors)
+    assert not is_pooled({**row, "status": FrameStatus.SIMULATED.identifier}, None)
     assert pooled([], 0) == {}
 
 

@@ -10,11 +10,11 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.compare.metrics import point_to_curve
-from pipeline.model import Curve, Lumen, Volume
+from pipeline.model import Curve, Lumen, Volume, arc_length
 from pipeline.run.log import Log
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import trace
+from pipeline.trace import of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.subtraction import levelled, subtracted
 from pipeline.trace.verdict import near_rotation_plane
@@ -80,7 +80,7 @@ def test_the_curve_lies_on_the_wire_as_closely_as_noise_allows(cnr, mean_bar, ti
     assert np.linalg.norm(curve.points_mm[-1] - wire[-1]) / VOXEL < tip_bar
     assert abs(curve.length_mm - 0.01 * (len(wire) - 1 - start)) < 0.5
     assert cKDTree(curve.points_mm).query(wire[start:])[0].max() < 1.5 * VOXEL
-    assert np.all(np.diff(curve.arc_mm) > 0)
+    assert np.all(np.diff(arc_length(curve.points_mm)) > 0)
     assert not curve.flagged.any()
 
 
@@ -202,7 +202,7 @@ def test_a_crop_of_the_frame_and_a_lumen_on_another_lattice_do():
     a, b = (2, 1, 0), tuple(n - 2 for n in frame.shape)
     crop, still = (v.crop(a, b) for v in (frame, reference))
     coarse = Grid(lumen.distance.values[::2, ::2, ::2], lumen.distance.spacing_mm * 2, lumen.distance.origin_mm)
-    other = Lumen(coarse, coarse.with_values((coarse.values < 0).astype(np.uint8)))
+    other = Lumen(coarse)
     curve = trace(Volume(crop.values, crop.spacing_mm, crop.origin_mm), other, entry, direction,
                   reference=Volume(still.values, still.spacing_mm, still.origin_mm))  # fmt: skip
     assert point_to_curve(curve.points_mm, wire)[0].mean() < 0.15 * VOXEL
@@ -327,6 +327,9 @@ def test_a_length_that_disagrees_with_the_insertion_is_a_named_status():
         assert curve.status is status
     assert "insertion_mm" in curve.note
     assert "16.00" in curve.note
+    given = Curve(wire, np.full(len(wire), np.nan))
+    assert of_length(given, 11.0, TraceConfig()) is of_length(given, None, TraceConfig()) is given
+    assert of_length(given, 16.0, TraceConfig()).status is FrameStatus.LENGTH_MISMATCH
 
 
 def test_a_curve_that_leaves_the_lumen_is_a_named_status():
@@ -335,7 +338,7 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
     assert inside.status is FrameStatus.OK
     x = lumen.distance.origin_mm[0] + VOXEL * np.arange(lumen.distance.shape[0])
     depth = np.maximum(lumen.distance.values, (x - 1.0)[:, None, None]).astype(np.float32)
-    narrow = Lumen(lumen.distance.with_values(depth), lumen.distance.with_values((depth < 0).astype(np.uint8)))
+    narrow = Lumen(lumen.distance.with_values(depth))
     outside = trace(frame, narrow, wire[0], wire[1] - wire[0], reference=reference)
     assert outside.status is FrameStatus.TRACE_LEFT_LUMEN
     assert outside.flagged.any()

@@ -14,11 +14,15 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, RunFiles, _drawing, _planes
-from reports.figures._drawing import STAGE_COLOURS, positive_axis, predictors
+from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
+from reports.figures._drawing import positive_axis
+from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
 from tests.reports.fake_results import FakeCase, write_run
+
+CASE_FIGURES = figures_of("case")
+RUN_FIGURES = figures_of("run")
 
 # no permutation, so that swapped or transposed axes cannot hide
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -213,13 +217,13 @@ def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Pat
         figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
-        axes.plot([0, 110], [40, 40], color=_drawing.ORANGE, linewidth=6)
+        axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
         path = tmp_path / f"{compact}.png"
         _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
     assert pixels[0, 0].tolist() == [255, 255, 255]
-    assert np.any(np.all(pixels == (np.array(to_rgba(_drawing.ORANGE)[:3]) * 255).round(), axis=-1))
+    assert np.any(np.all(pixels == (np.array(to_rgba(_style.ORANGE)[:3]) * 255).round(), axis=-1))
     assert np.abs(pixels.astype(int) - exact).max() <= 24
     assert sizes[1] < 0.6 * sizes[0]

@@ -16,10 +16,13 @@ import pytest
 
 from reports import figures, tables
 from reports.case_files import find_cases, read_case
-from reports.figures import CASE_FIGURES, RUN_FIGURES, Drawing, declared
+from reports.figures import Drawing, declared, figures_of
 from reports.html import render_case, render_index
 from reports.schema import ERRORS, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
+
+CASE_FIGURES = figures_of("case")
+RUN_FIGURES = figures_of("run")
 
 PAGE_BUDGET = 2_000_000
 KINDS = tuple(

@@ -9,11 +9,13 @@ import pytest
 
 from reports import diff, tables
 from reports.case_files import read_case
-from reports.figures import CASE_FIGURES, Drawing
-from reports.figures._drawing import LINES, predictors
+from reports.figures import Drawing, figures_of
+from reports.figures._style import LINES, predictors
 from reports.html import render_case, render_index
 from reports.schema import ERRORS, PLACES, SUMMARY, Column, predictor
 from tests.reports.fake_results import FakeCase, write_run
+
+CASE_FIGURES = figures_of("case")
 
 
 @pytest.fixture(autouse=True)

@@ -21,7 +21,8 @@ ERRORS_HEADER = (
     "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,back_rms_mm,hausdorff_mm,arc_rms_mm,"
     "arc_max_mm,tip_mm,tip_angle_deg,branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,"
     "null_min_bending_rms_mm,null_previous_rms_mm,skill,coverage,trace_sigma_mm,max_penetration_mm,"
-    "push_force_N,joints,iterations,load_s,segment_s,trace_s,simulate_s,compare_s,trace_mean_mm,"
+    "push_force_N,joints,iterations,snaps,uncertain,least_pivot,"
+    "load_s,segment_s,trace_s,simulate_s,compare_s,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
 POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N"

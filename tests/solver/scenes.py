@@ -100,3 +100,10 @@ def last(insertion: Insertion, depths: ArrayLike, roll: float = 0.0) -> Solution
         assert solution.converged, (solution.depth_mm, solution.sentence)
     assert solution is not None
     return solution
+
+
+def same_bits(a: Solution, b: Solution) -> None:
+    """Every field is the same to the last bit, counters too."""
+    for name, value in vars(a).items():
+        other = getattr(b, name)
+        assert np.array_equal(value, other) if isinstance(value, np.ndarray) else value == other, name

@@ -147,6 +147,36 @@ def test_newton_decrement_is_that_of_the_dense_hessian(name: str) -> None:
     assert b.report[0].decrement == pytest.approx(0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=2e-3)
 
 
+@pytest.mark.parametrize("drag", [0.0, 0.05])
+@pytest.mark.parametrize("hull", ["offset", "samples:5"])
+@pytest.mark.parametrize("name", ["curved tip", "twisting"])
+def test_newton_decrement_with_friction_is_that_of_the_dense_hessian(name: str, hull: str, drag: float) -> None:
+    """Hulls that rub at a radius from the axis, and a shaft that is held outside; loads and normals are kept."""
+    b = Workspace(WIRES[name], VesselWall(tube_grid(0.5), 0.5, 0.3, hull), "tip", Settings().limits, 20.0, drag)
+    b.lay_out(24.0)
+    b.clamp(np.zeros(3), base_frame(np.array([0.0, 0.0, 1.0]), None, 30.0))
+    b.problem.shaft.frame[0], b.problem.shaft.step[:] = b.problem.state.r[0, 0], (0.01, 0.0)
+    b.load([2e-2, 1e-2, -2e-3])
+    components = 3 if b.problem.twisting else 2
+    straight = np.zeros((b.k, 3))
+    straight[:, 1] = -b.problem.chain.rest[: b.k]
+    energy_of(b, straight)
+    status, _ = b.advance(24.0, 0.0, b.k)
+    assert status is Status.CONVERGED
+    assert np.count_nonzero(b.problem.friction.load) > 3
+
+    def padded(v: Array) -> Array:
+        return np.column_stack([v.reshape(b.k, components), np.zeros((b.k, 3 - components))])
+
+    # far enough that what slips goes on slipping, near enough for a minimum
+    away = 1e-3 * np.random.default_rng(0).normal(size=components * b.k)
+    v = b.problem.state.u[0, : b.k, :components].ravel() + away
+    gradient, hessian = dense(lambda w: energy_of(b, padded(w)), v, 2e-6)
+    energy_of(b, padded(v))
+    assert sweep(b.problem, 0, b.k, 0.0, b.report[0])
+    assert b.report[0].decrement == pytest.approx(0.5 * gradient @ np.linalg.solve(hessian, gradient), rel=5e-3)
+
+
 def dense(function: object, v: Array, step: float = 1e-4) -> tuple[Array, Array]:
     """Gradient and Hessian by central differences."""
     f, n = function, len(v)

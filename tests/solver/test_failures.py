@@ -76,7 +76,7 @@ def test_closed_form_refuses_what_it_cannot_do() -> None:
 
 def test_depths_must_be_depths() -> None:
     insertion = Insertion(WIRE, None, [0, 0, 0], [0, 0, 1])
-    with pytest.raises(ValueError, match="to_depths"):
+    with pytest.raises(ValueError, match=r"insertion: depths_mm: got -1\.0"):
         list(insertion.to_depths([1.0, -1.0]))
 
 

@@ -1,25 +1,47 @@
-"""Coulomb friction as an incremental potential: the capstan, the direction, and nothing at all at μ = 0."""
+"""Coulomb friction from step to step: the capstan, work and its loss, what is remembered; nothing at all at μ = 0."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from solver import GuideWire, Insertion, VesselWall
-from tests.solver.scenes import bend_grid, last
+from solver import GuideWire, Insertion, Solution, Status, VesselWall
+from tests.solver.scenes import bend_distance, bend_grid, last, sampled
+
+Array = NDArray[np.float64]
+WIRE = GuideWire(1.0, 0.18, 10.0)
+CURVED = GuideWire(1.0, 0.18, 10.0, [[0, 0.05], [10, 0.05], [15, 0.0]])
 
 
-def axial(joints: np.ndarray, force: np.ndarray, load: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def in_bend(wire: GuideWire, coefficient: float, step: float = 1.0, hull: str = "offset") -> Insertion:
+    wall = VesselWall(bend_grid(), 1.0, friction=coefficient, hull=hull)
+    return Insertion(wire, wall, [0, 0, 0], [0, 0, 1], step_mm=step)
+
+
+def all_of(insertion: Insertion, depths: Sequence[float] | Array) -> list[Solution]:
+    solutions = list(insertion.to_depths(depths))
+    assert all(s.converged for s in solutions)
+    return solutions
+
+
+def axial(joints: Array, force: Array, load: Array) -> Array:
     """Axial force in each segment, N: everything that acts on the wire beyond it, along it."""
     along = np.diff(joints, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     ahead = np.cumsum((force + load)[::-1], axis=0)[::-1]
-    return np.einsum("na,na->n", ahead[1:], along)
+    return np.asarray(np.einsum("na,na->n", ahead[1:], along))
 
 
 @pytest.mark.parametrize("coefficient", [0.1, 0.3])
 def test_capstan(coefficient: float) -> None:
-    """A limp wire pulled back around a bend by its tip load: tension grows by exp(μ Θ)."""
+    """A limp wire pulled back around a bend by its tip load: tension grows by exp(μ Θ).
+
+    It rubs on the inside of the bend, where it is 28.18 mm from the axis of the bend and its hull 28 mm: it slides
+    less there by that share, and the moment of friction about the axis carries 0.6 % of the tension.
+    """
     wall = VesselWall(bend_grid(), 5.0, friction=coefficient)
     wire = GuideWire(1.0, 0.18, 0.5)
     tip_load = np.array([0.05, 0.0, 0.0])
@@ -32,18 +54,115 @@ def test_capstan(coefficient: float) -> None:
     low, high = 40, 62
     angle = np.arccos(along[low] @ along[high] / np.linalg.norm(along[low]) / np.linalg.norm(along[high]))
     assert angle > 0.6
-    assert np.log(tension[low] / tension[high]) == pytest.approx(coefficient * angle, rel=0.03)
+    exponent = np.log(tension[low] / tension[high])
+    assert exponent == pytest.approx(coefficient * angle, rel=0.01)
+    assert exponent == pytest.approx(coefficient * angle * 28.0 / 28.18, rel=1e-3)
 
 
 def test_friction_raises_the_push_and_is_not_computed_without_a_coefficient() -> None:
-    wire = GuideWire(1.0, 0.18, 10.0)
     push, work = [], []
     for coefficient in (0.0, 0.1, 0.2):
-        insertion = Insertion(wire, VesselWall(bend_grid(), 1.0, friction=coefficient), [0, 0, 0], [0, 0, 1])
+        insertion = in_bend(WIRE, coefficient)
         solution = last(insertion, np.arange(1.0, 61.0))
         push.append(solution.push_force_N)
         work.append(solution.friction_energy_N_mm)
-        assert insertion.work.problem.friction.load.size == 0 or coefficient > 0
+        assert insertion._work.problem.friction.load.size == 0 or coefficient > 0
         np.testing.assert_allclose(solution.reaction_force_N, -solution.contact_force_N.sum(axis=0), atol=1e-6)
     assert push[0] < push[1] < push[2]
     assert work[0] == 0.0 < work[1] < work[2]
+
+
+@pytest.mark.parametrize("hull", ["offset", "samples:16"])
+@pytest.mark.parametrize("wire", [WIRE, CURVED], ids=["straight", "curved"])
+def test_push_and_loss_do_not_depend_on_the_step(wire: GuideWire, hull: str) -> None:
+    """Steps of 1 to 0.01 mm over the last 5 mm; the hull's own radius is no way slid."""
+    push, lost = [], []
+    for step in (1.0, 0.2, 0.05, 0.01):
+        insertion = in_bend(wire, 0.2, step, hull)
+        last(insertion, np.arange(1.0, 56.0))
+        solution = last(insertion, [60.0])
+        push.append(solution.push_force_N)
+        lost.append(solution.friction_energy_N_mm)
+    np.testing.assert_allclose(push, push[-1], rtol=2e-3)
+    # a wire that bends back at rest creeps to and fro in a step: it slides further the closer one looks
+    np.testing.assert_allclose(lost, lost[-1], rtol=2e-2 if hull != "offset" else 1e-2)
+
+
+def test_steps_shorter_than_the_spring_lose_no_friction() -> None:
+    """30 steps of 0.3 µm where a contact slips after 1 µm; the push grows by what 9 µm of depth give."""
+    insertion = in_bend(WIRE, 0.3)
+    before, ahead = all_of(insertion, np.arange(1.0, 72.0))[-2:]
+    after = last(insertion, 71.0 + 3e-4 * np.arange(1, 31))
+    slope = ahead.push_force_N - before.push_force_N
+    assert after.push_force_N == pytest.approx(ahead.push_force_N + 0.009 * slope, rel=5e-3)
+
+
+def test_a_wire_pulled_back_sticks_first() -> None:
+    """0.2 µm back is less than the springs give way: nothing slips, the push falls a little, and comes back."""
+    insertion = in_bend(WIRE, 0.3)
+    there = all_of(insertion, np.arange(1.0, 61.0))[-1]
+    back, again = all_of(insertion, [60.0 - 2e-4, 60.0])
+    assert back.friction_energy_N_mm < 0.1 * there.friction_energy_N_mm * 2e-4
+    assert 0.5 * there.push_force_N < back.push_force_N < there.push_force_N
+    assert again.push_force_N == pytest.approx(there.push_force_N, rel=1e-2)
+
+
+def test_loss_of_a_depth_is_that_of_all_its_steps() -> None:
+    one, many = in_bend(WIRE, 0.2), in_bend(WIRE, 0.2)
+    for insertion in (one, many):
+        last(insertion, np.arange(1.0, 51.0))
+    total = sum(s.friction_energy_N_mm for s in all_of(many, np.arange(51.0, 61.0)))
+    assert last(one, [60.0]).friction_energy_N_mm == pytest.approx(total, rel=1e-3)
+
+
+@pytest.mark.parametrize("wire", [WIRE, CURVED], ids=["straight", "curved"])
+@pytest.mark.parametrize("coefficient", [0.0, 0.1, 0.3])
+def test_work_is_change_of_energy_and_loss(wire: GuideWire, coefficient: float) -> None:
+    """75 mm in and 30 mm out by 0.25 mm: the hand's work is what the wire stores and what friction takes.
+
+    Its push is integrated by the trapezium rule; where the hand turns back the push falls within half a millimetre, and
+    the first millimetre is looked at in 20 steps.
+    """
+    way_in = 0.25 * np.arange(1, 301)
+    way_out = 75.0 - np.concatenate([0.05 * np.arange(1, 20), 0.25 * np.arange(4, 121)])
+    solutions = all_of(in_bend(wire, coefficient), [*way_in, *way_out])
+    push, energy = (np.array([0.0, *(getattr(s, n) for s in solutions)]) for n in ("push_force_N", "energy_N_mm"))
+    work = 0.5 * (push[1:] + push[:-1]) * np.diff([0.0, *way_in, *way_out])
+    lost = np.array([s.friction_energy_N_mm for s in solutions])
+    gap = work - np.diff(energy) - lost
+    assert abs(gap[:300].sum()) < 5e-3 * abs(work[:300]).sum()
+    assert abs(gap[300:].sum()) < 5e-3 * abs(work[300:]).sum()
+    assert (lost >= 0.0).all()
+
+
+def test_forces_after_a_failed_step_are_those_of_the_state_that_is_kept() -> None:
+    """The tip leaves the grid within the last step: that step's length, loads and friction are forgotten."""
+    grid = sampled(bend_distance, 0.3, (-5, -5, -5), (15, 5, 65), "float32")
+    wall = VesselWall(grid, 1.0, friction=0.3)
+    insertion = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0])
+    good = None
+    for depth in np.arange(1.0, 90.0, 0.7):
+        solution = next(insertion.to_depths([depth]))
+        if not solution.converged:
+            break
+        good = solution
+    assert good is not None
+    assert solution.status is Status.LEFT_GRID
+    assert solution.depth_mm == good.depth_mm > 50.0
+    np.testing.assert_array_equal(solution.contact_force_N, good.contact_force_N)
+    assert solution.push_force_N == pytest.approx(good.push_force_N, rel=1e-12)
+    # and the wire goes on from there as if nothing had been tried
+    again = Insertion(WIRE, wall, [0, 0, 0], [0, 0, 1], tip_load_N=[0.0, 0.004, 0.0])
+    last(again, np.arange(1.0, good.depth_mm + 0.1, 0.7))
+    one, other = last(insertion, [good.depth_mm - 1.0]), last(again, [good.depth_mm - 1.0])
+    np.testing.assert_allclose(one.contact_force_N, other.contact_force_N, atol=1e-12)
+
+
+def test_room_for_a_longer_wire_keeps_contact_and_friction() -> None:
+    """Asked for again with room for more joints made meanwhile, a wire is what it was."""
+    insertion = in_bend(CURVED, 0.3)
+    there = last(insertion, np.arange(1.0, 61.0))
+    again = next(insertion.to_depths([60.0, 500.0]))
+    assert np.abs(there.contact_force_N).max() > 1e-3
+    np.testing.assert_array_equal(again.contact_force_N, there.contact_force_N)
+    assert again.push_force_N == pytest.approx(there.push_force_N, rel=1e-12)

@@ -11,6 +11,7 @@ import pytest
 from solver import GuideWire, Insertion, Insertions, Solution, VesselWall, skips
 from solver.insertions import first_points, kind_of
 from tests.solver.scenes import bend_grid, fork_grid, sampled, sheath_grid
+from tests.solver.test_snaps import ringed
 
 SAME_MM, STRAIGHT_MM = 1e-9, 2e-8
 """Curved wires: rounding (1e-14 mm here) with room. Straight ones describe a joint by its direction where they go
@@ -49,6 +50,10 @@ def assert_same(together: list[list[Solution]], alone: list[list[Solution]]) -> 
             np.testing.assert_allclose(a.reaction_force_N, b.reaction_force_N, rtol=0, atol=1e3 * same * forces)
             assert a.push_force_N == pytest.approx(b.push_force_N, abs=1e3 * same * forces), where
             assert a.energy_N_mm == pytest.approx(b.energy_N_mm, rel=1e-9, abs=1e-15), where
+            assert a.least_pivot == pytest.approx(b.least_pivot, abs=1e2 * same), where
+            assert a.dissipated_N_mm == pytest.approx(b.dissipated_N_mm, abs=1e3 * same * forces), where
+            assert (a.uncertain, len(a.snaps)) == (b.uncertain, len(b.snaps)), where
+            np.testing.assert_allclose(a.snaps, b.snaps, rtol=1e-6, atol=1e2 * same, err_msg=where)
             assert a.max_penetration_mm == pytest.approx(b.max_penetration_mm, abs=same)
             if not straight:
                 counted = ("rest_shapes", "levenberg", "relaxations_without_friction", "starts_foreseen")
@@ -132,6 +137,39 @@ def test_joints_that_are_left_alone_and_branches() -> None:
     assert [np.sign(solutions[-1].joints_mm[-1, 0]) for solutions in found[3:]] == [1, 1, -1, -1]
 
 
+def test_a_snap_is_the_same_event_beside_others() -> None:
+    """A ring on the tube's wall, on which curved tips catch, each elsewhere: steps taken again, events, doubts."""
+    wall = VesselWall(sampled(ringed, 0.3, (-4, -4, -3), (4, 4, 34), "float32"), 3.0)
+
+    def make() -> list[Insertion]:
+        wires = [
+            GuideWire(1.0, 0.18, [[0, 0.5 + 0.1 * n], [15, 2.0]], [[0, 0.3], [6, 0.3], [6, 0.0]]) for n in range(8)
+        ]
+        return [Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0]) for wire in wires]
+
+    found = both(make, [np.arange(1.0, 31.0)] * 8, [10.0 * n for n in range(8)])
+    assert sum(len(s.snaps) for solutions in found for s in solutions) > 3
+    assert 3 < sum(s.uncertain for solutions in found for s in solutions) < 60
+
+
+def test_a_wire_that_is_moved_elsewhere_is_refused_and_ways_before_are_over() -> None:
+    first, second = wires_in_the_bend()[:2]
+    way = first.to_depths([2.0, 4.0])
+    next(way)
+    first._hold()
+    with pytest.raises(RuntimeError, match="another thread"):
+        Insertions([second, first]).to_depths([5.0])
+    first._release()
+    Insertions([second, first]).to_depths([5.0])
+    assert (first.depth_mm, second.depth_mm) == (5.0, 5.0)
+    with pytest.raises(RuntimeError, match="later call"):
+        next(way)
+    clone = first.clone()
+    (ours, _), (theirs, _) = Insertions([first, second]).to_depths([9.0, 12.0])
+    np.testing.assert_array_equal(ours.joints_mm, next(clone.to_depths([9.0])).joints_mm)
+    assert theirs.depth_mm == 9.0
+
+
 def test_those_that_cannot_go_in_lock_step_go_by_themselves() -> None:
     wall = bend_wall()
 
@@ -146,16 +184,18 @@ def test_those_that_cannot_go_in_lock_step_go_by_themselves() -> None:
             Insertion(wire, None, [0, 0, 0], [0, 0, 1]),
             Insertion(wire, wall, [9, 9, 9], [0, 0, 1]),
             Insertion(wire, wall, [0, 0, 0], [0, 0, 1], max_joints=5),
+            Insertion(wire, wall, [0, 0, 0], [0, 0, 1], shaft_mm=100.0, shaft_friction_N=0.01),
+            Insertion(GuideWire(2.0, 0.18, 10.0, weight_N_per_mm=1e-5), wall, [0, 0, 0], [0, 0, 1], down=[0, -1, 0]),
             slow,
         ]
 
-    assert [kind_of(one, 30.0) for one in make()] == [None] * 7
-    both(make, [[10.0, 30.0]] * 7, [0.0] * 7)
+    assert [kind_of(one, 30.0) for one in make()] == [None] * 9
+    both(make, [[10.0, 30.0]] * 9, [0.0] * 9)
 
 
 @pytest.mark.parametrize("quadrature", ["tip", "joints", "segments"])
 def test_look_up_points_stand_in_line(quadrature: str) -> None:
-    work = Insertion(GuideWire(1.0, 0.18, 10.0), bend_wall(), [0, 0, 0], [0, 0, 1], quadrature=quadrature).work
+    work = Insertion(GuideWire(1.0, 0.18, 10.0), bend_wall(), [0, 0, 0], [0, 0, 1], quadrature=quadrature)._work
     for k in (1, 3, 5, 6, 20):
         work.lay_out(float(k))
         np.testing.assert_array_equal(first_points(work, k), work.problem.chain.first[: k + 2])

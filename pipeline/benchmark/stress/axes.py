@@ -18,7 +18,7 @@ LUMENS = ("straight", "bend", "siphon", "sphere", "channel")
 def draw(seed: int, index: int) -> ScenePlan:
     """Scene ``index`` of the study ``seed``: the same one every time, in any order."""
     rng = np.random.default_rng([seed, index])
-    plan = _moderate(rng, seed, index)
+    plan = moderate(rng, seed, index)
     names = list(AXES)
     first = names[index % len(names)]
     others = rng.choice([n for n in names if n != first], size=int(rng.integers(0, 3)), replace=False)
@@ -37,7 +37,8 @@ def draw(seed: int, index: int) -> ScenePlan:
     return plan
 
 
-def _moderate(rng: Rng, seed: int, index: int) -> ScenePlan:
+def moderate(rng: Rng, seed: int, index: int) -> ScenePlan:
+    """A scene of ordinary proportions."""
     segment = _log_uniform(rng, 0.5, 2.0)
     voxel = _log_uniform(rng, 0.5, 1.0)
     curved = rng.random() < 0.5

@@ -12,31 +12,28 @@ from pipeline.status import FrameStatus
 
 def compare_frames(run: Context, known: Known) -> Known:
     """Errors of every frame with both curves, beside those of the trivial predictors."""
-    assert known.scans is not None
     with run.log.timed("compare"):
         clues = _clues(run, known)
     frames = []
     for frame, previous in zip(known.frames, _trusted_before(known.frames), strict=True):
         with run.log.timed("compare", frame.index):
-            if known.scans.frames:
-                frames.append(_compared(run, known, frame, clues, previous))
-            else:
-                frames.append(_simulated_only(frame))
+            done = _compared(run, known, frame, clues, previous)
             if frame.truth_mm is not None:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
-                frames[-1] = replace(frames[-1], truth=truth)
+                done = replace(done, truth=truth)
+            frames.append(done)
     return replace(known, frames=tuple(frames))
 
 
 def _clues(run: Context, known: Known) -> Clues | None:
     """What predictors may know; None where no trace is to be trusted."""
     assert known.lumen is not None
-    assert known.entry is not None
+    assert known.clamp is not None
     curves = [curve for frame in known.frames if (curve := frame.trusted_curve) is not None]
     if not curves:
         return None
     deepest = max(curves, key=lambda curve: curve.length_mm)
-    return Clues(known.lumen, known.entry, run.case.wire.radius_mm, deepest.points_mm)
+    return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, deepest.points_mm)
 
 
 def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
@@ -48,6 +45,10 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
 
 
 def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, previous: Array | None) -> Frame:
+    assert known.scans is not None
+    if frame.ok and not known.scans.frames:
+        only = FrameStatus.SIMULATED
+        return replace(frame, status=only.identifier, sentence=only.value)
     if frame.curve is None or not frame.traced or frame.simulated is None:
         return frame
     assert known.lumen is not None
@@ -57,11 +58,3 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, pre
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, previous, curve.points_mm, settings.sample_mm)
     return replace(frame, comparison=errors, nulls_rms_mm=nulls)
-
-
-def _simulated_only(frame: Frame) -> Frame:
-    """A frame of a case without scans: there is nothing to compare with."""
-    if not frame.ok:
-        return frame
-    only = FrameStatus.SIMULATED
-    return replace(frame, status=only.identifier, sentence=only.value)

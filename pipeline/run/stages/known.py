@@ -25,6 +25,7 @@ class Frame:
 
     status : identifier (``ok``, a FrameStatus or a solver status).     stage, message : where and why it is not ok.
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
+    num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
     projections : maximum-intensity projections of the scan along the array axes.
     """
 
@@ -38,6 +39,7 @@ class Frame:
     roll_deg: float = 0.0
     curve: Curve | None = None
     simulated: Solution | None = None
+    num_mm: float = float("nan")
     comparison: Comparison | None = None
     registration: Registration | None = None
     truth_mm: Array | None = None
@@ -74,11 +76,11 @@ Result = TypeVar("Result", Lumen, Curve)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of a case so far. entry : the clamp that was simulated; failure : why the case went no further."""
+    """What is known of a case so far. clamp : the one that was simulated; failure : why the case went no further."""
 
     scans: Scans | None = None
     lumen: Lumen | None = None
-    entry: Clamp | None = None
+    clamp: Clamp | None = None
     frames: tuple[Frame, ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""

@@ -16,8 +16,9 @@ def segment_vessel(run: Context, known: Known) -> Known:
     case, config, log = run.case, run.config, run.log
     if case.lumen is not None:
         with log.timed("segment"):
-            given = read_lumen(case.lumen.path, config.segment.least_voxels)
-            return replace(known, lumen=given_lumen(given, config.segment))
+            lumen = given_lumen(read_lumen(case.lumen.path, config.segment.least_voxels), config.segment)
+        log.assumptions += lumen.warnings
+        return replace(known, lumen=lumen)
     assert known.scans is not None
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
@@ -26,5 +27,5 @@ def segment_vessel(run: Context, known: Known) -> Known:
     crop = Crop(scan, scan.box, config.load)
     lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment)
     log.warnings += lumen.warnings
-    log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.mask.values))} voxels")
+    log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)

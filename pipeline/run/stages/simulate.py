@@ -1,48 +1,90 @@
 """simulate: the whole insertion replayed once, from the clamp to the depth of every frame."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
 from pipeline.model import Clamp
+from pipeline.run.log import Log
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
+from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
+from solver import Snap, Solution
+from solver.self_contact import self_overlap_mm
+
+MOST_OVERLAP_RADII = 0.1
+"""Of the wire with itself that still counts as a touch: less than a scan can show."""
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
-    assert known.lumen is not None
-    case, config, log = run.case, run.config, run.log
+    lumen, case, config, log = known.lumen, run.case, run.config, run.log
+    assert lumen is not None
     clamp = _clamp(run, known.frames)
     frames = [_with_depth(frame, config.simulate.depth) for frame in known.frames]
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
-    try:
-        insertion = insertion_of(case.wire, case.wall, known.lumen, clamp, config.solver, config.simulate)
+
+    def insert(segment_mm: float) -> list[Solution]:
+        """The wire of every frame with segments of one length."""
+        settings = replace(config.solver, segment_mm=segment_mm)
+        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate)
         found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay])
-        clock = perf_counter()
-        for frame, wire in zip(replay, found, strict=True):
-            log.spent("simulate", perf_counter() - clock, frame.index)
-            work = dict(wire.work)
-            levels = {name: work.pop(name) for name in LEVELS}
-            log.count("simulate", work, levels)
-            done = replace(frame, simulated=wire)
-            frames[frame.index] = done if wire.converged else done.failed("simulate", wire.status)
-            said = f"{wire.status.identifier} {wire.depth_mm:.1f} mm"
-            log.progress("simulate", frame.index + 1, len(frames), said)
-            clock = perf_counter()
+        return list(_noted(log, replay, found, len(frames)))
+
+    try:
+        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire))
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
-    return replace(known, frames=tuple(frames), entry=clamp)
+    log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
+    for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
+        log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
+        found = replace(frame, simulated=wire, num_mm=float(num_mm))
+        frames[frame.index] = judged(found, wire, case.wire.radius_mm)
+    return replace(known, frames=tuple(frames), clamp=clamp)
+
+
+def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
+    """The frame, failed where its wire is not at rest, cannot follow a bend or passes through itself."""
+    if not wire.converged:
+        return frame.failed("simulate", wire.status)
+    turn, overlap = wire.largest_turn_deg, self_overlap_mm(wire.joints_mm, radius_mm)
+    if turn > LARGEST_JOINT_TURN_DEG:
+        return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
+    if overlap > MOST_OVERLAP_RADII * radius_mm:
+        return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"it lies {overlap:.2f} mm deep in itself")
+    return frame
+
+
+def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
+    """The wires, each with its time, its work and a line in the log."""
+    clock = perf_counter()
+    for frame, wire in zip(frames, found, strict=True):
+        log.spent("simulate", perf_counter() - clock, frame.index)
+        work = dict(wire.work)
+        levels = {name: work.pop(name) for name in LEVELS}
+        log.count("simulate", work, levels)
+        log.progress("simulate", frame.index + 1, total, f"{wire.status.identifier} {wire.depth_mm:.1f} mm")
+        yield wire
+        clock = perf_counter()
+
+
+def _told(frame: int, snap: Snap) -> str:
+    """An event in words."""
+    return (
+        f"frame {frame}: the simulated wire gave way between {snap.from_mm:.2f} and {snap.to_mm:.2f} mm "
+        f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); what is seen here and "
+        "shortly after hangs on small causes"
+    )
 
 
 def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
     """The clamp of the simulation: measured in the scans, or the manifest's."""
     case = run.case
-    axis = None if case.material_axis is None else np.array(case.material_axis)
-    given = Clamp(np.array(case.entry_mm), np.array(case.entry_direction), axis)
+    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
+    given = Clamp(np.array(case.entry_mm), np.array(case.entry_direction), axis, down)
     if run.config.simulate.entry == "manifest":
         return given
     clamp = measured_clamp([curve for f in frames if (curve := f.trusted_curve) is not None], given)

@@ -3,18 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
 from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
-from pipeline.register.frames import Place, counters_of, place_of, put_in_place, said
+from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.status import FrameStatus, StageError
-from pipeline.trace import trace
+from pipeline.trace import of_length, trace
 
 
 def trace_frames(run: Context, known: Known) -> Known:
@@ -37,7 +36,7 @@ def trace_frames(run: Context, known: Known) -> Known:
             run.log.progress("trace", frame.index + 1, len(known.frames), f"{done.status} {length:.1f} mm")
         frames.append(done)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
-    assumed, doubtful = said(work.place, {frame.index: frame.registration for frame in frames})
+    assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
     return replace(known, frames=tuple(frames))
@@ -56,7 +55,7 @@ class _Tracing:
         self.reference = None if empty is None else run.load(Crop(empty, self.box, self.load))
         self.window: tuple[float, float] | None = None
         with run.log.timed("trace"):
-            self.place: Place = place_of(
+            self.alignment: Alignment = alignment_of(
                 self.lumen,
                 self.reference,
                 settings.register_skip_voxels,
@@ -66,36 +65,37 @@ class _Tracing:
 
     def look(self, frame: Frame, header: Header, previous: Curve | None, given: Curve | None) -> Frame:
         """One frame read, put in place and traced; LoadError where it cannot be read."""
-        log, volume = self.run.log, self.run.load(Crop(header, self.box, self.load), frame.index)
+        log, settings = self.run.log, self.run.config.trace
+        volume = self.run.load(Crop(header, self.box, self.load), frame.index)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
             return volume if box == self.box else Crop(header, box, self.load).load()
 
         with log.timed("trace", frame.index):
-            here, shown, registration = put_in_place(volume, self.place, read_moved)
+            here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
         self.window = self.window or grey_window(shown)
-        pictures: tuple[NDArray[np.uint8], ...] = projections(shown, self.window)
-        curve = given or self._trace(frame, here, previous)
+        pictures = projections(shown, self.window)
+        expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
+        if given is None:
+            curve = self.run.stored(
+                "trace",
+                trace,
+                here,
+                self.lumen,
+                self.run.case.entry_mm,
+                self.run.case.entry_direction,
+                of_frame=frame.index,
+                reference=self.reference,
+                previous=previous,
+                expected_mm=expected,
+                config=settings,
+            )
+        else:
+            curve = of_length(given, expected, settings)
         done = replace(frame, registration=registration, projections=pictures, curve=curve)
-        return _judged(done, curve, self.run)
-
-    def _trace(self, frame: Frame, volume: Volume, previous: Curve | None) -> Curve:
-        case = self.run.case
-        return self.run.stored(
-            "trace",
-            trace,
-            volume,
-            self.lumen,
-            case.entry_mm,
-            case.entry_direction,
-            of_frame=frame.index,
-            reference=self.reference,
-            previous=previous,
-            expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
-            config=self.run.config.trace,
-        )
+        return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
 
 
 def _given_traces(run: Context) -> list[Curve]:
@@ -103,22 +103,6 @@ def _given_traces(run: Context) -> list[Curve]:
     if run.case.traces:
         run.log.assumptions.append("the traced curves are the manifest's own files; no tracing was done")
     return [read_curve(source.path) for source in run.case.traces]
-
-
-def _judged(frame: Frame, curve: Curve, run: Context) -> Frame:
-    """The frame with the tracer's verdict, or a length that disagrees with the manifest, as its status."""
-    allowed = run.config.trace.length_tolerance_mm
-    if curve.status is not FrameStatus.OK:
-        return frame.failed("trace", curve.status, curve.note)
-    if not abs(curve.length_mm - frame.expected_mm) > allowed:
-        return frame
-    return frame.failed(
-        "trace",
-        FrameStatus.LENGTH_MISMATCH,
-        f"trace: case {run.case.id!r} frame {frame.index}: traced {curve.length_mm:.2f} mm, insertion_mm "
-        f"says {frame.expected_mm:.2f} mm, allowed {allowed} mm apart; look at the "
-        "picture, then correct the manifest or trace.length_tolerance_mm",
-    )
 
 
 def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:

@@ -45,16 +45,6 @@ def modelled(wall: WallModel, out: NDArray[Any]) -> None:
 
 
 @entry_point
-def residual(scan: NDArray[Any], corner: NDArray[Any], wall: WallModel, out: NDArray[Any]) -> None:
-    """scan - model on the runs of ``out`` (int16 or float32)."""
-    distance, runs, table, step = wall
-    for i, j, first, stop in runs:
-        a, b, c = i + corner[0], j + corner[1], corner[2]
-        for k in range(first, stop):
-            out[i, j, k] = scan[a, b, k + c] - _profile(table, step, distance[i, j, k])
-
-
-@entry_point
 def denoised(
     rough: NDArray[Any], wall: WallModel, taps: NDArray[Any], limit: float, variance: float, out: NDArray[Any]
 ) -> None:

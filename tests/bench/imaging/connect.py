@@ -64,7 +64,7 @@ def _mask(result, values):
 def methods(values, seed):
     """What is compared: ours as ``segment`` runs it by default, without smoothing, by strength; and the others."""
     grid, config = Grid(values), SegmentConfig()
-    ours, plain = estimate_affinity(LEVELS), estimate_affinity(LEVELS, scale=0)
+    ours, plain = estimate_affinity(LEVELS), estimate_affinity(LEVELS, SegmentConfig(scale=0))
     rest = (config.threshold, neighbours(config.adjacency))
     small, corner = Grid(values[:40, :40, :40].copy()), np.array([[5, 5, 5]])
     for search in (connect, strength_list):

@@ -79,7 +79,7 @@ def empty_frames(seeds):
             Volume(phantoms.scan(np.full(shape, 1000.0), 0.8, 100.0, 2 * seed + n), [0.3] * 3) for n in (0, 1)
         )
         distance = Grid(np.full(shape, -2.0, np.float32), [0.3] * 3)
-        lumen = Lumen(distance, distance.with_values(np.ones(shape, np.uint8)))
+        lumen = Lumen(distance)
         found[trace(frame, lumen, [9, 9, 0.5], [0, 0, 1], reference=reference).status.name] += 1
     return found
 

@@ -1,0 +1,85 @@
+"""What the kernels note: records of named numbers, whose fields they read and write by name.
+
+Units: mm, N, rad unless something else is said.
+"""
+
+from typing import Any
+
+import numpy as np
+
+
+def record(*fields: tuple[Any, ...]) -> np.dtype[Any]:
+    """The type of a record: kernels read and write its fields by name."""
+    return np.dtype((np.record, list(fields)))
+
+
+ENERGIES = record(*((name, float) for name in ("bending", "wall", "load", "friction")))
+"""The parts of a state's energy, N mm."""
+WORK = (
+    "wall_look_ups",
+    "wall_look_ups_cheap",
+    "wall_look_ups_proven_unnecessary",
+    "sweeps",
+    "rollouts",
+    "levenberg",
+    "rest_shapes",
+    "rolls_proven_idle",
+    "sweeps_without_roll",
+    "starts_foreseen",
+    "joints_left_still",
+    "starts_at_rest",
+    "relaxations_without_friction",
+    "relaxations_without_twist",
+    "joints_without_profile_look_up",
+)
+"""What is counted, by the keys of ``Solution.work``."""
+COUNTERS = record(*((name, np.int64) for name in (*WORK, "passed")))
+"""passed : joints and look-up points that the iterations of a depth have gone through, see ``tol.WORK``."""
+REPORT = record(
+    ("start", float),
+    ("penetration", float),
+    ("push", float),
+    ("force", float, 3),
+    ("torque", float, 3),
+    ("turned", float, (2, 3)),
+    ("moment", float),
+    ("decrement", float),
+    ("joint", np.int64),
+    ("bend", float, 2),
+    ("curvature", float),
+    ("twist", float),
+    ("pivot", float),
+)
+"""What a relaxation found out.
+
+start : energy at the beginning, N mm.     penetration : deepest of all points, mm.     push : the hand's force, N.
+force, torque : gradient of the energy with respect to the entry point, N, and to turning the base frame, N mm.
+turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
+decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
+joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
+pivot : least of the joints' stiffnesses with all beyond them free to follow, over their own; 0 where the wire snaps.
+"""
+DESCENT = record(
+    *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
+    *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
+)
+"""What one iteration of a relaxation hands to the next.
+
+slot : of the current state; the trial is in 1 - slot.     energy : of the current state, N mm.
+Newton's method. first_free : joints before it are left alone.     damping : Levenberg's term.     last_damping : the
+one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
+Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
+"""
+PLACE = record(
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step")),
+    *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
+    ("snaps", np.int64),
+)
+"""Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
+step, mm (0 after a roll).
+
+push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
+by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.
+"""
+SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
+"""An event: depths before and after, energy released, the largest way of a joint."""

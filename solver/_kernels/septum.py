@@ -1,0 +1,163 @@
+"""Whether a wire has come through a wall: judged by the wire itself, along its whole length, not by how it moved.
+
+A step may rest on the ridge between two lumens and go down on the far side in the next: each move is innocent. So every
+place on the wire is led back, down the distance, to the lumen it belongs to (its foot). From one place to the next the
+foot moves a little; where the straight way between two feet rises over a ridge of the distance, the wire has changed
+lumens, unless both feet are joined by lumen nearby: then the ridge is the edge of a carina or of an aneurysm's neck.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from solver import _tolerances as tol
+from solver._kernels.algebra import Three, dot, load3, minus, mix
+from solver._kernels.data import Field
+from solver._kernels.field import clipped, indices, jet_at, locate, value
+from solver._kernels.flags import cached, inlined, kernel
+
+Foot = tuple[float, float, float, float]
+"""A place in a lumen, mm, and the distance there, mm; the distance is inf where none was found."""
+
+
+@cached
+def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
+    """Whether a wire with joints x, of k segments, comes through a wall. margin : its radius, mm."""
+    if not passes_crease(field, x, k):
+        return False
+    last, known = (0.0, 0.0, 0.0, 0.0), False
+    for n in range(1, k + 1):
+        a, b = load3(x, n - 1), load3(x, n)
+        d = minus(b, a)
+        way = math.sqrt(dot(d, d))
+        if not near_crease(field, a, b, way):
+            known = False
+            continue
+        steps = math.ceil(2 * way / field.spacing)
+        for i in range(1 if known else 0, steps + 1):
+            here = foot(field, mix(1.0 - i / steps, a, i / steps, b), -margin)
+            if here[3] == math.inf:
+                continue
+            if known and parted(field, last, here, -margin):
+                return True
+            last, known = here, True
+    return False
+
+
+@kernel
+def passes_crease(field: Field, x: Any, k: int) -> bool:
+    """Whether a wire comes by a crease anywhere; asked about so few joints that most wires cost next to nothing."""
+    d = minus(load3(x, k), load3(x, k - 1))
+    # all segments but the first, which has up to half a segment more, are as long as the last one
+    stride = int(0.75 * tol.CREASE_BLOCK * field.spacing / math.sqrt(dot(d, d)))
+    if stride < 1:
+        return True
+    found = False
+    for n in range(k, -stride, -stride):
+        found = found or marked(field, load3(x, max(n, 0)))
+    return found
+
+
+@kernel
+def near_crease(field: Field, a: Three, b: Three, way: float) -> bool:
+    """Whether a segment from a to b comes by a crease."""
+    steps = 1 + int(way / (0.5 * tol.CREASE_BLOCK * field.spacing))
+    found = False
+    for i in range(1, steps + 1):
+        found = found or marked(field, mix(1.0 - i / steps, a, i / steps, b))
+    return found
+
+
+@inlined
+def marked(field: Field, q: Three) -> bool:
+    """Whether a point lies in a block of the grid that is marked for a crease."""
+    marks, block = field.creases, 1.0 / tol.CREASE_BLOCK
+    f = indices(field.to_index, field.origin, q)
+    i, j = clipped(block * f[0], marks.shape[0] - 1), clipped(block * f[1], marks.shape[1] - 1)
+    return bool(marks[i, j, clipped(block * f[2], marks.shape[2] - 1)])
+
+
+@inlined
+def distance(field: Field, q: Three) -> float:
+    """Signed distance, mm, at a point."""
+    c = field.coefficients
+    return float(value(c, locate(c, indices(field.to_index, field.origin, q))))
+
+
+@kernel
+def foot(field: Field, q: Three, level: float) -> Foot:
+    """Go down the distance from a place until it is ``level``, mm, or until a lumen too narrow for that is deepest."""
+    c, v = field.coefficients, distance(field, q)
+    for _ in range(tol.FOOT_STEPS):
+        if v <= level:
+            break
+        first, second = jet_at(c, field.to_index, locate(c, indices(field.to_index, field.origin, q)))
+        g = first[1:]
+        square = dot(g, g)
+        # hardly any slope is the floor of a lumen where the distance curves upwards, and a ridge where it does not
+        floor = square < 0.5 and second[0] + second[1] + second[2] > 0.0
+        if floor and v < 0.5 * field.spacing:
+            break
+        step = min((v - level) / max(square, 1e-12), 0.5 * field.spacing / math.sqrt(max(square, 1e-12)))
+        lower = mix(1.0, q, -step, g)
+        w = distance(field, lower)
+        if floor or not w < v:
+            v = math.inf
+            break
+        q, v = lower, w
+    return q[0], q[1], q[2], v
+
+
+@kernel
+def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
+    """Whether a ridge lies between two feet, and no way through lumen around it nearby."""
+    # where the lumen is narrower than the wire all of it counts, not what the wire has room in
+    top = tol.RIDGE_VOXELS * field.spacing + (level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0))
+    p, q = a[:3], b[:3]
+    d = minus(q, p)
+    steps = math.ceil(4 * math.sqrt(dot(d, d)) / field.spacing)
+    for i in range(1, steps):
+        if distance(field, mix(1.0 - i / steps, p, i / steps, q)) > top:
+            return not joined(field, deeper(field, a), deeper(field, b), top)
+    return False
+
+
+@kernel
+def joined(field: Field, p: Three, q: Three, top: float) -> bool:
+    """Whether a way on which the distance is below ``top`` leads from one place to another nearby: a flood from p."""
+    d = minus(q, p)
+    way = math.sqrt(dot(d, d))
+    limit = way + 2 * tol.DETOUR_MM
+    cell = max(0.5 * field.spacing, limit / tol.FLOOD_CELLS)
+    n = math.ceil(0.5 * (limit + way) / cell) + 1
+    seen = np.zeros((2 * n + 1, 2 * n + 1, 2 * n + 1), np.uint8)
+    queue = np.empty((seen.size, 3), np.int16)
+    queue[0, 0] = queue[0, 1] = queue[0, 2] = n
+    seen[n, n, n] = 1
+    first, count = 0, 1
+    while first < count:
+        for side in range(6):
+            i, j, k = int(queue[first, 0]), int(queue[first, 1]), int(queue[first, 2])
+            move = 1 - 2 * (side % 2)
+            i, j, k = i + move * (side < 2), j + move * (2 <= side < 4), k + move * (side >= 4)
+            here = (p[0] + (i - n) * cell, p[1] + (j - n) * cell, p[2] + (k - n) * cell)
+            e, f = minus(here, p), minus(here, q)
+            left = math.sqrt(dot(f, f))
+            if seen[i, j, k] or math.sqrt(dot(e, e)) + left > limit:
+                continue
+            seen[i, j, k] = 1
+            if distance(field, here) <= top:
+                if left < cell:
+                    return True
+                queue[count, 0], queue[count, 1], queue[count, 2] = i, j, k
+                count += 1
+        first += 1
+    return False
+
+
+@kernel
+def deeper(field: Field, a: Foot) -> Three:
+    """A place up to a voxel further in the lumen than a foot: there a flood cannot slip over a ridge."""
+    b = foot(field, a[:3], a[3] - field.spacing)
+    return b[:3] if b[3] < math.inf else a[:3]

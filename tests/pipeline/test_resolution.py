@@ -1,0 +1,104 @@
+"""The length of the segments: chosen so that it does not matter, and said where it still does."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+import pytest
+
+from pipeline.benchmark.scenes import BenchScene, bend
+from pipeline.benchmark.vessels import lumen_distance
+from pipeline.compare.metrics import point_to_curve, rms
+from pipeline.model import Wire
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.simulate import judged
+from pipeline.simulate.resolution import FINEST_MM, Resolved, lengths_mm, resolve
+from solver import GuideWire, Insertion, Solution, Status
+
+CURVED = [(0.0, 0.3), (6.0, 0.3), (6.0, 0.0)]
+
+
+def wire(rest: float | list[tuple[float, float]] = 0.0) -> Wire:
+    return Wire("w", radius_mm=0.18, bending_stiffness_N_mm2=10.0, rest_curvature_per_mm=rest)
+
+
+@cache
+def siphon() -> BenchScene:
+    """Two turns of 8 mm radius, the second one back, and a wire with a curved tip."""
+    soft = GuideWire(1.0, 0.18, np.array([[0.0, 1.0], [15.0, 4.0]]), np.array(CURVED))
+    distance = partial(lumen_distance, "siphon", radius=1.5)
+    box = ((-3.0, -3.0, -3.0), (20.0, 3.0, 30.0))
+    return BenchScene("siphon", 34.0, guide_wire=soft, distance=distance, box=box, material_axis=(1.0, 0.0, 0.0))
+
+
+def insert(scene: BenchScene, segment_mm: float) -> Sequence[Solution]:
+    insertion = Insertion(
+        scene.wire(segment_mm), scene.wall(), scene.entry_mm, scene.direction, material_axis=scene.material_axis
+    )
+    return list(insertion.to_depths(scene.depths(), roll_deg=scene.roll_deg))
+
+
+@cache
+def resolved(name: str) -> tuple[Resolved, np.ndarray]:
+    """A scene at the length chosen, and its true errors against half of the shortest length."""
+    scene = {"bend": bend, "siphon": siphon}[name]()
+    rest = CURVED if name == "siphon" else 0.0
+    found = resolve(partial(insert, scene), lengths_mm("auto", wire(rest)))
+    limit = insert(scene, FINEST_MM / 2)
+    errors = [rms(point_to_curve(a.joints_mm, b.joints_mm)[0]) for a, b in zip(found.wires, limit, strict=True)]
+    return found, np.array(errors)
+
+
+def test_lengths_are_halved_from_what_the_rest_curvature_allows() -> None:
+    assert lengths_mm("auto", wire()) == [1.0, 0.5, 0.25, 0.125, 0.0625]
+    assert lengths_mm("auto", wire(CURVED)) == [0.25, 0.125, 0.0625]
+    assert lengths_mm("auto", wire(-100.0)) == [0.125, 0.0625]
+    assert lengths_mm(0.4, wire(CURVED)) == [0.8, 0.4]
+    # twice the length would turn by more than a right angle at rest
+    assert lengths_mm(1.0, wire(1.2)) == [1.0]
+
+
+@pytest.mark.parametrize("name", ["bend", "siphon"])
+def test_the_length_chosen_is_right_to_a_tenth_of_a_voxel(name: str) -> None:
+    found, error = resolved(name)
+    assert all(w.converged for w in found.wires)
+    assert error.max() < 0.03
+    assert np.mean(error <= found.num_mm) >= 0.95
+
+
+def test_a_straight_wire_in_a_wide_bend_needs_no_short_segments() -> None:
+    assert resolved("bend")[0].segment_mm >= 0.5
+
+
+def test_the_bound_is_no_idle_one() -> None:
+    """With segments of 1 mm the curved tip is off by more than with the length chosen, and the bound says so."""
+    found, _ = resolved("siphon")
+    coarse = resolve(partial(insert, siphon()), lengths_mm(1.0, wire(CURVED)))
+    assert coarse.segment_mm == 1.0
+    assert np.nanmax(coarse.num_mm) > 3 * np.nanmax(found.num_mm)
+
+
+def test_a_length_that_loses_depths_is_not_taken() -> None:
+    def one(segment_mm: float) -> Sequence[Solution]:
+        wires = insert(bend(20.0), segment_mm)
+        return wires if segment_mm > 0.3 else [*wires[:-1], replace(wires[-1], status=Status.STALLED)]
+
+    apart = resolve(lambda mm: [replace(w, joints_mm=w.joints_mm + mm) for w in one(mm)], lengths_mm("auto", wire()))
+    assert apart.segment_mm == 0.5
+    assert "fewer depths" in apart.reason
+
+
+def test_a_joint_that_cannot_follow_the_bend_is_no_result() -> None:
+    """A soft tip behind a jump of 1:1000 goes round a U-turn by folding at a joint: at rest, and wrong."""
+    tip = replace(siphon(), guide_wire=GuideWire(1.0, 0.18, np.array([[0.0, 0.01], [3.0, 0.01], [3.0, 10.0]])))
+    turns = [(w.largest_turn_deg, judged(Frame(0), w, 0.18).status) for w in insert(tip, 1.0) if w.converged]
+    assert max(turn for turn, _ in turns) > 30
+    assert {status for turn, status in turns if turn > 30} == {"under_resolved"}
+    assert {status for turn, status in turns if turn <= 30} == {"ok"}
+
+
+def test_a_turn_is_the_angle_between_two_segments() -> None:
+    rest = GuideWire(0.5, 0.18, 10.0, 0.2)
+    (solution,) = Insertion(rest, None, (0, 0, 0), (0, 0, 1)).to_depths([10.0])
+    assert solution.largest_turn_deg == pytest.approx(np.degrees(0.2 * 0.5), abs=1e-9)

@@ -1,0 +1,334 @@
+"""Every public argument is looked at where it comes in: what cannot be used is refused by name, with what was found."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import solver
+from solver import Grid, GuideWire, Insertion, Insertions, VesselWall, relax, skips, warm_up
+from tests.solver.scenes import tube_grid
+
+WIRE = GuideWire(1.0, 0.18, 10.0)
+TUBE = np.full((3, 4, 5), -1.0)
+WALL = VesselWall(Grid(TUBE), 1.0)
+
+NOT_NUMBERS = [np.nan, np.inf, -np.inf, "12", "nan", b"1", None, True, np.True_, [1.0], [[1.0]], {}, 1j, object()]
+NOT_NUMBERS += [np.array([1.0, 2.0]), np.array(True), np.array("1"), np.ma.masked, 10**400]
+ROW = [[0, 0, 1]]
+NOT_VECTORS = [np.nan, "123", ["0", "0", "1"], None, 1.0, [0.0, 1.0], [0, 0, 1, 0], ROW, [0, 0, np.nan]]
+NOT_VECTORS += [[0, 0, np.inf], [None, 0, 1], [[0], [0, 1]], {}, {0.0, 1.0, 2.0}, np.array([False, False, True])]
+NOT_VECTORS += [np.ma.array([0.0, 0.0, 1.0], mask=[True, False, False]), [0j, 0j, 1j], [0, 0, 10**400]]
+NOT_WORDS = [None, 1, True, "", "Newton", ["newton"], np.array(["newton", "slide"]), b"newton", np.nan]
+NOT_TABLES = [[], [[]], [1.0, 2.0], [[0, 1.0, 2.0]], [[0, 1], [1]], [["0", "1"]], [[np.nan, 1.0]], [[0.0, np.nan]]]
+NOT_TABLES += [[[np.inf, 1.0]], [[5, 1.0], [0, 2.0]], [[-1.0, 1.0]], [[0.0, 1.0], [np.nan, 2.0]], np.ones((2, 2), bool)]
+NOT_TABLES += [
+    lambda s: s * np.nan,
+    lambda s: "1",
+    lambda s: None,
+    lambda s: s > 3.0,
+    lambda s: s[:3],
+    lambda s: 1e300 * s,
+]
+HUGE, BELOW = [1e30, 1e300, np.float64(1e18)], [0.0, -1.0, -1e-30]
+ENTRY = {"entry_mm": [0, 0, 0], "entry_direction": [0, 0, 1]}
+FAR = [[0, 0, 1e9], [-1e300, 0, 0]]
+
+
+def wire(**arguments: Any) -> Any:
+    return GuideWire(**({"segment_mm": 1.0, "radius_mm": 0.18, "bending_stiffness_N_mm2": 10.0} | arguments))
+
+
+def wall(**arguments: Any) -> Any:
+    return VesselWall(**({"distance": Grid(TUBE), "stiffness_N_mm2": 1.0} | arguments))
+
+
+def insertion(**arguments: Any) -> Any:
+    return Insertion(**({"wire": WIRE, "wall": WALL} | ENTRY | arguments))
+
+
+def relaxed(**arguments: Any) -> Any:
+    return relax(**({"wire": WIRE, "depth_mm": 5.0} | arguments))
+
+
+def to_depths(**arguments: Any) -> Any:
+    return insertion().to_depths(**({"depths_mm": [1.0, 2.0]} | arguments))
+
+
+def grid(**arguments: Any) -> Any:
+    return Grid(**({"values": TUBE} | arguments))
+
+
+SCENE = {"wire": ["wire", None, 1.0, WALL], "wall": ["wall", 1.0, TUBE, Grid(TUBE), WIRE]}
+CLAMP = {
+    "entry_mm": NOT_VECTORS + FAR,
+    "entry_direction": [*NOT_VECTORS, [0, 0, 0], [0, 0, 1e300]],
+    "down": [v for v in NOT_VECTORS if v is not None] + [[0, 0, 0]],
+    "material_axis": [v for v in NOT_VECTORS if v is not None] + [[0, 0, 2.0], [0, 0, 0]],
+}
+METHOD = {
+    "method": NOT_WORDS,
+    "quadrature": NOT_WORDS,
+    "tolerance": NOT_NUMBERS + HUGE + BELOW + [1.0],
+    "max_iterations": NOT_NUMBERS + HUGE + BELOW + [0.5, 1.5],
+}
+DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
+    "wire": (
+        wire,
+        {
+            "segment_mm": NOT_NUMBERS + HUGE + BELOW,
+            "radius_mm": NOT_NUMBERS + HUGE + [-1.0],
+            "bending_stiffness_N_mm2": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + BELOW,
+            "rest_curvature_per_mm": [v for v in NOT_NUMBERS if not callable(v)] + NOT_TABLES + HUGE + [3.0, -3.0],
+            "weight_N_per_mm": NOT_NUMBERS + HUGE + [-1e-6],
+            "torsional_stiffness_N_mm2": [v for v in NOT_NUMBERS if v is not np.inf] + HUGE + BELOW,
+        },
+    ),
+    "wall": (
+        wall,
+        {
+            "distance": ["x", None, TUBE, TUBE < 0, Grid(TUBE < 0), Grid((TUBE < 0).astype(np.uint8)), Grid(-TUBE)]
+            + [Grid(np.where(np.arange(60).reshape(3, 4, 5) == 7, bad, -1.0)) for bad in (np.nan, np.inf, -1e30)],
+            "stiffness_N_mm2": NOT_NUMBERS + HUGE + BELOW,
+            "friction": NOT_NUMBERS + HUGE + [-0.1],
+            "hull": [
+                *NOT_WORDS,
+                "offset ",
+                "samples",
+                "samples:",
+                "samples:0",
+                "samples:257",
+                "samples:-1",
+                "samples:²",
+            ],
+        },
+    ),
+    "grid": (
+        grid,
+        {
+            "values": [
+                "x",
+                None,
+                1.0,
+                [1.0, 2.0],
+                [[[1.0], [1.0, 2.0]]],
+                np.zeros((2, 2)),
+                np.zeros((0, 2, 2)),
+                np.full((2, 2, 2), None),
+                np.full((2, 2, 2), "1"),
+                np.ma.array(TUBE, mask=TUBE < 0),
+            ],
+            "spacing_mm": [*NOT_VECTORS, [1.0, 0.0, 1.0], [1.0, -1.0, 1.0], [1e9, 1, 1]],
+            "origin_mm": NOT_VECTORS + FAR,
+            "direction": [*NOT_VECTORS, np.eye(2), 2 * np.eye(3), np.ones((3, 3)), np.eye(3) > 0, np.eye(3) * np.nan],
+        },
+    ),
+    "insertion": (
+        insertion,
+        SCENE
+        | CLAMP
+        | METHOD
+        | {
+            "initial": NOT_WORDS,
+            "step_mm": NOT_NUMBERS + HUGE + BELOW + [1e-12],
+            "roll_step_deg": NOT_NUMBERS + HUGE + BELOW + [1e-12],
+            "max_joints": NOT_NUMBERS + HUGE + BELOW + [0.5, 10.5],
+            "tip_load_N": [*NOT_VECTORS, [0, 0, 1e9]],
+            "finest_mm": [v for v in NOT_NUMBERS if v is not np.inf] + BELOW,
+            "shaft_mm": NOT_NUMBERS + HUGE + [-1.0],
+            "shaft_friction_N": NOT_NUMBERS + HUGE + [-1.0],
+        },
+    ),
+    "insertions": (
+        lambda insertions=(), **a: Insertions(insertions, **a),
+        {
+            "insertions": [None, 1.0, "x", [None], [WIRE], insertion(), [insertion(), 1.0]],
+            "threads": [v for v in NOT_NUMBERS if v is not None] + HUGE + BELOW + [0.5],
+        },
+    ),
+    "many": (
+        lambda **a: Insertions([insertion(), insertion()]).to_depths(**({"depths_mm": [1.0, 2.0]} | a)),
+        {
+            "depths_mm": [5.0, "12", None, ["1", "2"], [-1.0], [1j], [[1.0]], [[1.0], [np.nan]], [[1.0], 2.0], {1.0}],
+            "roll_deg": ["1", None, np.nan, [0.0], [0.0, np.nan], [0.0] * 3, [0.0, [0.0] * 3], [True, 0.0], {}, 1e9],
+        },
+    ),
+    "like": (
+        lambda **a: WALL.like(**a),
+        {
+            "stiffness_N_mm2": [v for v in NOT_NUMBERS if v is not None] + HUGE + BELOW,
+            "friction": [v for v in NOT_NUMBERS if v is not None] + HUGE + [-0.1],
+        },
+    ),
+    "to_depths": (
+        to_depths,
+        {
+            "depths_mm": [
+                5.0,
+                "12",
+                b"12",
+                None,
+                ["1", "2"],
+                [1.0, np.nan],
+                [np.inf],
+                [-1.0],
+                [[1.0, 2.0]],
+                [None],
+                [1j],
+                np.array([True, False]),
+                [True, False],
+                {1.0, 2.0},
+                {1.0: 2.0},
+                np.ma.array([1.0, 2.0], mask=[0, 1]),
+                10**400,
+            ],
+            "roll_deg": [v for v in NOT_NUMBERS if np.shape(v) != (2,)]
+            + [[0.0, 0.0, 0.0], [0.0, np.nan], ["0", "0"], [[0.0, 0.0]], [True, False], np.array([True, False]), 1e9],
+        },
+    ),
+    "relax": (
+        relaxed,
+        SCENE
+        | CLAMP
+        | METHOD
+        | {
+            "depth_mm": NOT_NUMBERS + HUGE + BELOW + [1e9, 20_001.0],
+            "roll_deg": NOT_NUMBERS + HUGE,
+            "start_mm": [v for v in NOT_VECTORS if v is not None]
+            + [[[0, 0, 0]], [[0, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0, np.nan]], [[0, 0], [0, 1]], np.eye(3) > 0]
+            + [
+                [["0", "0", "0"], ["0", "0", "1"]],
+                [[0, 0, 50.0], [0, 0, 60.0]],
+                np.zeros((0, 3)),
+                [[0, 0, 0], [0, 0, 1e9]],
+            ],
+            "load_N": [v for v in NOT_VECTORS if v is not None]
+            + [np.zeros((5, 3)), np.full((6, 3), np.nan), [0, 0, 1e9]],
+        },
+    ),
+    "segments_at": (lambda **a: WIRE.segments_at(**a), {"depth_mm": NOT_NUMBERS + HUGE + [-1.0]}),
+    "arcs_at": (lambda **a: WIRE.arcs_at(**a), {"depth_mm": NOT_NUMBERS + HUGE + [-1.0]}),
+    "hull_points": (lambda **a: WALL.hull_points(**a), {"radius_mm": NOT_NUMBERS + HUGE + [-1.0]}),
+    "look_up": (
+        lambda **a: WALL.look_up(**a),
+        {"points_mm": [v for v in NOT_VECTORS if v is not ROW] + [np.zeros((2, 2, 3)), *FAR]},
+    ),
+    "to_index": (
+        lambda **a: Grid(TUBE).to_index(**a),
+        {"points_mm": ["x", None, 1.0, [1.0, 2.0], [0, 0, np.nan], *FAR]},
+    ),
+    "to_mm": (lambda **a: Grid(TUBE).to_mm(**a), {"index": ["x", None, 1.0, [1.0, 2.0], [0, 0, np.nan], [True] * 3]}),
+    "with_values": (lambda **a: Grid(TUBE).with_values(**a), {"values": ["x", None, 1.0, np.zeros((2, 2))]}),
+    "crop": (
+        lambda **a: Grid(TUBE).crop(**({"start": (0, 0, 0), "stop": (2, 2, 2)} | a)),
+        {
+            "start": ["x", None, 1, (0, 0), (-1, 0, 0), (2, 0, 0), (0.5, 0, 0), (np.nan, 0, 0), (True, False, False)],
+            "stop": ["x", None, 1, (2, 2), (2, 2, 9), (4, 2, 2), (0, 2, 2), (1.5, 2, 2), (np.nan, 2, 2)],
+        },
+    ),
+    "warm_up": (warm_up, {"beside": [None, "yes", 2, 1.0, [True], np.nan]}),
+}
+CASES = [
+    pytest.param(call, name, value, id=f"{door}-{name}-{i}")
+    for door, (call, arguments) in DOORS.items()
+    for name, values in arguments.items()
+    for i, value in enumerate(values)
+]
+
+
+@pytest.mark.parametrize(("call", "name", "value"), CASES)
+def test_what_cannot_be_used_is_refused_by_name_at_the_call(call: Callable[..., Any], name: str, value: Any) -> None:
+    word = {"distance": "(distance|grid values)", "start": "(start|crop)", "stop": "(stop|crop)"}.get(name, name)
+    with pytest.raises(ValueError, match=rf"(?s)^\w+: {word}: got .+; allowed: .+; \w+"):
+        call(**{name: value})
+
+
+def test_no_public_argument_is_left_out() -> None:
+    """What stands in ``solver.__all__``, its public methods, and every argument of theirs is in the list above."""
+    listed = {name: set(arguments) for name, (_, arguments) in DOORS.items()}
+    classes = {"wire": GuideWire, "wall": VesselWall, "grid": Grid, "insertion": Insertion, "insertions": Insertions}
+    calls: dict[str, Any] = dict(classes) | {"relax": relax, "warm_up": warm_up}
+    for kind in classes.values():
+        calls |= {n: f for n, f in vars(kind).items() if inspect.isfunction(f) and not n.startswith("_")}
+    # results, and what takes nothing
+    results = {"Solution", "Status", "Snap"}
+    assert set(solver.__all__) - results == {c.__name__ for c in classes.values()} | {"relax", "warm_up"}
+    for name, call in calls.items():
+        arguments = set(inspect.signature(call).parameters) - {"self"}
+        assert arguments == listed.get(name, set()), name
+
+
+junk = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.integers(-(10**20), 10**20),
+    st.text(max_size=5),
+    st.booleans(),
+    st.none(),
+    st.lists(st.floats() | st.booleans() | st.text(max_size=2) | st.none(), max_size=4),
+    st.lists(st.lists(st.floats(), max_size=3), max_size=3),
+)
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.sampled_from(["depth_mm", "roll_deg", "start_mm", "load_N", *CLAMP]), junk)
+def test_whatever_is_given_nothing_undefined_is_called_converged(name: str, value: Any) -> None:
+    solution, refusal = None, ""
+    try:
+        solution = relaxed(**{name: value, "max_iterations": 20})
+    except ValueError as error:
+        refusal = str(error)
+    if solution is None:
+        assert refusal.split(": ")[1] == name
+        return
+    assert np.isfinite(solution.joints_mm).all()
+    assert np.isfinite(solution.frames).all()
+    assert np.isfinite(solution.energy_N_mm)
+
+
+def test_a_skip_that_is_none_is_refused() -> None:
+    with (
+        pytest.raises(ValueError, match=r"^skips: name: got 'foresigt'; allowed: .*foresight.*; choose"),
+        skips.off("foresigt"),
+    ):
+        pass
+
+
+def test_a_depth_is_refused_at_the_call_and_moves_nothing() -> None:
+    push = insertion(wall=VesselWall(tube_grid(), 1.0))
+    next(push.to_depths([5.0]))
+    with pytest.raises(ValueError, match="depths_mm"):
+        push.to_depths("12")
+    assert push.depth_mm == 5.0
+
+
+def test_what_is_given_is_copied() -> None:
+    values, spacing, rows, entry = np.array(tube_grid().values), np.ones(3), np.array([[0.0, 1.0]]), np.zeros(3)
+    box, soft = Grid(values, spacing), GuideWire(1.0, 0.1, rows)
+    push = insertion(wire=soft, wall=None, entry_mm=entry)
+    values[:], spacing[:], rows[:], entry[:] = 7.0, 9.0, 5.0, 3.0
+    assert not np.any(box.values == 7.0)
+    assert box.spacing_mm.tolist() == [1.0, 1.0, 1.0]
+    assert np.asarray(soft.bending_stiffness_N_mm2).tolist() == [[0.0, 1.0]]
+    assert next(push.to_depths([2.0])).joints_mm[0].tolist() == [0.0, 0.0, 0.0]
+    for array in (box.values, box.spacing_mm, soft.bending_stiffness_N_mm2, soft.profile.stiffness):
+        assert not np.asarray(array).flags.writeable
+
+
+def test_a_read_only_array_is_taken_as_it_is() -> None:
+    values = solver.grid.read_only(TUBE)
+    assert np.shares_memory(Grid(values).values, TUBE)
+
+
+@pytest.mark.parametrize("method", ["newton", "closed_form"])
+def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
+    method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules["solver.relax"], "base_frame", lambda *_: np.full((3, 3), np.nan))
+    assert relaxed(method=method).status is solver.Status.NON_FINITE

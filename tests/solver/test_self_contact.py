@@ -1,0 +1,60 @@
+"""A wire that passes through itself is found, whatever the length of its segments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from solver.self_contact import self_overlap_mm
+from tests.naive.passes import closest_mm
+
+RADIUS = 0.18
+
+
+def coil(turns: float, pitch: float, segment: float, radius: float = 4.0) -> np.ndarray:
+    """A helix of a radius, mm; pitch in mm per turn."""
+    length = turns * math.hypot(2 * math.pi * radius, pitch)
+    angle = np.linspace(0.0, 2 * math.pi * turns, max(round(length / segment), 2))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), pitch * angle / (2 * math.pi)])
+
+
+@pytest.mark.parametrize("segment", [1.0, 0.5, 0.1])
+@pytest.mark.parametrize("pitch", [0.05, 0.2, 0.35, 0.37, 1.0])
+def test_turns_of_a_coil_overlap_by_what_their_pitch_lacks(pitch: float, segment: float) -> None:
+    rise = pitch / math.hypot(1.0, pitch / (2 * math.pi * 4.0))  # distance of neighbouring turns
+    # chords lie inside the helix, all by the same sagitta, and turns need not have their joints above each other
+    sagitta = segment**2 / (8 * 4.0)
+    expected = max(2 * RADIUS - rise, 0.0)
+    assert self_overlap_mm(coil(3, pitch, segment), RADIUS) == pytest.approx(expected, abs=sagitta + 1e-6)
+
+
+def test_two_strands_that_cross_between_their_joints_are_seen() -> None:
+    """A loop whose strands cross at right angles, 0.05 mm apart, at the middle of segments of 1 mm."""
+    joints = np.array([[-1.5, 0, 0], [-0.5, 0, 0], [0.5, 0, 0], [1.5, 0, 0], [2.2, 0.7, 0], [1.5, 1.5, 0.05]])
+    joints = np.concatenate([joints, [[0.0, 1.5, 0.05], [0.0, 0.5, 0.05], [0.0, -0.5, 0.05]]])
+    assert self_overlap_mm(joints, RADIUS) == pytest.approx(2 * RADIUS - 0.05, abs=1e-12)
+
+
+def test_a_bend_as_tight_as_the_wire_is_no_contact() -> None:
+    assert self_overlap_mm(coil(0.5, 0.0, 0.02, RADIUS * 1.001), RADIUS) == 0.0
+    assert self_overlap_mm(np.zeros((1, 3)), RADIUS) == 0.0
+    assert self_overlap_mm(np.array([[0.0, 0, 0], [0, 0, 1]]), RADIUS) == 0.0
+
+
+@settings(deadline=None)  # the oracle is slow
+@given(st.integers(0, 10_000), st.floats(0.1, 1.0), st.integers(3, 40))
+def test_all_pairs_of_dense_points_find_no_closer_pass(seed: int, segment: float, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    along = np.cumsum(rng.normal(size=(count, 3)) * 0.6, axis=0) + np.array([0.0, 0.0, 1.0])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    joints = np.concatenate([np.zeros((1, 3)), np.cumsum(segment * along, axis=0)])
+    overlap, step = self_overlap_mm(joints, RADIUS), 0.02
+    # segments count whole: their nearest ends must be further apart than pi radii, so the dense pairs are fewer or more
+    wide = closest_mm(joints, math.pi * RADIUS + 2 * segment, step)
+    narrow = closest_mm(joints, math.pi * RADIUS, step)
+    assert 2 * RADIUS - wide - 1e-9 <= overlap + 1e-12 or wide == math.inf
+    assert overlap <= max(2 * RADIUS - narrow, 0.0) + 2 * step

@@ -1,0 +1,94 @@
+"""The shaft outside the body: how far it lets the tip be behind the hand, and what its own friction takes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver import GuideWire, Insertion, Solution, VesselWall
+from tests.solver.scenes import last, tube_grid
+
+RADIUS, DRAG, SHAFT, TORSION = 0.18, 0.02, 1000.0, 5.0
+
+
+def inserted(coefficient: float = 0.0, torsion: float = TORSION, rest: float = 0.0, **shaft: Any) -> Insertion:
+    """40 mm of wire in a straight tube, its tip pressed to the wall with 0.05 N."""
+    wall = VesselWall(tube_grid(), 20.0, friction=coefficient)
+    wire = GuideWire(1.0, RADIUS, 10.0, rest, torsional_stiffness_N_mm2=torsion)
+    where = {"material_axis": [1, 0, 0], "tip_load_N": [0, 0.05, 0]} | shaft
+    insertion = Insertion(wire, wall, [0, 1.8, 0], [0, 0, 1], **where)
+    last(insertion, np.arange(1.0, 41.0))
+    return insertion
+
+
+def roll(insertion: Insertion, rolls: list[float]) -> Solution:
+    *_, solution = solutions = list(insertion.to_depths([40.0] * len(rolls), rolls))
+    assert all(s.converged for s in solutions)
+    return solution
+
+
+def behind(solution: Solution) -> float:
+    """Roll of the hand over that of the tip, rad."""
+    hand, tip = solution.frames[0], solution.frames[-1]
+    return -math.atan2(tip[:, 0] @ hand[:, 1], tip[:, 0] @ hand[:, 0])
+
+
+@pytest.mark.parametrize(("coefficient", "drag"), [(0.1, 0.0), (0.0, DRAG), (0.1, DRAG)])
+def test_the_shaft_twists_by_the_torques_along_it(coefficient: float, drag: float) -> None:
+    """T L/GJ by what the wire meets inside, and D r L/2GJ by friction that is alike all along the shaft."""
+    insertion = inserted(coefficient, shaft_mm=SHAFT, shaft_friction_N=drag)
+    solution = roll(insertion, [15.0 * i for i in range(1, 37)])
+    normal = np.linalg.norm(solution.contact_force_N, axis=1).sum() / math.hypot(1.0, coefficient)
+    inside, outside = coefficient * normal * RADIUS, drag * RADIUS
+    assert solution.reaction_torque_N_mm == pytest.approx(inside + outside, rel=1e-3)
+    lag = (inside * (40.0 + SHAFT) + outside * SHAFT / 2) / TORSION
+    assert behind(solution) == pytest.approx(lag, rel=5e-3)
+    lost = solution.friction_energy_N_mm
+    assert lost == pytest.approx((inside + outside) * math.radians(15.0), rel=5e-3)
+
+
+def test_ideal_torque_control_feels_the_friction_of_the_shaft_alone() -> None:
+    solution = roll(inserted(torsion=math.inf, shaft_mm=SHAFT, shaft_friction_N=DRAG), [15.0, 30.0])
+    assert solution.reaction_torque_N_mm == pytest.approx(DRAG * RADIUS, rel=1e-6)
+    assert abs(behind(solution)) < 1e-3
+
+
+def test_the_hand_pushes_against_the_friction_of_the_shaft() -> None:
+    free, held = (inserted(shaft_mm=SHAFT, shaft_friction_N=drag) for drag in (0.0, DRAG))
+    for depths, sign in (([41.0, 45.0], 1.0), ([44.0, 41.0], -1.0)):
+        for a, b in zip(free.to_depths(depths), held.to_depths(depths), strict=True):
+            np.testing.assert_allclose(a.joints_mm, b.joints_mm, atol=1e-6)
+            assert b.push_force_N - a.push_force_N == pytest.approx(sign * DRAG, abs=1e-6)
+    # the way there in four steps of 1 mm, but for the springs, which give way by 1 µm when the hand turns back
+    assert b.friction_energy_N_mm == pytest.approx(3.0 * DRAG, rel=1e-3)
+
+
+def test_a_shaft_that_is_pushed_turns_freely() -> None:
+    """Friction acts against the whole motion: 5 mm of push let out the twist that the hand put in."""
+    insertion = inserted(shaft_mm=SHAFT, shaft_friction_N=DRAG)
+    twisted = roll(insertion, [15.0 * i for i in range(1, 25)])
+    assert behind(twisted) == pytest.approx(DRAG * RADIUS * SHAFT / 2 / TORSION, rel=5e-3)
+    *_, pushed = list(insertion.to_depths([41.0, 42.0, 43.0, 44.0, 45.0], 360.0))
+    assert pushed.converged
+    assert abs(behind(pushed)) < 0.02 * behind(twisted)
+    assert pushed.push_force_N == pytest.approx(DRAG, rel=0.02)
+
+
+def test_a_bent_tip_follows_the_hand_later() -> None:
+    """The same roll of the hand turns the tip less the longer the shaft is."""
+    angle = []
+    for length in (0.0, 100.0, 1000.0):
+        insertion = inserted(0.2, rest=0.02, shaft_mm=length, tip_load_N=[0, 0, 0])
+        solution = roll(insertion, [20.0, 40.0])
+        angle.append(behind(solution))
+    assert 0.0 < angle[0] < angle[1] < angle[2]
+
+
+@pytest.mark.parametrize("name", ["shaft_mm", "shaft_friction_N"])
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+def test_a_shaft_that_cannot_be_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"insertion: {name}: got"):
+        Insertion(GuideWire(1.0, RADIUS, 10.0), None, [0, 0, 0], [0, 0, 1], **{name: value})

@@ -1,0 +1,82 @@
+"""Where a wire gives way: steps are taken again in shorter ones there, and the event is told."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from solver import GuideWire, Insertion, Solution, VesselWall, relax
+from tests.solver.scenes import Array, bend_grid, sampled
+
+
+def ringed(p: Array) -> Array:
+    """A tube with a ring on its wall at z = 12 mm that leaves 0.9 mm: a curved tip catches on it, and turns back."""
+    across = np.hypot(p[..., 0], p[..., 1])
+    return np.asarray(across - 1.8 + 0.9 * np.exp(-(((p[..., 2] - 12.0) / 0.6) ** 2)))
+
+
+def caught(**how: float) -> list[Solution]:
+    wall = VesselWall(sampled(ringed, 0.3, (-4, -4, -3), (4, 4, 34), "float32"), 3.0)
+    wire = GuideWire(1.0, 0.18, [[0, 0.5], [15, 2.0]], [[0, 0.3], [6, 0.3], [6, 0.0]])
+    insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0], **how)  # type: ignore[arg-type]
+    return list(insertion.to_depths(np.arange(1.0, 31.0)))
+
+
+def test_a_snap_is_bracketed_and_told() -> None:
+    found, coarse = caught(), caught(finest_mm=1.0)
+    assert all(s.converged for s in found)
+    last = found[-1]
+    snap = last.snaps[0]
+    assert 29.0 < snap.from_mm < snap.to_mm <= 29.0 + 1.0
+    assert snap.to_mm - snap.from_mm <= 0.05 + 1e-9
+    assert snap.moved_mm > 5.0
+    # all that the hand's work does not find again in wire and wall was released there
+    assert snap.released_N_mm == pytest.approx(last.dissipated_N_mm, rel=0.02)
+    assert last.uncertain
+    assert not any(s.uncertain for s in found[:-1])
+    # without shorter steps it is seen as well, but not where
+    assert coarse[-1].snaps[0].to_mm - coarse[-1].snaps[0].from_mm > 0.3
+
+
+def test_a_smooth_insertion_is_left_alone() -> None:
+    wall, wire = VesselWall(bend_grid(), 1.0), GuideWire(1.0, 0.18, 10.0)
+    both = []
+    for finest in (0.05, np.inf):
+        insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], finest_mm=finest)
+        both.append(list(insertion.to_depths(np.arange(1.0, 61.0))))
+    for with_it, without in zip(*both, strict=True):
+        np.testing.assert_array_equal(with_it.joints_mm, without.joints_mm)
+        assert with_it.counts == without.counts
+        assert not with_it.snaps
+        assert not with_it.uncertain
+    # work and energy agree to what the trapezium rule leaves of a force that rises in steps of 1 mm
+    lost = sum(s.dissipated_N_mm for s in both[0])
+    assert abs(lost) < 0.01 * both[0][-1].energy_N_mm
+
+
+@pytest.mark.parametrize("step", [1.0, 0.1])
+def test_work_of_the_hand_goes_into_the_wire(step: float) -> None:
+    """A free curved wire that is pushed, rolled and pulled back loses nothing, a finite torsion included."""
+    wire = GuideWire(1.0, 0.18, 2.0, 0.03, torsional_stiffness_N_mm2=3.0)
+    insertion = Insertion(
+        wire, VesselWall(bend_grid(), 1.0), [0, 0, 0], [0, 0, 1], step_mm=step, roll_step_deg=15 * step
+    )
+    depths, rolls = [*np.arange(2.0, 51.0, 2.0), 50.0, 50.0, 45.0], [*[0.0] * 25, 20.0, 40.0, 40.0]
+    found = list(insertion.to_depths(depths, rolls))
+    assert all(s.converged and not s.snaps for s in found)
+    assert abs(sum(s.dissipated_N_mm for s in found)) < (0.02 if step == 1.0 else 0.002) * found[-1].energy_N_mm
+
+
+def test_the_least_pivot_falls_to_zero_at_eulers_load() -> None:
+    """Hencky's chain, half a cell at the clamp: P = 4 EI / l² sin²(pi / 4n), exact at any number of segments."""
+    n, length, bending = 40, 1.0, 10.0
+    critical = 4 * bending / length**2 * np.sin(np.pi / (4 * n)) ** 2
+    pivots = []
+    for share in (0.0, 0.5, 0.9, 0.99, 0.999):
+        load = [0.0, 0.0, -share * critical]
+        pivots.append(relax(GuideWire(length, 0.18, bending), depth_mm=n * length, load_N=load).least_pivot)
+    assert pivots[0] == 1.0
+    assert all(a > b for a, b in pairwise(pivots))
+    assert 0.0 < pivots[-1] < 0.05
