@@ -93,8 +93,7 @@ class Settings:
         """The same for the kernels."""
         method, count = METHODS.index(self.method), int(self.max_iterations)
         sweeps = tol.SWEEPS_PER_ITERATION if method == CLOSED_FORM else 1
-        work = tol.WORK + tol.WORK_PER_ITERATION * count
-        return Limits(method, float(self.tolerance), count * sweeps, work)
+        return Limits(method, float(self.tolerance), count * sweeps, tol.WORK + tol.WORK_PER_ITERATION * count)
 
 
 def relax(

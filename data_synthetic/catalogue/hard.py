@@ -52,8 +52,7 @@ def introducer(rng: np.random.Generator, frames: int) -> Setup:
 @scene("moved-phantom", tries="segment trace report", frames=5)
 def moved_phantom(rng: np.random.Generator, frames: int) -> Setup:
     """the phantom was nudged between scans: the reference does not fit"""
-    shift = rng.normal(0.0, 0.35, (frames, 3))
-    return replace(bend.plan(rng, frames), motion_mm=np.clip(shift, -0.6, 0.6))
+    return replace(bend.plan(rng, frames), motion_mm=np.clip(rng.normal(0.0, 0.35, (frames, 3)), -0.6, 0.6))
 
 
 @scene("anisotropic", tries="load segment trace", frames=5)

@@ -38,8 +38,7 @@ def willis_setup(
     anatomy = circle_of_willis(rng, plan)
     carotid = anatomy.tube("right.ICA")
     depths = spread(10.0, carotid.length_mm - ENTRY_ARC_MM + past_mm, frames)
-    rolls = (roll_deg,) * frames
-    return Setup(anatomy, carotid, ENTRY_ARC_MM, depths, rolls, CENTRE_MM, bone=skull_base())
+    return Setup(anatomy, carotid, ENTRY_ARC_MM, depths, (roll_deg,) * frames, CENTRE_MM, bone=skull_base())
 
 
 @scene("circle-of-willis", tries="load segment trace simulate compare report", fov_mm=76.8, size=256, frames=30)

@@ -42,8 +42,7 @@ def integer_offset(grid: Grid, inner: Grid) -> NDArray[np.int64] | None:
         grid.direction, inner.direction, atol=1e-4
     )
     shift = grid.to_index(inner.origin_mm)
-    whole = same and np.all(np.abs(shift - np.rint(shift)) <= 0.02)
-    return np.rint(shift).astype(np.int64) if whole else None
+    return np.rint(shift).astype(np.int64) if same and np.all(np.abs(shift - np.rint(shift)) <= 0.02) else None
 
 
 def corners_mm(grid: Grid) -> Array:

@@ -114,8 +114,7 @@ def sheath(bore_mm: float = 0.25, wall_stiffness: float = 1.0) -> BenchScene:
 def cantilever() -> BenchScene:
     """Scene A: 200 mm, no wall, dead tip load with P L² / EI = 5: the elastica, whose closed form is known."""
     length = 200.0
-    force = 5.0 * STIFFNESS / length**2
-    return BenchScene("cantilever", length, step_mm=length, load_N=(force, 0.0, 0.0))
+    return BenchScene("cantilever", length, step_mm=length, load_N=(5.0 * STIFFNESS / length**2, 0.0, 0.0))
 
 
 @cache

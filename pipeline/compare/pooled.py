@@ -105,8 +105,7 @@ POOLING: dict[str, Callable[[Array, Array], float]] = {
 def blocks(count: int, length: int) -> list[NDArray[np.intp]]:
     """Indices 0..count-1 in runs of ``length``; a short rest joins the last run."""
     starts = range(0, max(count - length + 1, 1), length)
-    cuts = [*starts, count]
-    return [np.arange(a, b) for a, b in itertools.pairwise(cuts)]
+    return [np.arange(a, b) for a, b in itertools.pairwise([*starts, count])]
 
 
 def intervals(

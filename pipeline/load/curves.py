@@ -18,8 +18,7 @@ _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"))
 def markups_in(path: Path) -> list[dict[str, Any]]:
     """The markups of a 3D Slicer file that have control points."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))["markups"]
-        return [m for m in found if m.get("controlPoints")]
+        return [m for m in json.loads(path.read_text(encoding="utf-8"))["markups"] if m.get("controlPoints")]
     except (ValueError, KeyError, TypeError) as error:
         raise refused(path, repr(error), "a 3D Slicer markups file", "save the curve as .mrk.json") from error
 

@@ -123,14 +123,13 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
     ids = sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
     sizes = {uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid) for uid in ids}
     known = {Path(name).name for files in sizes.values() for name in files}
-    strangers = [p for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
-    lost = [p.name for p in strangers if _may_be_a_slice(p)]
+    others = [p for p in sorted(folder.iterdir()) if p.suffix.lower() in SUFFIXES and p.name not in known]
+    lost = [p.name for p in others if _may_be_a_slice(p)]
     if lost:
         which = f"{len(lost)} of its files cannot be read as DICOM: {', '.join(lost[:5])}. "
         raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
-    images = {uid: files for uid, files in sizes.items() if files and _is_image(Path(files[0]))}
-    if wanted:
-        images = {uid: files for uid, files in images.items() if uid == wanted}
+    series = {wanted: sizes.get(wanted, ())} if wanted else sizes
+    images = {uid: files for uid, files in series.items() if files and _is_image(Path(files[0]))}
     if len(images) != 1:
         groups = "\n".join(f"    {uid}: {len(files)} files" for uid, files in images.items()) or "    none"
         below = [d.name for d in sorted(folder.iterdir()) if d.is_dir()]
@@ -141,16 +140,12 @@ def _series_files(folder: Path, wanted: str) -> list[Path]:
 
 
 def _may_be_a_slice(path: Path) -> bool:
-    """Whether a file that GDCM puts in no series may be a damaged slice: it is not whole, or of a class of images.
-
-    Contours, plans and reports (RTSTRUCT, SR) lie beside the slices that they were made from.
-    """
-    from pydicom import dcmread
-    from pydicom.errors import InvalidDicomError
+    """Whether a file in no series may be a damaged slice; contours, plans and reports lie beside the slices, too."""
+    import pydicom
 
     try:
-        kind = dcmread(path, stop_before_pixels=True).SOPClassUID
-    except (InvalidDicomError, AttributeError, ValueError, TypeError, EOFError, struct.error):
+        kind = pydicom.dcmread(path, stop_before_pixels=True).SOPClassUID
+    except (pydicom.errors.InvalidDicomError, AttributeError, ValueError, TypeError, EOFError, struct.error):
         return True
     return kind.is_private or "Image Storage" in kind.name
 

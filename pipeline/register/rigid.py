@@ -132,5 +132,4 @@ def rigid(frame: Volume, reference: Volume, edges: NDArray[np.bool_], centre_mm:
     start.SetCenter(centre_mm.tolist())
     method.SetInitialTransform(start, inPlace=True)
     method.Execute(fixed, moving)
-    origin = np.array(start.TransformPoint((0.0, 0.0, 0.0)))
-    return Motion(np.reshape(start.GetMatrix(), (3, 3)), origin)
+    return Motion(np.reshape(start.GetMatrix(), (3, 3)), np.array(start.TransformPoint((0.0, 0.0, 0.0))))

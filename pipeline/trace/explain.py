@@ -69,8 +69,7 @@ def _on_bridges(points: Array, attempt: Attempt, reach: float) -> NDArray[np.boo
     gaps = attempt.path.points[attempt.path.bridged]
     if len(gaps) == 0:
         return np.zeros(len(points), bool)
-    square = np.min(np.sum((points[:, None] - gaps[None]) ** 2, axis=2), axis=1)
-    return np.asarray(square < reach**2)
+    return np.asarray(np.min(np.sum((points[:, None] - gaps[None]) ** 2, axis=2), axis=1) < reach**2)
 
 
 def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> list[Candidate]:
