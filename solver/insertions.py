@@ -5,30 +5,27 @@ take little longer than one; see ``_kernels.lanes``.
 """
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver import skips
-from solver._kernels import data, records
-from solver._kernels.lane_block import LANE, SHAPES, Block
-from solver._kernels.lane_insertion import Plan, advance_together
-from solver._kernels.lanes import WIDTH, room
+from solver._kernels.lane_insertion import advance_together
+from solver._kernels.lanes import WIDTH
 from solver._kernels.minimise import NEWTON
+from solver.crew import Crew, Job, go_alone
 from solver.doors import Found, instance, whole
 from solver.errors import refuse
 from solver.insertion import Insertion
-from solver.solution import Solution, Status
-from solver.workspace import SNAPS_KEPT, Workspace
+from solver.solution import Solution
 
 LISTS = (list, tuple, np.ndarray)
 MOST_THREADS = 4096
-Goals = tuple[list[float], list[float]]
-"""Depths, mm, and rolls, degrees."""
 
 
 class Insertions:
@@ -66,26 +63,28 @@ class Insertions:
         depths = _one_each("depths_mm", given, count) if own else [given] * count
         rolls = _one_each("roll_deg", roll_deg, count) if isinstance(roll_deg, LISTS) else [roll_deg] * count
         goals = [one._goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
-        found: list[list[Solution]] = [[] for _ in range(count)]
+        jobs = [Job(one, *goal, []) for one, goal in zip(self.insertions, goals, strict=True)]
+        kinds: dict[Any, deque[Job]] = {}
+        # those that go deepest first, so that none of them is left over when all others are done
+        for job in sorted(jobs, key=lambda job: -max(job.depths, default=0.0)):
+            kinds.setdefault(kind_of(job) or id(job), deque()).append(job)
+        with ExitStack() as stack:
+            for job in jobs:
+                job.insertion._hold()
+                stack.callback(job.insertion._release)
+            tasks = [task for kind in kinds.values() for task in _tasks(kind, self.threads)]
+            with ThreadPoolExecutor(self.threads) as pool:
+                for ended in [pool.submit(task) for task in tasks]:
+                    ended.result()
+        return [job.found for job in jobs]
 
-        def work(team: list[int]) -> None:
-            if len(team) == 1:
-                found[team[0]] = list(self.insertions[team[0]].to_depths(*goals[team[0]]))
-                return
-            for index, solutions in zip(team, together([(self.insertions[i], goals[i]) for i in team]), strict=True):
-                found[index] = solutions
 
-        with ThreadPoolExecutor(self.threads) as pool:
-            list(pool.map(work, self._teams(goals)))
-        return found
-
-    def _teams(self, goals: Sequence[Goals]) -> list[list[int]]:
-        """Who goes with whom: like with like, up to WIDTH of them, those that go deepest first."""
-        kinds: dict[Any, list[int]] = {}
-        deepest = [max(depths, default=0.0) for depths, _ in goals]
-        for index in sorted(range(len(goals)), key=lambda i: -deepest[i]):
-            kinds.setdefault(kind_of(self.insertions[index], deepest[index]) or index, []).append(index)
-        return [kind[i : i + WIDTH] for kind in kinds.values() for i in range(0, len(kind), WIDTH)]
+def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
+    """What to do in threads for jobs of one kind."""
+    if len(kind) == 1:
+        return [partial(go_alone, kind[0])]
+    crews = [Crew(kind) for _ in range(min(threads, -(-len(kind) // WIDTH)))]
+    return [partial(crew.lead, kind) for crew in crews]
 
 
 def _one_each(name: str, values: Any, count: int) -> list[Any]:
@@ -95,81 +94,12 @@ def _one_each(name: str, values: Any, count: int) -> list[Any]:
     return list(values)
 
 
-def kind_of(insertion: Insertion, deepest_mm: float) -> tuple[int, int, int] | None:
+def kind_of(job: Job) -> tuple[int, int, int] | None:
     """What insertions must share to go in lock-step; None for those that cannot."""
-    work, wall = insertion._work, insertion.wall
+    insertion, wall, work = job.insertion, job.insertion.wall, job.insertion._work
     plain = wall is not None and wall.friction == 0.0 and wall.samples == 0 and work.shaft.drag == 0.0
     plain = plain and not insertion.wire.twists and insertion.wire.weight_N_per_mm == 0.0
-    reached = work.limits.method == NEWTON and work.skips == skips.ALL and insertion._reaches(deepest_mm)
+    reached = insertion._reaches(max(job.depths, default=0.0))
     # there are no vectors where nothing is compiled
-    possible = plain and reached and hasattr(advance_together, "py_func")
-    return (id(work.field.coefficients), work.rule.zone, work.rule.tip_at.size) if possible else None
-
-
-def together(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:
-    """The solutions of up to WIDTH insertions that go in lock-step."""
-    with ExitStack() as stack:
-        for insertion, goals in team:
-            insertion._hold()
-            stack.callback(insertion._release)
-            insertion._begin(*goals)
-        return _in_lock_step(team)
-
-
-def _in_lock_step(team: Sequence[tuple[Insertion, Goals]]) -> list[list[Solution]]:
-    """The solutions of insertions that are held and ready."""
-    plan = _plan(team)
-    works = [insertion._work for insertion, _ in team]
-    size = max(
-        insertion.wire.segments_at(max(*depths, insertion.depth_mm))[0] for insertion, (depths, _) in team if depths
-    )
-    first = first_points(works[0], size)
-    axes = {"k": size, "n": size + 1, "p": int(first[-1])}
-    block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
-    wires = tuple(works[lane if lane < len(works) else 0].handle for lane in range(WIDTH))
-    kinds = LANE, records.DESCENT, records.COUNTERS
-    notes = tuple(np.zeros(WIDTH, kind).view(np.recarray) for kind in kinds)
-    advance_together(wires, plan, notes, block, first)
-    return [_solutions(plan, lane) for lane in range(len(team))]
-
-
-def first_points(work: Workspace, size: int) -> NDArray[np.int64]:
-    """First look-up point (size + 2,) of each node of a wire of ``size`` segments, see ``chain.place_points``."""
-    rule, behind = work.rule, np.arange(size)[::-1]
-    counts = np.where(behind <= rule.zone, 2, 1) if rule.tip_at.size > 1 else np.ones(size, dtype=np.int64)
-    counts[-1] = rule.tip_at.size
-    return np.concatenate([[0, 0], np.cumsum(counts)])
-
-
-def _plan(team: Sequence[tuple[Insertion, Goals]]) -> Plan:
-    """Where they go, with room for what they find."""
-    most = max(len(depths) for _, (depths, _) in team)
-    goal, row, count = np.zeros((WIDTH, most, 2)), np.zeros((WIDTH, most), np.int64), np.zeros(WIDTH, np.int64)
-    rows = 0
-    for lane, (insertion, (depths, rolls)) in enumerate(team):
-        count[lane] = len(depths)
-        goal[lane, : len(depths)] = np.column_stack([depths, rolls])
-        # a wire that does not come out again stays as long as it was
-        longest = np.maximum.accumulate([max(d, insertion.depth_mm) for d in depths])
-        room_for = [insertion.wire.segments_at(d)[0] + 1 for d in longest]
-        row[lane, : len(depths)] = np.cumsum(room_for) - room_for
-        rows = max(rows, sum(room_for))
-    x, r, force = np.zeros((WIDTH, rows, 3)), np.zeros((WIDTH, rows, 3, 3)), np.zeros((WIDTH, rows, 3))
-    kinds = (records.PLACE, records.REPORT, records.ENERGIES, records.COUNTERS)
-    place, report, energies, counters = (np.zeros((WIDTH, most), kind).view(np.recarray) for kind in kinds)
-    ended = np.zeros((WIDTH, most, 3), np.int64)
-    snaps, blank = np.zeros((WIDTH, most, SNAPS_KEPT), records.SNAP), np.zeros(1, records.COUNTERS)
-    return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, snaps, blank)
-
-
-def _solutions(plan: Plan, lane: int) -> list[Solution]:
-    """What a lane found at its depths."""
-    names = "place", "report", "energies", "counters", "ended", "row"
-    noted = zip(*(getattr(plan, name)[lane, : plan.count[lane]].tolist() for name in names), strict=True)
-    found = []
-    for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
-        arrays = [a[lane, row : row + k + 1] for a in (plan.x, plan.r, plan.force)]
-        depth, roll, *_ = notes[0]
-        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll
-        found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[lane, n], ended))
-    return found
+    possible = work.limits.method == NEWTON and work.skips == skips.ALL and hasattr(advance_together, "py_func")
+    return (id(work.field), work.rule.zone, work.rule.tip_at.size) if plain and reached and possible else None

@@ -15,7 +15,7 @@ from solver._kernels.flags import inlined, kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
-from solver._kernels.lane_decide import ALONE, DONE, IDLE, READY, RESTED, STOPPED, SWEEP
+from solver._kernels.lane_decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP
 from solver._kernels.lane_relax import Team, do_round, hand_over, take_over
 from solver._kernels.lanes import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
@@ -48,8 +48,11 @@ class Plan(NamedTuple):
 
 
 @released
-def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any) -> None:
-    """Lead each wire through all its depths."""
+def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any, until_idle: bool) -> None:
+    """Lead each wire through all its depths.
+
+    until_idle : come back as soon as a lane has nothing left to do; called again, the others go on where they were.
+    """
     block = Block(
         in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
         in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
@@ -61,12 +64,12 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
     number = raw.number
     left = 0
     for lane in range(WIDTH):
-        set_up(team, number, lane)
-        if plan.count[lane] > 0:
+        if lanes[lane].phase == NEW:
+            set_up(team, number, lane)
             next_goal(team, plan, lane)
             proceed(team, plan, raw, lane)
-            left += lanes[lane].phase != IDLE
-    while left > 0:
+        left += lanes[lane].phase != IDLE
+    while left > 0 and not (until_idle and left < WIDTH):
         do_round(team, block, raw, number)
         left = 0
         for lane in range(WIDTH):
@@ -80,7 +83,7 @@ def set_up(team: Team, number: Any, lane: int) -> None:
     """Put into a lane what stays the same all the way."""
     me, wire = team.lanes[lane], team.wires[lane]
     number[STIFFNESS, lane], number[REACH, lane] = wire.problem.stiffness, wire.problem.chain.reach
-    me.phase, me.goal, me.tolerance = IDLE, -1, wire.limits.tolerance
+    me.goal, me.tolerance = -1, wire.limits.tolerance
 
 
 @kernel

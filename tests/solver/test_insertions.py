@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from solver import GuideWire, Insertion, Insertions, Solution, VesselWall, skips
-from solver.insertions import first_points, kind_of
+from solver.crew import Job, first_points
+from solver.insertions import kind_of
 from tests.solver.scenes import bend_grid, fork_grid, sampled, sheath_grid
 from tests.solver.test_snaps import ringed
 
@@ -189,7 +190,7 @@ def test_those_that_cannot_go_in_lock_step_go_by_themselves() -> None:
             slow,
         ]
 
-    assert [kind_of(one, 30.0) for one in make()] == [None] * 9
+    assert [kind_of(Job(one, [30.0], [0.0], [])) for one in make()] == [None] * 9
     both(make, [[10.0, 30.0]] * 9, [0.0] * 9)
 
 
