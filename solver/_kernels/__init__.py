@@ -1,6 +1,6 @@
 """Every compiled function of the solver. In: named tuples of arrays and scalars. Out: numbers, or filled arrays.
 
-flags            the five decorators                    data             what the kernels hand to each other
+flags            the six decorators                     data             what the kernels hand to each other
 algebra          3x3 matrices as tuples of scalars      rotation         exponential map and its derivatives
 field            the interpolated signed distance       wall_law         energy, force, curvature of the wall
 chain            a wire cut into segments               friction         Coulomb friction as a potential

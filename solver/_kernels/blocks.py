@@ -107,8 +107,10 @@ def lever(o: Three, f: Three, stiffness: Six) -> tuple[Nine, Six]:
 def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Three, Three]:
     """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
     chain, state = problem.chain, problem.state
-    load = apply_transposed(frame, load3(chain.load, n))
-    f, g = (-load[0], -load[1], -load[2]), ZERO3
+    load, f, g = load3(chain.load, n), ZERO3, ZERO3
+    # the tip alone bears one, as a rule
+    if load != ZERO3:
+        f = scaled(-1.0, apply_transposed(frame, load))
     for p in range(chain.first[n], chain.first[n + 1]):
         d = state.penetration[slot, p]
         if d != 0.0:
@@ -197,8 +199,9 @@ def stiffened(q: Six, more: float) -> Six:
 def solve_block(q: Six, twisting: bool) -> Nine:
     """Minus the inverse of Q_uu; without a twist variable its last row and column are zero."""
     if not twisting:
-        det = q[0] * q[1] - q[3] * q[3]
-        return -q[1] / det, q[3] / det, 0.0, q[3] / det, -q[0] / det, 0.0, 0.0, 0.0, 0.0
+        per_det = -1.0 / (q[0] * q[1] - q[3] * q[3])
+        i2 = -q[3] * per_det
+        return q[1] * per_det, i2, 0.0, i2, q[0] * per_det, 0.0, 0.0, 0.0, 0.0
     c00 = q[1] * q[2] - q[5] * q[5]
     c01 = q[4] * q[5] - q[3] * q[2]
     c02 = q[3] * q[5] - q[4] * q[1]

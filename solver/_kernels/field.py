@@ -95,10 +95,10 @@ def cubic(t: float) -> Four:
     s = min(max(t, 0.0), 1.0)
     r, beyond, (a, b, c, d) = 1 - s, t - s, slopes(t)
     return (
-        r * r * r / 6 + beyond * a,
+        r * r * r * (1 / 6) + beyond * a,
         2.0 / 3 - s * s * (1 - 0.5 * s) + beyond * b,
         2.0 / 3 - r * r * (1 - 0.5 * r) + beyond * c,
-        s * s * s / 6 + beyond * d,
+        s * s * s * (1 / 6) + beyond * d,
     )
 
 

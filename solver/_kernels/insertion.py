@@ -8,10 +8,11 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import data
+from solver._kernels.algebra import load3
 from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
-from solver._kernels.flags import inlined, kernel, merged, released
+from solver._kernels.flags import inlined, merged, owner, released
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
@@ -32,7 +33,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     return outcome, iterations, sum_up(handle, laid)
 
 
-@kernel
+@owner
 def sum_up(handle: Any, laid: int) -> int:
     """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
@@ -126,7 +127,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     return settle(handle, (depth, roll, energy), k, outcome, laid, hard), used
 
 
-@kernel
+@owner
 def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, hard: bool) -> int:
     """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
 
@@ -183,7 +184,8 @@ def allowed(
         longest = min(introducer.step, abs(ahead))
         if ahead > 0.0 and problem.stiffness > 0.0:
             k, _ = segments_at(depth, table.segment)
-            tip, along = problem.state.x[data.CURRENT, k], problem.state.r[data.CURRENT, k, :, 2]
+            r, tip = problem.state.r[data.CURRENT], load3(problem.state.x[data.CURRENT], k)
+            along = (r[k, 0, 2], r[k, 1, 2], r[k, 2, 2])
             longest = free_way(problem.field, tip, along, longest, introducer.rise)
         fraction = min(fraction, longest / abs(ahead))
     return fraction

@@ -11,7 +11,7 @@ from solver._kernels import data
 from solver._kernels.bare import bare
 from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
-from solver._kernels.flags import inlined, kernel, merged, released
+from solver._kernels.flags import merged, owner, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
@@ -78,7 +78,7 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
             left += lanes[lane].phase != IDLE
 
 
-@kernel
+@owner
 def set_up(team: Team, number: Any, lane: int) -> None:
     """Put into a lane what stays the same all the way."""
     me, wire = team.lanes[lane], team.wires[lane]
@@ -86,7 +86,7 @@ def set_up(team: Team, number: Any, lane: int) -> None:
     me.goal, me.tolerance = -1, wire.limits.tolerance
 
 
-@kernel
+@owner
 def next_goal(team: Team, plan: Plan, lane: int) -> None:
     """Set the next depth as the goal, or let the lane idle where there is none."""
     me, wire = team.lanes[lane], team.wires[lane]
@@ -98,7 +98,7 @@ def next_goal(team: Team, plan: Plan, lane: int) -> None:
         me.outcome, me.iterations, me.phase = data.CONVERGED, 0, READY
 
 
-@kernel
+@owner
 def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
     """End a relaxation, and go on until the next step has to be relaxed or nothing is left to do."""
     me, wire = team.lanes[lane], team.wires[lane]
@@ -129,7 +129,7 @@ def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
         relaxed = True
 
 
-@inlined
+@merged
 def levenbergs(team: Team, lane: int) -> int:
     """How often a wire was held back on its way to a depth, in its lane and alone."""
     return int(team.counts[lane].levenberg + team.wires[lane].problem.scratch.counters[0].levenberg)
@@ -169,7 +169,7 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem, levenberg: int) -> 
     me.phase = READY if goes_on else STOPPED
 
 
-@kernel
+@owner
 def write_down(team: Team, plan: Plan, number: Any, lane: int) -> None:
     """Write down the wire at a depth."""
     me, wire = team.lanes[lane], team.wires[lane]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from solver._kernels import newton_method
 from solver._kernels.crossing import free_fraction
 from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
-from solver._kernels.flags import kernel, merged
+from solver._kernels.flags import kernel, merged, owner
 from solver._kernels.forces import copy_state
 from solver._kernels.lane_block import ACCEPTED, ACTIVE, DAMPING, FRACTION, JUMP, MOMENT, START, Block, put_in, take_out
 from solver._kernels.lane_decide import (
@@ -141,7 +141,8 @@ def reachable(team: Team, x: Any, lane: int) -> bool:
         for a in range(3):
             square += (x[TRIAL, n, a, lane] - x[CURRENT, n, a, lane]) ** 2
         if square > limit:
-            old, new = x[CURRENT, n, :, lane], x[TRIAL, n, :, lane]
+            old = (x[CURRENT, n, 0, lane], x[CURRENT, n, 1, lane], x[CURRENT, n, 2, lane])
+            new = (x[TRIAL, n, 0, lane], x[TRIAL, n, 1, lane], x[TRIAL, n, 2, lane])
             if free_fraction(field, old, new, math.sqrt(square)) < 1.0:
                 return False
     return True
@@ -170,7 +171,7 @@ def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
 
 
-@kernel
+@owner
 def go_alone(team: Team, raw: Block, lane: int) -> None:
     """Do one iteration of a lane by itself, or end its relaxation where none is left."""
     me, wire = team.lanes[lane], team.wires[lane]

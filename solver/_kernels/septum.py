@@ -15,7 +15,7 @@ from solver import _tolerances as tol
 from solver._kernels.algebra import Three, dot, load3, minus, mix
 from solver._kernels.data import Field
 from solver._kernels.field import clipped, indices, jet_at, locate, value
-from solver._kernels.flags import cached, inlined, kernel
+from solver._kernels.flags import cached, inlined, kernel, owner
 
 Foot = tuple[float, float, float, float]
 """A place in a lumen, mm, and the distance there, mm; the distance is inf where none was found."""
@@ -123,7 +123,7 @@ def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
     return False
 
 
-@kernel
+@owner
 def joined(field: Field, p: Three, q: Three, top: float) -> bool:
     """Whether a way on which the distance is below ``top`` leads from one place to another nearby: a flood from p."""
     d = minus(q, p)

