@@ -1,4 +1,4 @@
-"""A crew: eight lanes that take insertions from a queue, so that none idles while another has far to go."""
+"""A crew: eight lanes that take insertions from a queue, eight at a time; other threads' crews take from it too."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver._kernels import data, records
 from solver._kernels.lane_block import LANE, SHAPES, Block
-from solver._kernels.lane_decide import IDLE, NEW
+from solver._kernels.lane_decide import NEW
 from solver._kernels.lane_insertion import Plan, advance_together
 from solver._kernels.lanes import WIDTH, room
 from solver.insertion import Insertion
@@ -38,6 +38,14 @@ def go_alone(job: Job) -> None:
     job.found.extend(insertion._go(depth, roll) for depth, roll in zip(job.depths, job.rolls, strict=True))
 
 
+def _next(queue: deque[Job]) -> Job | None:
+    """The next job of a queue that several threads take from, None where none is left."""
+    try:
+        return queue.popleft()
+    except IndexError:
+        return None
+
+
 class Crew:
     """Room for eight wires in lanes, and for what they find. Whoever makes it holds the insertions."""
 
@@ -54,20 +62,13 @@ class Crew:
 
     def lead(self, queue: deque[Job]) -> None:
         """Do jobs of a queue that others may take from as well until none is left."""
-        busy: dict[int, Job] = {}
-        while True:
-            for lane in range(WIDTH):
-                if lane not in busy:
-                    try:
-                        busy[lane] = queue.popleft()
-                    except IndexError:
-                        break
-                    self._start(lane, busy[lane])
-            if not busy:
-                return
-            advance_together(tuple(self.wires), self.plan, self.notes, self.block, self.first, bool(queue))
-            for lane in [lane for lane in busy if self.notes[0]["phase"][lane] == IDLE]:
-                busy.pop(lane).found.extend(_solutions(self.plan, lane))
+        while jobs := [job for job in (_next(queue) for _ in range(WIDTH)) if job is not None]:
+            for lane, job in enumerate(jobs):
+                self._start(lane, job)
+            # a free lane waits for the others: a wire at another depth would make all of them sweep its length
+            advance_together(tuple(self.wires), self.plan, self.notes, self.block, self.first)
+            for lane, job in enumerate(jobs):
+                job.found.extend(_solutions(self.plan, lane))
 
     def _start(self, lane: int, job: Job) -> None:
         """Put a wire into a lane."""

@@ -48,11 +48,8 @@ class Plan(NamedTuple):
 
 
 @released
-def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any, until_idle: bool) -> None:
-    """Lead each wire through all its depths.
-
-    until_idle : come back as soon as a lane has nothing left to do; called again, the others go on where they were.
-    """
+def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any) -> None:
+    """Lead each wire whose lane is NEW through all its depths."""
     block = Block(
         in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
         in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
@@ -69,7 +66,7 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
             next_goal(team, plan, lane)
             proceed(team, plan, raw, lane)
         left += lanes[lane].phase != IDLE
-    while left > 0 and not (until_idle and left < WIDTH):
+    while left > 0:
         do_round(team, block, raw, number)
         left = 0
         for lane in range(WIDTH):

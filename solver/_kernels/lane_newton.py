@@ -81,7 +81,8 @@ def add_touch(b: Block, p: int, frame: Nine, value: Value) -> Value:
     d, stiffness, weight, zero = b.touch[CURRENT, p, 0], b.number[STIFFNESS], b.site[p, WEIGHT], spread(0.0)
     force, normal, jet = touch_of(b, p, frame)
     law = wall_law.force(stiffness, weight, d), select(d > 0.0, wall_law.curvature(stiffness, weight, d), zero)
-    hessian = wall_hessian(frame, jet, normal, law, b.number[DAMPING] > 0.0)
+    # asked of lanes that touch here: what is left out takes as long as all the rest
+    hessian = wall_hessian(frame, jet, normal, law, (b.number[DAMPING] > 0.0) & (d > 0.0))
     vp, vf = add6(vp, hessian), add3(vf, force)
     along = b.site[p, ALONG]
     if anywhere(along != 0.0):
