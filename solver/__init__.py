@@ -33,10 +33,23 @@ fast minimiser), ``closed_form`` (eq. 10), ``crossing`` (no tunnelling).
 from solver.catheter import Catheter
 from solver.grid import Grid
 from solver.insertion import Insertion
+from solver.insertions import Insertions
 from solver.relax import relax
 from solver.solution import Snap, Solution, Status
 from solver.wall import VesselWall
 from solver.warm import warm_up
 from solver.wire import GuideWire
 
-__all__ = ["Catheter", "Grid", "GuideWire", "Insertion", "Snap", "Solution", "Status", "VesselWall", "relax", "warm_up"]
+__all__ = [
+    "Catheter",
+    "Grid",
+    "GuideWire",
+    "Insertion",
+    "Insertions",
+    "Snap",
+    "Solution",
+    "Status",
+    "VesselWall",
+    "relax",
+    "warm_up",
+]

@@ -38,6 +38,8 @@ USUAL_JOINTS = 20_000
 """Joints of the longest wire accepted unless something else is said."""
 MATCH_DEPTH_MM = 1e-9
 """Depths closer than this are the same depth."""
+SAME_LENGTH_MM = 1e-13
+"""Difference of two lengths of a first segment that is rounding of the depths they were cut from."""
 FIRST_DAMPING = 1e-3
 """Levenberg term tried first: holds a bend of 20 segments' length back by about its own stiffness."""
 LEAST_DAMPING = 1e-7

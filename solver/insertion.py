@@ -121,6 +121,12 @@ class Insertion:
         The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
         and a call while another thread is at work, is a RuntimeError.
         """
+        return self._each(*self._goals(depths_mm, roll_deg, catheter_mm))
+
+    def _goals(
+        self, depths_mm: Iterable[float], roll_deg: float | Sequence[float], catheter_mm: float | Sequence[float] = 0.0
+    ) -> tuple[list[float], list[float], list[float]]:
+        """Depths, and a roll and a place of the catheter's tip for each, or a refusal of what cannot be one."""
         if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
         depths = _list("depths_mm", depths_mm, DEPTH_MM)
@@ -132,7 +138,7 @@ class Insertion:
             if tip > depth:
                 advice = "a wire whose tip lies inside the catheter is not modelled: push it out or pull the tube back"
                 refuse("insertion", "catheter_mm", tip, f"{depth:g}, the wire's depth, or less", advice)
-        return self._each(depths, rolls, tips)
+        return depths, rolls, tips
 
     def _each(self, depths: list[float], rolls: list[float], tips: list[float]) -> Iterator[Solution]:
         """Go to each depth, for as long as no later call has begun."""
@@ -140,22 +146,36 @@ class Insertion:
         for depth, roll, tip in zip(depths, rolls, tips, strict=True):
             self._hold()
             try:
-                if way is None:
-                    way = self._way = object()
-                    # room for all of it at once
-                    self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+                way = way or self._begin(depths, rolls)
                 if self._way is not way:
                     raise RuntimeError(f"insertion: to_depths: a later call has begun since; {ONE_AT_A_TIME}")
                 self._work.place["goal"] = tip
                 solution = self._go(depth, roll)
             finally:
-                self._lock.release()
+                self._release()
             yield solution
 
     def _hold(self) -> None:
         """Take the lock, or refuse to touch the wire while another thread does."""
         if not self._lock.acquire(blocking=False):
             raise RuntimeError(f"insertion: another thread is moving this wire; {ONE_AT_A_TIME}")
+
+    def _release(self) -> None:
+        """Give the lock back."""
+        self._lock.release()
+
+    def _begin(self, depths: list[float], rolls: list[float]) -> object:
+        """Make room for all of a way at once, and end the ways before it; return what tells it from others."""
+        self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
+        if not self._started and rolls:
+            # a wire that is not yet in the lumen has no history: it starts at its first roll
+            self._work.place["roll"], self._started = rolls[0], True
+        self._way = object()
+        return self._way
+
+    def _reaches(self, depth_mm: float) -> bool:
+        """Whether the wire can be tried at a depth at all."""
+        return depth_mm < self._too_long and self._refused is None
 
     def clone(self) -> Self:
         """A second insertion where this one is, to the last bit; both go on from there, each on its own way."""
@@ -170,7 +190,7 @@ class Insertion:
         try:
             return copy.deepcopy(state, {id(shared): shared for shared in (self.wire, self.wall)})
         finally:
-            self._lock.release()
+            self._release()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
@@ -180,9 +200,6 @@ class Insertion:
         """Step until the depth is reached or no step succeeds."""
         work = self._work
         work.counts.fill(0)
-        if not self._started:
-            # a wire that is not yet in the lumen has no history: it starts at its first roll
-            work.place["roll"], self._started = roll, True
         if depth >= self._too_long:
             status, iterations = Status.TOO_LONG, 0
         elif self._refused is not None:

@@ -134,7 +134,7 @@ def relax(
     work.load((0.0, 0.0, 0.0) if load_N is None else load_N)
     work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
-    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], work.k)
+    follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
     return work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)
 
 

@@ -1,5 +1,6 @@
 """The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
@@ -73,8 +74,7 @@ class VesselWall:
 
     def __post_init__(self) -> None:
         """Prefilter the distances into spline coefficients, so that the spline takes the values at the nodes."""
-        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, Range(1e-9, 1e9, "0.1 to 100 is usual"))
-        number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
+        self._check_law()
         _ = self.samples
         values = _checked(instance("wall", "distance", self.distance, Grid))
         marks = creases(values, self.distance.spacing_mm)
@@ -86,6 +86,20 @@ class VesselWall:
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
+
+    def _check_law(self) -> None:
+        """Refuse a stiffness or a friction that no wall has."""
+        number("wall", "stiffness_N_mm2", self.stiffness_N_mm2, Range(1e-9, 1e9, "0.1 to 100 is usual"))
+        number("wall", "friction", self.friction, Range(0.0, 10.0, "hydrophilic wires have 0.01 to 0.1"))
+
+    def like(self, *, stiffness_N_mm2: float | None = None, friction: float | None = None) -> "VesselWall":
+        """The same lumen with another stiffness or friction: its grid is shared, and not filtered again."""
+        other = copy(self)
+        for name, value in (("stiffness_N_mm2", stiffness_N_mm2), ("friction", friction)):
+            if value is not None:
+                object.__setattr__(other, name, value)
+        other._check_law()
+        return other
 
     @cached_property
     def samples(self) -> int:

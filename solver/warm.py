@@ -13,8 +13,8 @@ import numpy as np
 
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
-from solver._kernels.insertion import lay_along
 from solver._kernels.septum import through_wall
+from solver._kernels.start import lay_along
 from solver.doors import instance
 from solver.grid import Grid
 from solver.relax import Settings, relax

@@ -19,7 +19,7 @@ from solver._kernels.shaft import shaft_forces
 from solver.catheter import Catheter, sleeve_of
 from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
-from solver.solution import Snap, Solution, Status
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 
@@ -137,10 +137,10 @@ class Workspace:
         return data.State(u, x, r, penetration, jet, np.zeros(3, records.ENERGIES), np.zeros((3, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
-        gain, anchor, weights = np.zeros((k, 3, 7)), np.ones((points, 4)), np.zeros((3, 3, 4))
+        gain, anchor = np.zeros((k, 3, 7)), np.ones((points, 4))
         start, change, keep = np.zeros((3, k, 3))
         descent, seen = np.zeros(1, records.DESCENT), np.zeros((k + 1, 3))
-        return data.Scratch(gain, anchor, weights, self.counters, descent, start, change, keep, seen, self.snaps)
+        return data.Scratch(gain, anchor, self.counters, descent, start, change, keep, seen, self.snaps)
 
     def _empty_friction(self, k: int, points: int) -> data.Friction:
         coefficient = float(self.wall.friction) if self.wall is not None else 0.0
@@ -199,12 +199,12 @@ class Workspace:
     def _bind(self) -> None:
         """Take a handle of the arrays, wherever in memory they are now."""
         settings = self.introducer, self.limits
-        self._handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
+        self.handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
 
     def __getstate__(self) -> dict[str, Any]:
         """What a checkpoint holds: the wall has the field already, and numba's handle is of this process."""
         state = vars(self) | {"problem": self.problem._replace(field=NO_FIELD), "version": _VERSION}
-        return {name: value for name, value in state.items() if name not in ("_handle", "counts", "field")}
+        return {name: value for name, value in state.items() if name not in ("handle", "counts", "field")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Take a checkpoint up, where the solver is the one that made it: its arrays mean the same then."""
@@ -236,45 +236,22 @@ class Workspace:
 
     def advance(self, depth_mm: float, roll_deg: float, laid: int = 0) -> tuple[Status, int]:
         """Go to a depth and roll, see ``_kernels.insertion.advance``; return the status and the iterations."""
-        outcome, iterations, self.k = advance(self._handle, depth_mm, roll_deg, laid)
+        outcome, iterations, self.k = advance(self.handle, depth_mm, roll_deg, laid)
         return Status[data.OUTCOMES[outcome]], iterations
 
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        start, penetration, push, force, torque, *_, pivot = self.report.item(0)
-        sliding, turning = shaft_forces(self.shaft) if self.shaft.drag else (0.0, 0.0)
-        bending, wall, *_ = state.energies.item(CURRENT)
-        if n > 1 and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
+        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n])]
+        notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
+        solution = Solution.assembled(arrays, notes, self.snaps, (status, iterations, depth_mm, roll_deg))
+        if self.shaft.drag:
+            sliding, turning = shaft_forces(self.shaft)
+            push, torque = solution.push_force_N + sliding, solution.reaction_torque_N_mm + turning
+            vars(solution).update(push_force_N=push, reaction_torque_N_mm=torque)
+        if self.k and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
             # half of the first segment's weight hangs at the entry, where no joint can move
-            force = force - 0.5 * self.problem.chain.length[0] * self.introducer.weight
-        _, _, energy, *_, dissipated, calm, _, _, _, _, _, stored, snaps = self.place.item(0)
-        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n], force)]
-        for array in arrays:
-            array.setflags(write=False)
-        solution = object.__new__(Solution)
-        # a frozen dataclass sets its fields one by one, which takes 2 µs of the 40 that a step may take
-        vars(solution).update(
-            joints_mm=arrays[0],
-            frames=arrays[1],
-            energy_N_mm=energy,
-            bending_energy_N_mm=bending + stored,
-            wall_energy_N_mm=wall,
-            friction_energy_N_mm=self.place["rubbed"].item(0),
-            status=status,
-            iterations=iterations,
-            contact_force_N=arrays[2],
-            reaction_force_N=arrays[3],
-            reaction_torque_N_mm=float(torque[2]) + turning,
-            push_force_N=push + sliding,
-            max_penetration_mm=penetration,
-            depth_mm=depth_mm,
-            roll_deg=roll_deg,
-            counts=self.counters.item(0),
-            start_energy_N_mm=start + stored,
-            least_pivot=pivot,
-            dissipated_N_mm=dissipated,
-            snaps=tuple(Snap(*self.snaps.item(n)) for n in range(snaps)),
-            uncertain=calm < tol.CALM_MM,
-        )
+            force = solution.reaction_force_N - 0.5 * self.problem.chain.length[0] * self.introducer.weight
+            force.setflags(write=False)
+            vars(solution).update(reaction_force_N=force)
         return solution

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from pipeline.benchmark import scenes
+from pipeline.benchmark import many, scenes
 from pipeline.benchmark.insert import SolverSetting, insert, timed
 from pipeline.benchmark.reference import reference, shape_error
 from pipeline.benchmark.scenes import BenchScene
@@ -37,6 +37,7 @@ OFF_LATTICE = 0.37
 MANY_LOOK_UPS = "samples:16"
 """The hull with which skips of look-ups are measured; with one look-up a joint there is little to save."""
 PAIRS = 9
+MANY_SEED, SAME_MM = 100, 1e-9
 COLD = """
 from time import perf_counter, process_time
 from solver import warm_up
@@ -203,6 +204,16 @@ def skips() -> Iterator[Claim]:
         yield Claim(f"{where}: time, times", float(slow / quick), "1")
 
 
+def many_at_once() -> Iterator[Claim]:
+    """256 variations of the circle of Willis, thirty depths each, in lock-step against one after the other."""
+    found = many.compared(scenes.willis(MANY_SEED), MANY_SEED)
+    name = "256 varied insertions at once, circle of Willis: "
+    yield Claim(name + "as many a second, one core", found.one_core, "1", "3 aimed at, reported")
+    yield Claim(name + "as many a second, two cores", found.two_cores, "1", "6 aimed at, reported")
+    share = float(np.mean(found.apart > SAME_MM))
+    yield Claim(name + "depths apart by more than 1e-9 mm", share, "1", "at most 0.01 (snaps)", share <= 0.01)
+
+
 def compilation() -> Iterator[Claim]:
     """Compile everything of the solver in a fresh process that finds nothing compiled."""
     with tempfile.TemporaryDirectory() as folder:
@@ -215,7 +226,8 @@ def compilation() -> Iterator[Claim]:
 
 
 STUDIES: tuple[Callable[[], Iterator[Claim]], ...] = (
-    step_time, against_closed_form, sub_steps, scene_b, orders, voxel_order, in_a_sheath, skips, compilation
+    step_time, against_closed_form, sub_steps, scene_b, orders, voxel_order, in_a_sheath, skips, many_at_once,
+    compilation
 )  # fmt: skip
 """Everything that the solver promises. A new promise is a function here."""
 

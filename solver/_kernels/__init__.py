@@ -1,6 +1,6 @@
 """Every compiled function of the solver. In: named tuples of arrays and scalars. Out: numbers, or filled arrays.
 
-flags            the five decorators                    data             what the kernels hand to each other
+flags            the six decorators                     data             what the kernels hand to each other
 algebra          3x3 matrices as tuples of scalars      rotation         exponential map and its derivatives
 field            the interpolated signed distance       wall_law         energy, force, curvature of the wall
 chain            a wire cut into segments               friction         Coulomb friction as a potential
@@ -14,4 +14,10 @@ handle           what these work on, behind one pointer shaft            the wir
 septum           whether the wire left its lumen        snaps            energy that a step released
 saddle           the way off a saddle                   trial            a share of the step, and the energy there
 records          what the kernels note
+
+Several wires side by side, in the processor's vectors, with the same formulas:
+lanes            numbers of eight wires as one type     bare             arrays without reference counts
+lane_block       eight wires in memory                  lane_newton      sweep and gradient
+lane_trial       trial states and their energies        lane_decide      what a lane does next
+lane_relax       one round of all lanes                 lane_insertion   from depth to depth
 """

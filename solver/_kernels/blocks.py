@@ -23,9 +23,11 @@ from solver._kernels.algebra import (
     conjugate,
     cross,
     cross_matrix,
+    dot,
     dyad,
     full,
     load3,
+    mix,
     outer,
     scaled,
     times,
@@ -34,6 +36,7 @@ from solver._kernels.algebra import (
 from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.friction import friction_derivatives, lever_of
+from solver._kernels.lanes import anywhere, select, select3
 from solver._kernels.rotation import jacobian_curvature
 
 
@@ -46,34 +49,40 @@ def wall_hessian(frame: Nine, jet: Any, n: Three, law: tuple[float, float], proj
     f = law[0]
     bend = (f * jet[4], f * jet[5], f * jet[6], f * jet[7], f * jet[8], f * jet[9])
     bend = conjugate(transpose(frame), bend)
-    return add6(dyad(scaled(law[1], n), n), without_negative(bend, n) if project else bend)
+    if anywhere(project):
+        rest = without_negative(bend, n)
+        bend = select3(project, rest[:3], bend[:3]) + select3(project, rest[3:], bend[3:])
+    return add6(dyad(scaled(law[1], n), n), bend)
 
 
 @inlined
 def without_negative(m: Six, n: Three) -> Six:
     """The positive part of a symmetric matrix in the plane across n; nothing along n."""
     size = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-    if size < 1e-6:
-        return ZERO6
+    flat = size < 1e-6
+    size = select(flat, 1.0, size)
     n = (n[0] / size, n[1] / size, n[2] / size)
     # an orthonormal pair across n (Duff et al. 2017), without a branch at the poles
-    sign = math.copysign(1.0, n[2])
+    sign = select(n[2] < 0.0, -1.0, 1.0)
     a = -1.0 / (sign + n[2])
     b = n[0] * n[1] * a
     s = (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0])
     t = (b, sign + n[1] * n[1] * a, -n[1])
     ms, mt = apply(full(m), s), apply(full(m), t)
-    ss = s[0] * ms[0] + s[1] * ms[1] + s[2] * ms[2]
-    tt = t[0] * mt[0] + t[1] * mt[1] + t[2] * mt[2]
-    st = s[0] * mt[0] + s[1] * mt[1] + s[2] * mt[2]
-    # principal directions of the 2x2 block
-    angle = 0.5 * math.atan2(2 * st, ss - tt)
-    c, d = math.cos(angle), math.sin(angle)
-    mean, radius = 0.5 * (ss + tt), math.sqrt(0.25 * (ss - tt) * (ss - tt) + st * st)
-    one, two = max(mean + radius, 0.0), max(mean - radius, 0.0)
-    v = (c * s[0] + d * t[0], c * s[1] + d * t[1], c * s[2] + d * t[2])
-    w = (c * t[0] - d * s[0], c * t[1] - d * s[1], c * t[2] - d * s[2])
-    return outer(scaled(one, v), v, scaled(two, w), w)
+    half, st, mean = 0.5 * (dot(s, ms) - dot(t, mt)), dot(s, mt), 0.5 * (dot(s, ms) + dot(t, mt))
+    radius = math.sqrt(half * half + st * st)
+    one, two = positive(mean + radius), positive(mean - radius)
+    # the mean of the two eigenvalues that are left, and how far they are from it along the principal directions
+    mean, share = 0.5 * (one + two), 0.5 * (one - two) / select(radius > 0.0, radius, 1.0)
+    mean, share = select(flat, 0.0, mean), select(flat, 0.0, share)
+    v, w = mix(mean + share * half, s, share * st, t), mix(share * st, s, mean - share * half, t)
+    return outer(v, s, w, t)
+
+
+@inlined
+def positive(x: float) -> float:
+    """X, or 0 where it is negative."""
+    return select(x > 0.0, x, 0.0)  # type: ignore[no-any-return]
 
 
 @inlined
@@ -98,8 +107,10 @@ def lever(o: Three, f: Three, stiffness: Six) -> tuple[Nine, Six]:
 def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Three, Three]:
     """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
     chain, state = problem.chain, problem.state
-    load = apply_transposed(frame, load3(chain.load, n))
-    f, g = (-load[0], -load[1], -load[2]), ZERO3
+    load, f, g = load3(chain.load, n), ZERO3, ZERO3
+    # the tip alone bears one, as a rule
+    if load != ZERO3:
+        f = scaled(-1.0, apply_transposed(frame, load))
     for p in range(chain.first[n], chain.first[n + 1]):
         d = state.penetration[slot, p]
         if d != 0.0:
@@ -163,13 +174,19 @@ def joint_hessian(
 @inlined
 def least_curvature(q: Six, twisting: bool) -> float:
     """Least eigenvalue of the bending block of Q_uu; -inf where the twist entry makes the whole indefinite."""
-    half = 0.5 * (q[0] - q[1])
-    least = 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
+    least = least_bending(q)
     if twisting and least > 0.0:
         det = q[0] * q[1] - q[3] * q[3]
         if not q[2] * det > q[4] * q[4] * q[1] - 2 * q[3] * q[4] * q[5] + q[5] * q[5] * q[0]:
             return -math.inf
     return least
+
+
+@inlined
+def least_bending(q: Six) -> float:
+    """Least eigenvalue of the bending block of Q_uu."""
+    half = 0.5 * (q[0] - q[1])
+    return 0.5 * (q[0] + q[1]) - math.sqrt(half * half + q[3] * q[3])
 
 
 @inlined
@@ -182,8 +199,9 @@ def stiffened(q: Six, more: float) -> Six:
 def solve_block(q: Six, twisting: bool) -> Nine:
     """Minus the inverse of Q_uu; without a twist variable its last row and column are zero."""
     if not twisting:
-        det = q[0] * q[1] - q[3] * q[3]
-        return -q[1] / det, q[3] / det, 0.0, q[3] / det, -q[0] / det, 0.0, 0.0, 0.0, 0.0
+        per_det = -1.0 / (q[0] * q[1] - q[3] * q[3])
+        i2 = -q[3] * per_det
+        return q[1] * per_det, i2, 0.0, i2, q[0] * per_det, 0.0, 0.0, 0.0, 0.0
     c00 = q[1] * q[2] - q[5] * q[5]
     c01 = q[4] * q[5] - q[3] * q[2]
     c02 = q[3] * q[5] - q[4] * q[1]

@@ -1,12 +1,9 @@
 """Whether a way through the grid passes through a wall: what makes tunnelling impossible."""
 
 import math
-from typing import Any
-
-import numpy as np
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import dot, load3, minus
+from solver._kernels.algebra import Three, dot, load3, minus, mix
 from solver._kernels.data import Field, Problem
 from solver._kernels.field import indices, locate, value
 from solver._kernels.flags import inlined, kernel
@@ -22,15 +19,16 @@ def crossed(problem: Problem, slot: int, k: int) -> bool:
     field, old, new = problem.field, problem.state.x[slot], problem.state.x[1 - slot]
     limit = 0.25 * field.spacing * field.spacing
     for n in range(1, k + 1):
-        d = minus(load3(new, n), load3(old, n))
+        a, b = load3(old, n), load3(new, n)
+        d = minus(b, a)
         square = dot(d, d)
-        if square > limit and free_fraction(field, old[n], new[n], math.sqrt(square)) < 1.0:
+        if square > limit and free_fraction(field, a, b, math.sqrt(square)) < 1.0:
             return True
     return False
 
 
 @kernel
-def free_fraction(field: Field, a: Any, b: Any, way: float) -> float:
+def free_fraction(field: Field, a: Three, b: Three, way: float) -> float:
     """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
     here, last = distance_at(field, a, 0.0, b), distance_at(field, a, 1.0, b)
     limit = max(here, last, 0.0) + tol.HOP_VOXELS * field.spacing
@@ -45,7 +43,7 @@ def free_fraction(field: Field, a: Any, b: Any, way: float) -> float:
 
 
 @kernel
-def distance_at(field: Field, a: Any, t: float, b: Any) -> float:
+def distance_at(field: Field, a: Three, t: float, b: Three) -> float:
     """Signed distance, mm, at a + t (b - a)."""
     q = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]))
     c = field.coefficients
@@ -53,26 +51,22 @@ def distance_at(field: Field, a: Any, t: float, b: Any) -> float:
 
 
 @kernel
-def free_way(field: Field, tip: Any, along: Any, step: float, rise: float) -> float:
+def free_way(field: Field, tip: Three, along: Three, step: float, rise: float) -> float:
     """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall (or beyond it).
 
     Never less than a quarter of that, so that a jammed tip still presses on.
     """
-    end = np.empty(3)
-    for a in range(3):
-        end[a] = tip[a] + step * along[a]
+    end = mix(1.0, tip, step, along)
     free = way_below(field, tip, end, step, rise)
     # where no other vessel lies ahead there is nothing to tunnel into, and four times as deep is allowed
     if free < 1.0 and not ridge_ahead(field, tip, end, step):
         free = way_below(field, tip, end, step, 4 * rise)
-    for a in range(3):
-        end[a] = tip[a] + free * step * along[a]
-    free *= step * free_fraction(field, tip, end, free * step)
+    free *= step * free_fraction(field, tip, mix(1.0, tip, free * step, along), free * step)
     return max(free, min(step, 0.25 * rise))
 
 
 @kernel
-def way_below(field: Field, a: Any, b: Any, way: float, rise: float) -> float:
+def way_below(field: Field, a: Three, b: Three, way: float, rise: float) -> float:
     """Fraction of the way from a to b until it is ``rise`` mm deeper in the wall than it began."""
     before = distance_at(field, a, 0.0, b)
     steps = 1 + math.ceil(2 * way / field.spacing)
@@ -88,7 +82,7 @@ def way_below(field: Field, a: Any, b: Any, way: float, rise: float) -> float:
 
 
 @kernel
-def ridge_ahead(field: Field, a: Any, b: Any, step: float) -> bool:
+def ridge_ahead(field: Field, a: Three, b: Three, step: float) -> bool:
     """Whether the distance on the ray from a through b rises above the surface and falls again, 2 mm past b."""
     top, i, last = 0.0, 1, 1 + math.ceil(2 * (step + tol.LOOK_AHEAD_MM) / field.spacing)
     while i <= last:

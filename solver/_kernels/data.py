@@ -133,15 +133,14 @@ class Scratch(NamedTuple):
     """Work space.
 
     gain : (k, 3, 7), see ``blocks.store_gains``.     anchor : (p, 4), where a point was looked up last, and the
-    distance there.     weights : (3, 3, 4), see ``field.basis``.     counters, descent : (1,), see ``records``.
-    start : (k, 3) controls that the step began with.     change : (k, 3) what relaxing them added in the last step,
-    from the tip inwards.     keep : (k, 3) controls to come back to.     seen : (k + 1, 3) joints after a rough step,
-    mm.     snaps : (n,) of ``records.SNAP``.
+    distance there.     counters, descent : (1,), see ``records``.     start : (k, 3) controls that the step began
+    with.     change : (k, 3) what relaxing them added in the last step, from the tip inwards.
+    keep : (k, 3) controls to come back to.     seen : (k + 1, 3) joints after a rough step, mm.
+    snaps : (n,) of ``records.SNAP``.
     """
 
     gain: Any
     anchor: Any
-    weights: Any
     counters: Any
     descent: Any
     start: Any

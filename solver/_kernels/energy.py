@@ -9,7 +9,7 @@ from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import Three, dot, load3, minus, store3
 from solver._kernels.data import Chain, Problem
-from solver._kernels.field import fill_jet, in_grid, indices, locate, trilinear, value
+from solver._kernels.field import depth_in_grid, indices, jet_at, locate, store_jet, trilinear, value
 from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.friction import friction_energy
 from solver._kernels.shaft import shaft_energy
@@ -70,33 +70,33 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     c, m, o, slope = field.coefficients, field.to_index, field.origin, field.slope
     first, offset, weight, reach = chain.first, chain.offset, chain.weight, chain.reach
     x, r, penetration, jet = state.x[slot], state.r[slot], state.penetration[slot], state.jet[slot]
-    anchor, weights = problem.scratch.anchor, problem.scratch.weights
-    clear, cheap = 0, 0
+    anchor, clear, cheap = problem.scratch.anchor, 0, 0
     for n in range(first_free + 1, k + 1):
         for p in range(first[n], first[n + 1]):
             q = load3(x, n)
             if offset[p, 0] != 0.0 or offset[p, 1] != 0.0 or offset[p, 2] != 0.0:
                 q = placed(q, r, n, load3(offset, p))
             penetration[p] = 0.0
-            at = indices(m, o, q)
-            inside = in_grid(c, at)
             clearance = -anchor[p, 3] - reach
-            if skips.clearance and inside and still_clear(anchor, p, q, slope, clearance):
+            if skips.clearance and still_clear(anchor, p, q, slope, clearance):
                 clear += 1
                 continue
+            at = indices(m, o, q)
+            # beyond the grid the slope has no bound: no point is called clearer than it is inside
+            border = -field.spacing * depth_in_grid(c, at)
             touched = clearance < 0.0  # it is taken to touch still: its value alone is not asked first
             store3(anchor, p, q)
             cell = locate(c, at)
-            if skips.cheap and inside and not touched:
+            if skips.cheap and border <= 0.0 and not touched:
                 phi = trilinear(c, cell) + field.gap
                 if phi + reach <= 0.0:
                     cheap += 1
-                    anchor[p, 3] = phi
+                    anchor[p, 3] = max(phi, border)
                     continue
             d = -1.0 if touched else value(c, cell) + reach
             if touched or d > 0.0:
-                d = fill_jet(c, m, cell, weights, jet[p]) + reach
-            anchor[p, 3] = d - reach if inside else 1.0  # no anchor: outside the grid the slope has no bound
+                d = store_jet(jet, p, jet_at(c, m, cell)) + reach
+            anchor[p, 3] = max(d - reach, border) if border <= 0.0 else 1.0
             if d > 0.0:
                 penetration[p] = d
                 total += wall_law.energy(problem.stiffness, weight[p], d)

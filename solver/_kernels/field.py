@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from solver._kernels.algebra import Three
+from solver._kernels.algebra import Six, Three, apply, conjugate
 from solver._kernels.data import Field
 from solver._kernels.flags import entry_point, inlined, kernel
+from solver._kernels.lanes import four, quad, weighted
 
 Four = tuple[float, float, float, float]
 Cell = tuple[int, int, int, float, float, float]
@@ -70,10 +71,11 @@ def locate(c: Any, f: Three) -> Cell:
 
 
 @inlined
-def in_grid(c: Any, f: Three) -> bool:
-    """Whether continuous indices lie among a field's nodes."""
-    shape = c.shape
-    return bool(0.0 <= f[0] <= shape[0] - 3 and 0.0 <= f[1] <= shape[1] - 3 and 0.0 <= f[2] <= shape[2] - 3)
+def depth_in_grid(c: Any, f: Three) -> float:
+    """How far inside a field's nodes continuous indices lie, in indices; negative outside."""
+    s = c.shape
+    low = min(f[0], f[1], f[2])
+    return float(min(low, s[0] - 3 - f[0], s[1] - 3 - f[1], s[2] - 3 - f[2]))
 
 
 @inlined
@@ -90,124 +92,114 @@ def trilinear(c: Any, cell: Cell) -> float:
 @inlined
 def cubic(t: float) -> Four:
     """Weights of the four coefficients around a place in a cell: linear beyond the grid."""
-    if t < 0.0 or t > 1.0:
-        return 0.0, 1 - t, t, 0.0
-    r = 1 - t
-    return r * r * r / 6, 2.0 / 3 - t * t * (1 - 0.5 * t), 2.0 / 3 - r * r * (1 - 0.5 * r), t * t * t / 6
+    s = min(max(t, 0.0), 1.0)
+    r, beyond, (a, b, c, d) = 1 - s, t - s, slopes(t)
+    return (
+        r * r * r * (1 / 6) + beyond * a,
+        2.0 / 3 - s * s * (1 - 0.5 * s) + beyond * b,
+        2.0 / 3 - r * r * (1 - 0.5 * r) + beyond * c,
+        s * s * s * (1 / 6) + beyond * d,
+    )
 
 
 @inlined
-def row(c: Any, i: int, j: int, k: int, r: Four) -> float:
-    """Four coefficients along the last axis, weighted."""
-    return float(c[i, j, k] * r[0] + c[i, j, k + 1] * r[1] + c[i, j, k + 2] * r[2] + c[i, j, k + 3] * r[3])
+def slopes(t: float) -> Four:
+    """Derivatives of ``cubic`` per index."""
+    s = min(max(t, 0.0), 1.0)
+    r = 1 - s
+    return -0.5 * r * r, s * (1.5 * s - 2), r * (2 - 1.5 * r), 0.5 * s * s
 
 
 @inlined
-def plane(c: Any, i: int, j: int, k: int, q: Four, r: Four) -> float:
-    """Four rows, weighted."""
-    low = row(c, i, j, k, r) * q[0] + row(c, i, j + 1, k, r) * q[1]
-    return low + row(c, i, j + 2, k, r) * q[2] + row(c, i, j + 3, k, r) * q[3]
+def bends(t: float) -> Four:
+    """Second derivatives of ``cubic`` per index; beyond the grid the ghost layer makes their sum 0."""
+    s = min(max(t, 0.0), 1.0)
+    return 1 - s, 3 * s - 2, 1 - 3 * s, s
+
+
+@inlined
+def plane(c: Any, i: int, j: int, k: int, q: Four) -> Any:
+    """Four rows of four coefficients, weighted."""
+    return (
+        four(c, i, j, k) * q[0]
+        + four(c, i, j + 1, k) * q[1]
+        + four(c, i, j + 2, k) * q[2]
+        + four(c, i, j + 3, k) * q[3]
+    )
 
 
 @kernel
 def value(c: Any, cell: Cell) -> float:
     """The spline alone, without derivatives: a third of the cost."""
     i, j, k, u, v, w = cell
-    p, q, r = cubic(u), cubic(v), cubic(w)
-    low = plane(c, i, j, k, q, r) * p[0] + plane(c, i + 1, j, k, q, r) * p[1]
-    return low + plane(c, i + 2, j, k, q, r) * p[2] + plane(c, i + 3, j, k, q, r) * p[3]
+    p, q = cubic(u), cubic(v)
+    low = plane(c, i, j, k, q) * p[0] + plane(c, i + 1, j, k, q) * p[1]
+    return weighted(low + plane(c, i + 2, j, k, q) * p[2] + plane(c, i + 3, j, k, q) * p[3], quad(cubic(w)))
 
 
 @inlined
-def basis(t: float, weights: Any) -> None:
-    """Fill (3, 4) weights: value, first and second derivative per index of the four coefficients around t."""
-    weights[0, 0], weights[0, 1], weights[0, 2], weights[0, 3] = cubic(t)
-    if t < 0.0 or t > 1.0:
-        weights[1, 0], weights[1, 1], weights[1, 2], weights[1, 3] = 0.0, -1.0, 1.0, 0.0
-        weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3] = 0.0, 0.0, 0.0, 0.0
-        return
-    r = 1 - t
-    weights[1, 0] = -0.5 * r * r
-    weights[1, 1] = t * (1.5 * t - 2)
-    weights[1, 2] = r * (2 - 1.5 * r)
-    weights[1, 3] = 0.5 * t * t
-    weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3] = r, 3 * t - 2, 1 - 3 * t, t
+def layer(c: Any, cell: Cell, a: int, q: tuple[Four, Four, Four]) -> Any:
+    """The coefficients of plane a of a cell, weighted by ``cubic``, ``slopes`` and ``bends`` along the second axis."""
+    i, j, k, _, _, _ = cell
+    one, two, three, last = (
+        four(c, i + a, j, k),
+        four(c, i + a, j + 1, k),
+        four(c, i + a, j + 2, k),
+        four(c, i + a, j + 3, k),
+    )
+    return (
+        one * q[0][0] + two * q[0][1] + three * q[0][2] + last * q[0][3],
+        one * q[1][0] + two * q[1][1] + three * q[1][2] + last * q[1][3],
+        one * q[2][0] + two * q[2][1] + three * q[2][2] + last * q[2][3],
+    )
+
+
+@inlined
+def across(w: Four, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Four layers, weighted."""
+    return a * w[0] + b * w[1] + c * w[2] + d * w[3]
 
 
 @kernel
-def spline(c: Any, cell: Cell, weights: Any, jet: Any) -> None:
-    """Fill jet (10,): value, gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
-    i, j, k, _, _, _ = cell
-    p, q, r = weights[0], weights[1], weights[2]
-    v = gx = gy = gz = hxx = hyy = hzz = hxy = hxz = hyz = 0.0
-    for a in range(4):
-        a0 = a1 = a2 = b0 = b1 = d0 = 0.0
-        for b in range(4):
-            m0 = c[i + a, j + b, k]
-            m1 = c[i + a, j + b, k + 1]
-            m2 = c[i + a, j + b, k + 2]
-            m3 = c[i + a, j + b, k + 3]
-            e0 = m0 * r[0, 0] + m1 * r[0, 1] + m2 * r[0, 2] + m3 * r[0, 3]
-            e1 = m0 * r[1, 0] + m1 * r[1, 1] + m2 * r[1, 2] + m3 * r[1, 3]
-            e2 = m0 * r[2, 0] + m1 * r[2, 1] + m2 * r[2, 2] + m3 * r[2, 3]
-            a0 += q[0, b] * e0
-            a1 += q[1, b] * e0
-            a2 += q[2, b] * e0
-            b0 += q[0, b] * e1
-            b1 += q[1, b] * e1
-            d0 += q[0, b] * e2
-        v += p[0, a] * a0
-        gx += p[1, a] * a0
-        hxx += p[2, a] * a0
-        gy += p[0, a] * a1
-        hxy += p[1, a] * a1
-        hyy += p[0, a] * a2
-        gz += p[0, a] * b0
-        hxz += p[1, a] * b0
-        hyz += p[0, a] * b1
-        hzz += p[0, a] * d0
-    jet[0], jet[1], jet[2], jet[3] = v, gx, gy, gz
-    jet[4], jet[5], jet[6], jet[7], jet[8], jet[9] = hxx, hyy, hzz, hxy, hxz, hyz
+def spline(c: Any, cell: Cell) -> tuple[Four, Six]:
+    """Value and gradient x y z, second derivatives xx yy zz xy xz yz, per index."""
+    _, _, _, u, v, w = cell
+    p, dp, r, dr = cubic(u), slopes(u), quad(cubic(w)), quad(slopes(w))
+    q = cubic(v), slopes(v), bends(v)
+    a, b, e, f = layer(c, cell, 0, q), layer(c, cell, 1, q), layer(c, cell, 2, q), layer(c, cell, 3, q)
+    here, x = across(p, a[0], b[0], e[0], f[0]), across(dp, a[0], b[0], e[0], f[0])
+    y, xy = across(p, a[1], b[1], e[1], f[1]), across(dp, a[1], b[1], e[1], f[1])
+    xx, yy = across(bends(u), a[0], b[0], e[0], f[0]), across(p, a[2], b[2], e[2], f[2])
+    first = weighted(here, r), weighted(x, r), weighted(y, r), weighted(here, dr)
+    second = weighted(xx, r), weighted(yy, r), weighted(here, quad(bends(w)))
+    return first, (*second, weighted(xy, r), weighted(x, dr), weighted(y, dr))
 
 
 @inlined
-def to_world(m: Any, jet: Any) -> None:
-    """Turn the derivatives of a jet from per index into per mm, in place: g <- Mᵀ g, H <- Mᵀ H M."""
-    g0, g1, g2 = jet[1], jet[2], jet[3]
-    xx, yy, zz, xy, xz, yz = jet[4], jet[5], jet[6], jet[7], jet[8], jet[9]
-    for a in range(3):
-        jet[1 + a] = m[0, a] * g0 + m[1, a] * g1 + m[2, a] * g2
-    for n in range(6):
-        a = n if n < 3 else (0 if n < 5 else 1)
-        b = n if n < 3 else (1 if n == 3 else 2)
-        h0 = xx * m[0, b] + xy * m[1, b] + xz * m[2, b]
-        h1 = xy * m[0, b] + yy * m[1, b] + yz * m[2, b]
-        h2 = xz * m[0, b] + yz * m[1, b] + zz * m[2, b]
-        jet[4 + n] = m[0, a] * h0 + m[1, a] * h1 + m[2, a] * h2
-
-
-@inlined
-def fill_jet(c: Any, m: Any, cell: Cell, weights: Any, jet: Any) -> float:
-    """Fill jet (10,) as ``spline``, but per mm; return its value, mm.
-
-    m is a field's to_index, weights (3, 3, 4) is work space.
-    """
-    basis(cell[3], weights[0])
-    basis(cell[4], weights[1])
-    basis(cell[5], weights[2])
-    spline(c, cell, weights, jet)
-    to_world(m, jet)
-    return float(jet[0])
+def jet_at(c: Any, m: Any, cell: Cell) -> tuple[Four, Six]:
+    """``spline`` with its derivatives per mm: g <- Mᵀ g, H <- Mᵀ H M; m is a field's to_index."""
+    (phi, g0, g1, g2), h = spline(c, cell)
+    turn = (m[0, 0], m[1, 0], m[2, 0], m[0, 1], m[1, 1], m[2, 1], m[0, 2], m[1, 2], m[2, 2])
+    g0, g1, g2 = apply(turn, (g0, g1, g2))
+    return (phi, g0, g1, g2), conjugate(turn, h)
 
 
 @entry_point
 def look_up(field: Field, points: Any, jets: Any) -> None:
     """Value, gradient and second derivatives (n, 10), per mm, at points (n, 3) in mm."""
-    weights = np.empty((3, 3, 4))
     c, m, o = field.coefficients, field.to_index, field.origin
     for n in range(points.shape[0]):
         cell = locate(c, indices(m, o, (points[n, 0], points[n, 1], points[n, 2])))
-        fill_jet(c, m, cell, weights, jets[n])
+        store_jet(jets, n, jet_at(c, m, cell))
+
+
+@inlined
+def store_jet(jets: Any, n: int, jet: tuple[Four, Six]) -> float:
+    """Write row n of an array (m, 10); return its value, mm."""
+    first, second = jet
+    jets[n, 0], jets[n, 1], jets[n, 2], jets[n, 3] = first
+    jets[n, 4], jets[n, 5], jets[n, 6], jets[n, 7], jets[n, 8], jets[n, 9] = second
+    return first[0]
 
 
 @entry_point

@@ -1,4 +1,4 @@
-"""How compiled functions are compiled: five decorators.
+"""How compiled functions are compiled: six decorators.
 
 Machine code that Python can call is made for entry points alone. Unpacking a kernel's forty arrays is code too: made
 for every kernel, it would take as long again as compiling the kernels themselves.
@@ -22,7 +22,7 @@ FAST: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy"}
 
 def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable[[F], F]:
     """Return a decorator for functions that only compiled code calls."""
-    options = dict(FAST, no_cpython_wrapper=True, no_cfunc_wrapper=True, **how)
+    options = dict(FAST, no_cpython_wrapper=True, no_cfunc_wrapper=True, **{"_nrt": False, **how})
 
     def decorate(function: F) -> F:
         compiled: Any = compiler(**options)(function)
@@ -51,8 +51,13 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
 # Called from Python; kept on disk.
 entry_point = on_disk(**FAST)
-# Called by other kernels.
+# The same for what takes long: other threads of Python run meanwhile.
+released = on_disk(nogil=True, **FAST)
+# Called by other kernels. Arrays are borrowed, not counted: who calls the entry point keeps them. A count is a call in
+# the middle of a recursion, around which all that is in registers goes through memory.
 kernel = _internal()
+# The same for what makes arrays or reads a handle, which takes the counting runtime.
+owner = _internal(_nrt=True)
 # The same, kept on disk as well: another process can compile it meanwhile.
 cached = _internal(on_disk)
 # Called per joint or per point: inlined by LLVM, so that the tuples it takes never leave the registers.

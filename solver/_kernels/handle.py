@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from numba import types
 from numba.experimental import structref
 
+from solver._kernels.bare import bare
 from solver._kernels.flags import entry_point
 
 
@@ -26,7 +27,7 @@ class Contents(NamedTuple):
 
 @structref.register
 class HandleType(types.StructRef):
-    """Numba's type of a handle; it keeps the arrays alive."""
+    """Numba's type of a handle."""
 
 
 class Handle(structref.StructRefProxy):
@@ -38,8 +39,10 @@ structref.define_proxy(Handle, HandleType, list(Contents._fields))  # type: igno
 
 @entry_point
 def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, report: Any, force: Any) -> Any:
-    """The handle of the contents."""
-    return Handle(problem, table, introducer, limits, place, report, force)  # type: ignore[no-untyped-call]
+    """The handle of the contents, which must be kept beside it."""
+    return Handle(  # type: ignore[no-untyped-call]
+        bare(problem), bare(table), bare(introducer), limits, bare(place), bare(report), bare(force)
+    )
 
 
 def handle_of(contents: Contents) -> Any:

@@ -8,10 +8,11 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import data
+from solver._kernels.algebra import load3
 from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
-from solver._kernels.data import Chain, Introducer, Problem, WireTable
-from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
+from solver._kernels.data import Introducer, Problem, WireTable
+from solver._kernels.flags import inlined, merged, owner, released
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
@@ -19,10 +20,10 @@ from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, settle_shaft
 from solver._kernels.sleeve import put_over, stored_energy
 from solver._kernels.snaps import account
-from solver._kernels.start import extrapolate_start, follow, note_change
+from solver._kernels.start import extrapolate_start, lay_along, note_change, put_load
 
 
-@entry_point
+@released
 def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
     """Step to a depth (mm) and roll (degrees); return the outcome, the iterations and the number of segments.
 
@@ -30,6 +31,12 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     laid : number of segments that are laid out already, to be relaxed where they are; 0 to step there.
     """
     outcome, iterations = go(handle, to_depth, to_roll, laid)
+    return outcome, iterations, sum_up(handle, laid)
+
+
+@owner
+def sum_up(handle: Any, laid: int) -> int:
+    """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
     problem, report, force = handle.problem, handle.report[0], handle.force
     for n in range(k + 1):
@@ -40,49 +47,60 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     if k > 0:
         weight = handle.introducer.weight
         report.push = push_force(problem, handle.table, weight, k, report) if laid > 0 else handle.place[0].push
-    return outcome, iterations, k
+    return k
 
 
 @merged
 def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int]:
     """Step until the goal is reached or no step succeeds; return the outcome and the iterations."""
-    at, introducer, limits = handle.place[0], handle.introducer, handle.limits
-    at.rubbed = 0.0
-    counters = handle.problem.scratch.counters[0]
-    # a cap on the time that a hopeless scene can take
-    steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
-    steps += abs(at.goal - at.catheter) / introducer.step
-    limit = limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps)
+    limit = prepare(handle, to_depth, to_roll)
     outcome, iterations = data.CONVERGED, 0
-    at.dissipated, at.snaps, at.seen_depth = 0.0, 0, math.nan
-    if introducer.idle_roll and at.roll != to_roll:
-        at.roll = to_roll
-        counters.rolls_proven_idle += 1
-    while laid > 0 or not arrived(at, to_depth, to_roll):
+    while laid > 0 or not arrived(handle.place[0], to_depth, to_roll):
         outcome, used = step(handle, to_depth, to_roll, laid)
         iterations += used
         if laid > 0:
             break
-        if iterations > limit or counters.passed >= limits.work:
-            outcome = data.MAX_ITERATIONS
+        goes_on, outcome = judge(handle, outcome, iterations, limit)
+        if not goes_on:
             break
-        if outcome == data.CONVERGED:
-            at.shrink = min(1.0, 2 * at.shrink)
-        elif outcome == data.ROUGH:
-            at.shrink = max(tol.REFINE * at.shrink, introducer.finest)
-        elif at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE:
-            at.shrink *= 0.5
-        else:
-            # outside the grid or without a finite energy a shorter step does not help either
-            break
-    at.shrink = max(at.shrink, 8 * tol.SMALLEST_STEP)
+    handle.place[0].shrink = max(handle.place[0].shrink, 8 * tol.SMALLEST_STEP)
     return outcome, iterations
+
+
+@merged
+def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
+    """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
+    at, introducer = handle.place[0], handle.introducer
+    at.rubbed, at.dissipated, at.snaps, at.seen_depth = 0.0, 0.0, 0, math.nan
+    steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
+    steps += abs(at.goal - at.catheter) / introducer.step
+    if introducer.idle_roll and at.roll != to_roll:
+        at.roll = to_roll
+        handle.problem.scratch.counters[0].rolls_proven_idle += 1
+    return float(handle.limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps))
 
 
 @inlined
 def arrived(at: Any, depth: float, roll: float) -> bool:
     """Whether wire, roll and catheter are where they are to go."""
     return bool(abs(depth - at.inserted) < tol.MATCH_DEPTH_MM and at.roll == roll and at.catheter == at.goal)
+
+
+@merged
+def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
+    """Whether to take another step after one that ended so, and what to call the outcome if not."""
+    at = handle.place[0]
+    if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
+        return False, data.MAX_ITERATIONS
+    # outside the grid or without a finite energy a shorter step does not help
+    helps = at.shrink > tol.SMALLEST_STEP and outcome != data.LEFT_GRID and outcome != data.NON_FINITE
+    if outcome == data.CONVERGED:
+        at.shrink = min(1.0, 2 * at.shrink)
+    elif outcome == data.ROUGH:
+        at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
+    elif helps:
+        at.shrink *= 0.5
+    return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
 
 
 @merged
@@ -107,15 +125,26 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
+    return settle(handle, (depth, roll, energy), k, outcome, laid, used), used
+
+
+@owner
+def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int) -> int:
+    """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
+
+    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations.
+    """
+    problem, at, (depth, roll, energy) = handle.problem, handle.place[0], reached
+    energy -= problem.state.energies[data.CURRENT].friction
     if outcome == data.CONVERGED and problem.stiffness > 0.0:
         outcome = where(problem, handle.introducer.margin, k, laid)
     energy += stored_energy(handle.table, depth)
     if outcome == data.CONVERGED and laid == 0:
-        outcome = account(handle, k, (depth, roll, energy - problem.state.energies[data.CURRENT].friction), used)
+        outcome = account(handle, k, (depth, roll, energy), used)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step = depth - at.inserted if roll == at.roll else 0.0
-        at.inserted, at.roll, at.energy = depth, roll, energy - problem.state.energies[data.CURRENT].friction
+        at.inserted, at.roll, at.energy = depth, roll, energy
         at.catheter, at.stored = at.next, stored_energy(handle.table, depth)
         if problem.friction.coefficient > 0.0:
             at.rubbed += settle_friction(problem, k)
@@ -123,7 +152,7 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
             at.rubbed += settle_shaft(problem, k)
     else:
         take_back(handle)
-    return outcome, used
+    return outcome
 
 
 @merged
@@ -165,7 +194,8 @@ def allowed(
         longest = min(introducer.step, abs(ahead))
         if ahead > 0.0 and problem.stiffness > 0.0:
             k, _ = segments_at(depth, table.segment)
-            tip, along = problem.state.x[data.CURRENT, k], problem.state.r[data.CURRENT, k, :, 2]
+            r, tip = problem.state.r[data.CURRENT], load3(problem.state.x[data.CURRENT], k)
+            along = (r[k, 0, 2], r[k, 1, 2], r[k, 2, 2])
             longest = free_way(problem.field, tip, along, longest, introducer.rise)
         fraction = min(fraction, longest / abs(ahead))
     return fraction
@@ -228,61 +258,3 @@ def clamp(problem: Problem, introducer: Introducer, roll: float) -> None:
         x[0, a] = introducer.entry[a]
         one, two = introducer.frame[a, 0], introducer.frame[a, 1]
         r[0, a, 0], r[0, a, 1], r[0, a, 2] = c * one + s * two, c * two - s * one, introducer.frame[a, 2]
-
-
-@cached
-def lay_along(
-    problem: Problem, table: WireTable, introducer: Introducer, was: int, k: int, first: float, ahead: float
-) -> None:
-    """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
-    chain, state = problem.chain, problem.state
-    before = chain.length[0]
-    lay_out(chain, table, k, first)
-    put_over(chain, table, k)
-    if problem.twisting:
-        # twist stays with the material, which is counted from the tip
-        for j in range(k):
-            # the first joint twists with the shaft outside, wherever the material is
-            common = j >= k - min(was, k) and (table.shaft == 0.0 or (j > 0 and was - k + j > 0))
-            state.u[data.CURRENT, j, 2] = state.u[data.LAST_GOOD, was - k + j, 2] if common else 0.0
-        if table.shaft > 0.0 and was > 0:
-            state.u[data.CURRENT, 0, 2] = state.u[data.LAST_GOOD, 0, 2]
-    put_load(chain, introducer, k)
-    source, count = data.LAST_GOOD, was + 1
-    if was == 0:
-        source, count = data.TRIAL, begin(introducer, state.x[data.TRIAL])
-    elif introducer.translate and ahead != 0.0:
-        source, count = data.TRIAL, moved(introducer, table, state.x, was, before, ahead)
-    follow(state.x[source], count, chain, state.u[data.CURRENT], state.x[data.CURRENT], state.r[data.CURRENT], k)
-    if problem.friction.coefficient > 0.0:
-        anchor_friction(problem, was, k, ahead, table.shaft)
-
-
-@kernel
-def put_load(chain: Chain, introducer: Introducer, k: int) -> None:
-    """Put the dead load on the tip and none elsewhere."""
-    for n in range(k + 1):
-        for a in range(3):
-            chain.load[n, a] = introducer.load[a] if n == k else 0.0
-
-
-@merged
-def begin(introducer: Introducer, curve: Any) -> int:
-    """Straight on from the entry, as two points."""
-    for a in range(3):
-        curve[0, a] = introducer.entry[a]
-        curve[1, a] = introducer.entry[a] + introducer.frame[a, 2]
-    return 2
-
-
-@kernel
-def moved(introducer: Introducer, table: WireTable, x: Any, was: int, first: float, ahead: float) -> int:
-    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
-    curve, count = x[data.TRIAL], begin(introducer, x[data.TRIAL]) - 1
-    for n in range(was + 1):
-        arc = first + (n - 1) * table.segment if n > 0 else 0.0
-        if ahead > 0.0 or arc > -ahead:
-            for a in range(3):
-                curve[count, a] = x[data.LAST_GOOD, n, a] + ahead * introducer.frame[a, 2]
-            count += 1
-    return max(count, 2)

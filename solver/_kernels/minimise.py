@@ -10,7 +10,7 @@ from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
 from solver._kernels.data import CONVERGED, FOLDED, FRICTION, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import merged
+from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.friction import take_loads
 from solver._kernels.newton import costate
@@ -81,11 +81,14 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
         if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
             break
         outcome = FRICTION
-    if outcome == CONVERGED:
-        tip = problem.state.x[slot, k]
-        # whatever is undefined along the wire is so at its tip
-        if not math.isfinite(tip[0] + tip[1] + tip[2]):
-            outcome = NON_FINITE
-        elif least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE:
-            outcome = FOLDED
-    return outcome, iterations, energy
+    return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, energy
+
+
+@kernel
+def shape_of(problem: Problem, slot: int, k: int) -> int:
+    """Judge the shape of a wire at rest: NON_FINITE, FOLDED, or CONVERGED where there is nothing wrong with it."""
+    tip = problem.state.x[slot, k]
+    # whatever is undefined along the wire is so at its tip
+    if not math.isfinite(tip[0] + tip[1] + tip[2]):
+        return NON_FINITE
+    return FOLDED if least_turn_cosine(problem.state.r[slot], k) < tol.FOLD_COSINE else CONVERGED

@@ -126,7 +126,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         frame = load9(state.r[slot], n)
         df, dg = node_gradient(problem, slot, n, frame)
         dp, dc, dh = node_hessian(problem, slot, n, frame, damping > 0.0)
-        held = damping * bend[j] / (length[j] * length[j])
+        held = damping * bend[j] / (length[j] * length[j]) if damping > 0.0 else 0.0
         value = cross_segment(length[j], add_node(value, (df, dg), (dp, dc, dh), held))
         _, c, h, _, g = value
         u = load3(state.u[slot], j)

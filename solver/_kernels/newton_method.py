@@ -86,10 +86,13 @@ def rest_shape(problem: Problem, slot: int, k: int) -> bool:
 
 
 @merged
-def last_step(problem: Problem, k: int, now: Any, report: Any) -> None:
-    """Take the step that squares the error, and leave the exact gradient of the result in the report."""
+def last_step(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
+    """Take the step that squares the error, and leave the exact gradient of the result in the report.
+
+    Not the energy's last place decides, 1e-8 mm of the result would hang on it.
+    """
     trial = step(problem, now.slot, now.first_free, k, 1.0)
-    if trial <= now.energy and admissible(problem, now.slot, k):
+    if trial <= now.energy + noise and admissible(problem, now.slot, k):
         now.slot, now.energy = 1 - now.slot, trial
     costate(problem, now.slot, k, report)
 
@@ -216,7 +219,7 @@ def release(problem: Problem, k: int, now: Any, noise: float, report: Any) -> in
 def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int:
     """Take the last step and judge the result; UNDECIDED where the step did not help."""
     before = now.energy
-    last_step(problem, k, now, report)
+    last_step(problem, k, now, noise, report)
     if now.iterations == 0 and not problem.skips.rest:
         return UNFINISHED
     if whole(now, report) and at_rest(problem, now.slot, k, report):

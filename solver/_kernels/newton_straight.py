@@ -105,8 +105,8 @@ def cross_joint(turn: Turn, moment: Pair, q_uu: Six, value: Value) -> tuple[Valu
     p, c, h, f, g = value
     jac, e = turn
     e0, e1 = e[:3], e[3:6]
-    det = -(q_uu[0] * q_uu[1] - q_uu[3] * q_uu[3])
-    i0, i1, i2 = q_uu[1] / det, q_uu[0] / det, -q_uu[3] / det
+    per_det = -1.0 / (q_uu[0] * q_uu[1] - q_uu[3] * q_uu[3])
+    i0, i1, i2 = q_uu[1] * per_det, q_uu[0] * per_det, -q_uu[3] * per_det
     w0 = jac[0] * g[0] + jac[2] * g[1] + moment[0]
     w1 = jac[1] * g[0] + jac[3] * g[1] + moment[1]
     # rows of Q_up and of Q_ur, the latter with the answer to a roll of the outgoing frame
@@ -156,7 +156,7 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
         frame, u = load9(frames, n), (controls[j, 0], controls[j, 1])
         gradient = node_gradient(problem, slot, n, frame)
         hessian = node_hessian(problem, slot, n, frame, damping > 0.0)
-        held = damping * bend[j] / (length[j] * length[j])
+        held = damping * bend[j] / (length[j] * length[j]) if damping > 0.0 else 0.0
         value = cross_segment(length[j], add_node(value, gradient, hessian, held))
         turn, q_uu = joint_block(bend[j] * (1.0 + 0.01 * damping), u, value)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, False)

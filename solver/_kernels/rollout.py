@@ -20,6 +20,7 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import Chain, Problem, State
 from solver._kernels.flags import inlined, kernel
+from solver._kernels.lanes import anywhere, select
 from solver._kernels.rotation import turn
 
 
@@ -99,14 +100,16 @@ def relative(old: Nine, new: Nine) -> Three:
 @inlined
 def limited(u: Three, s: Three) -> Three:
     """u + s with the step kept below STEP_ANGLE and the result below CONTROL_ANGLE."""
-    s0, s1, s2 = s
-    size = s0 * s0 + s1 * s1 + s2 * s2
-    if size > tol.STEP_ANGLE * tol.STEP_ANGLE:
-        scale = tol.STEP_ANGLE / math.sqrt(size)
-        s0, s1, s2 = s0 * scale, s1 * scale, s2 * scale
-    v0, v1, v2 = u[0] + s0, u[1] + s1, u[2] + s2
-    size = v0 * v0 + v1 * v1 + v2 * v2
-    if size > tol.CONTROL_ANGLE * tol.CONTROL_ANGLE:
-        scale = tol.CONTROL_ANGLE / math.sqrt(size)
-        v0, v1, v2 = v0 * scale, v1 * scale, v2 * scale
-    return v0, v1, v2
+    s = shortened(s, tol.STEP_ANGLE)
+    return shortened((u[0] + s[0], u[1] + s[1], u[2] + s[2]), tol.CONTROL_ANGLE)
+
+
+@inlined
+def shortened(v: Three, longest: float) -> Three:
+    """V, or where it is longer than that, as long as ``longest``."""
+    size = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    beyond = size > longest * longest
+    if anywhere(beyond):
+        scale = select(beyond, longest / math.sqrt(size), 1.0)
+        return v[0] * scale, v[1] * scale, v[2] * scale
+    return v

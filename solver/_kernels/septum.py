@@ -14,8 +14,8 @@ import numpy as np
 from solver import _tolerances as tol
 from solver._kernels.algebra import Three, dot, load3, minus, mix
 from solver._kernels.data import Field
-from solver._kernels.field import clipped, fill_jet, indices, locate, value
-from solver._kernels.flags import cached, inlined, kernel
+from solver._kernels.field import clipped, indices, jet_at, locate, value
+from solver._kernels.flags import cached, inlined, kernel, owner
 
 Foot = tuple[float, float, float, float]
 """A place in a lumen, mm, and the distance there, mm; the distance is inf where none was found."""
@@ -27,7 +27,6 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
     if not passes_crease(field, x, k):
         return False
     last, known = (0.0, 0.0, 0.0, 0.0), False
-    weights, jet = np.empty((3, 3, 4)), np.empty(10)
     for n in range(1, k + 1):
         a, b = load3(x, n - 1), load3(x, n)
         d = minus(b, a)
@@ -37,10 +36,10 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
             continue
         steps = math.ceil(2 * way / field.spacing)
         for i in range(1 if known else 0, steps + 1):
-            here = foot(field, mix(1.0 - i / steps, a, i / steps, b), -margin, weights, jet)
+            here = foot(field, mix(1.0 - i / steps, a, i / steps, b), -margin)
             if here[3] == math.inf:
                 continue
-            if known and parted(field, last, here, -margin, weights, jet):
+            if known and parted(field, last, here, -margin):
                 return True
             last, known = here, True
     return False
@@ -87,7 +86,7 @@ def distance(field: Field, q: Three) -> float:
 
 
 @kernel
-def foot(field: Field, q: Three, level: float, weights: Any, jet: Any) -> Foot:
+def foot(field: Field, q: Three, level: float) -> Foot:
     """Go down the distance from a place until it is ``level``, mm, or until a lumen too narrow for that is deepest."""
     c, v = field.coefficients, distance(field, q)
     for _ in range(tol.FOOT_STEPS):
@@ -95,11 +94,11 @@ def foot(field: Field, q: Three, level: float, weights: Any, jet: Any) -> Foot:
             # the last of these steps ends a rounding above the level or below it
             v = min(v, level)
             break
-        fill_jet(c, field.to_index, locate(c, indices(field.to_index, field.origin, q)), weights, jet)
-        g = (jet[1], jet[2], jet[3])
+        first, second = jet_at(c, field.to_index, locate(c, indices(field.to_index, field.origin, q)))
+        g = first[1:]
         square = dot(g, g)
         # hardly any slope is the floor of a lumen where the distance curves upwards, and a ridge where it does not
-        floor = square < 0.5 and jet[4] + jet[5] + jet[6] > 0.0
+        floor = square < 0.5 and second[0] + second[1] + second[2] > 0.0
         if floor and v < 0.5 * field.spacing:
             break
         step = min((v - level) / max(square, 1e-12), 0.5 * field.spacing / math.sqrt(max(square, 1e-12)))
@@ -113,7 +112,7 @@ def foot(field: Field, q: Three, level: float, weights: Any, jet: Any) -> Foot:
 
 
 @kernel
-def parted(field: Field, a: Foot, b: Foot, level: float, weights: Any, jet: Any) -> bool:
+def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
     """Whether a ridge lies between two feet, and no way through lumen around it nearby."""
     # where the lumen is narrower than the wire all of it counts, not what the wire has room in
     top = tol.RIDGE_VOXELS * field.spacing + (level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0))
@@ -122,11 +121,11 @@ def parted(field: Field, a: Foot, b: Foot, level: float, weights: Any, jet: Any)
     steps = math.ceil(4 * math.sqrt(dot(d, d)) / field.spacing)
     for i in range(1, steps):
         if distance(field, mix(1.0 - i / steps, p, i / steps, q)) > top:
-            return not joined(field, deeper(field, a, weights, jet), deeper(field, b, weights, jet), top)
+            return not joined(field, deeper(field, a), deeper(field, b), top)
     return False
 
 
-@kernel
+@owner
 def joined(field: Field, p: Three, q: Three, top: float) -> bool:
     """Whether a way on which the distance is below ``top`` leads from one place to another nearby: a flood from p."""
     d = minus(q, p)
@@ -160,7 +159,7 @@ def joined(field: Field, p: Three, q: Three, top: float) -> bool:
 
 
 @kernel
-def deeper(field: Field, a: Foot, weights: Any, jet: Any) -> Three:
+def deeper(field: Field, a: Foot) -> Three:
     """A place up to a voxel further in the lumen than a foot: there a flood cannot slip over a ridge."""
-    b = foot(field, a[:3], a[3] - field.spacing, weights, jet)
+    b = foot(field, a[:3], a[3] - field.spacing)
     return b[:3] if b[3] < math.inf else a[:3]

@@ -9,12 +9,15 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.algebra import apply_transposed, dot, load9, minus, scaled, store3, store9, times
+from solver._kernels.chain import lay_out
 from solver._kernels.crossing import crossed
-from solver._kernels.data import Chain, Problem
+from solver._kernels.data import CURRENT, LAST_GOOD, TRIAL, Chain, Introducer, Problem, WireTable
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import entry_point, inlined, kernel, merged
+from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
+from solver._kernels.friction import anchor_friction
 from solver._kernels.rollout import copy_base, place
 from solver._kernels.rotation import bend_towards, turn, with_twist
+from solver._kernels.sleeve import put_over
 
 
 @inlined
@@ -35,14 +38,15 @@ def leaving(a: Any, b: Any, centre: Any, radius: float) -> float:
 
 
 @entry_point
-def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, k: int) -> None:
-    """Lay k segments along a polyline (m, 3) from x[0], which lies on its start; fill u, x and frames r.
+def follow(curve: Any, m: int, chain: Chain, u: Any, x: Any, r: Any, joints: tuple[int, int]) -> None:
+    """Lay segments along a polyline (m, 3) from x[0], which lies on its start; fill u, x and frames r.
 
     Each joint is the first place on the curve at its segment's length from the joint before; past the end the
     last direction continues. r[0] must hold the base frame.
+    joints : the first one to bend, up to which the wire lies on the polyline's own joints, and the number of segments.
     """
-    at, start = 0, 0.0
-    for j in range(k):
+    at, start = joints[0], 0.0
+    for j in range(joints[0], joints[1]):
         length = chain.length[j]
         while at < m - 1:
             t = leaving(curve[at], curve[at + 1], x[j], length)
@@ -125,3 +129,74 @@ def note_change(problem: Problem, slot: int, k: int) -> None:
             scratch.change[k - 1 - j, a] = u[j, a] - scratch.start[j, a]
     for m in range(k, scratch.change.shape[0]):
         scratch.change[m, 0] = scratch.change[m, 1] = scratch.change[m, 2] = 0.0
+
+
+@cached
+def lay_along(
+    problem: Problem, table: WireTable, introducer: Introducer, was: int, k: int, first: float, ahead: float
+) -> None:
+    """Lay the wire of the last good state, pushed on by ``ahead`` mm, along its own curve: the start of a step."""
+    chain, state = problem.chain, problem.state
+    before = chain.length[0]
+    lay_out(chain, table, k, first)
+    put_over(chain, table, k)
+    if problem.twisting:
+        # twist stays with the material, which is counted from the tip
+        for j in range(k):
+            # the first joint twists with the shaft outside, wherever the material is
+            common = j >= k - min(was, k) and (table.shaft == 0.0 or (j > 0 and was - k + j > 0))
+            state.u[CURRENT, j, 2] = state.u[LAST_GOOD, was - k + j, 2] if common else 0.0
+        if table.shaft > 0.0 and was > 0:
+            state.u[CURRENT, 0, 2] = state.u[LAST_GOOD, 0, 2]
+    put_load(chain, introducer, k)
+    source, count = LAST_GOOD, was + 1
+    if was == 0:
+        source, count = TRIAL, begin(introducer, state.x[TRIAL])
+    elif introducer.translate and ahead != 0.0:
+        source, count = TRIAL, moved(introducer, table, state.x, was, before, ahead)
+    # moved on by whole segments, the joints of a straight wire lie where joints lay, and are there already
+    lies = problem.straight and source == LAST_GOOD and abs(chain.length[0] - before) < tol.SAME_LENGTH_MM
+    joints = (min(was, k) if lies and same_base(state.r) else 0, k)
+    follow(state.x[source], count, chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], joints)
+    if problem.friction.coefficient > 0.0:
+        anchor_friction(problem, was, k, ahead, table.shaft)
+
+
+@inlined
+def same_base(r: Any) -> bool:
+    """Whether the base is turned as in the last good state."""
+    same = True
+    for a in range(3):
+        for b in range(3):
+            same = same and r[CURRENT, 0, a, b] == r[LAST_GOOD, 0, a, b]
+    return same
+
+
+@kernel
+def put_load(chain: Chain, introducer: Introducer, k: int) -> None:
+    """Put the dead load on the tip and none elsewhere."""
+    for n in range(k + 1):
+        for a in range(3):
+            chain.load[n, a] = introducer.load[a] if n == k else 0.0
+
+
+@merged
+def begin(introducer: Introducer, curve: Any) -> int:
+    """Straight on from the entry, as two points."""
+    for a in range(3):
+        curve[0, a] = introducer.entry[a]
+        curve[1, a] = introducer.entry[a] + introducer.frame[a, 2]
+    return 2
+
+
+@kernel
+def moved(introducer: Introducer, table: WireTable, x: Any, was: int, first: float, ahead: float) -> int:
+    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
+    curve, count = x[TRIAL], begin(introducer, x[TRIAL]) - 1
+    for n in range(was + 1):
+        arc = first + (n - 1) * table.segment if n > 0 else 0.0
+        if ahead > 0.0 or arc > -ahead:
+            for a in range(3):
+                curve[count, a] = x[LAST_GOOD, n, a] + ahead * introducer.frame[a, 2]
+            count += 1
+    return max(count, 2)

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import solver
-from solver import Catheter, Grid, GuideWire, Insertion, VesselWall, relax, skips, warm_up
+from solver import Catheter, Grid, GuideWire, Insertion, Insertions, VesselWall, relax, skips, warm_up
 from tests.solver.scenes import tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -151,6 +151,27 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "tip_load_N": [*NOT_VECTORS, [0, 0, 1e9]],
         },
     ),
+    "insertions": (
+        lambda insertions=(), **a: Insertions(insertions, **a),
+        {
+            "insertions": [None, 1.0, "x", [None], [WIRE], insertion(), [insertion(), 1.0]],
+            "threads": [v for v in NOT_NUMBERS if v is not None] + HUGE + BELOW + [0.5],
+        },
+    ),
+    "many": (
+        lambda **a: Insertions([insertion(), insertion()]).to_depths(**({"depths_mm": [1.0, 2.0]} | a)),
+        {
+            "depths_mm": [5.0, "12", None, ["1", "2"], [-1.0], [1j], [[1.0]], [[1.0], [np.nan]], [[1.0], 2.0], {1.0}],
+            "roll_deg": ["1", None, np.nan, [0.0], [0.0, np.nan], [0.0] * 3, [0.0, [0.0] * 3], [True, 0.0], {}, 1e9],
+        },
+    ),
+    "like": (
+        lambda **a: WALL.like(**a),
+        {
+            "stiffness_N_mm2": [v for v in NOT_NUMBERS if v is not None] + HUGE + BELOW,
+            "friction": [v for v in NOT_NUMBERS if v is not None] + HUGE + [-0.1],
+        },
+    ),
     "to_depths": (
         to_depths,
         {
@@ -238,11 +259,13 @@ def test_what_cannot_be_used_is_refused_by_name_at_the_call(call: Callable[..., 
 def test_no_public_argument_is_left_out() -> None:
     """What stands in ``solver.__all__``, its public methods, and every argument of theirs is in the list above."""
     listed = {name: set(arguments) for name, (_, arguments) in DOORS.items()}
-    classes = {"wire": GuideWire, "catheter": Catheter, "wall": VesselWall, "grid": Grid, "insertion": Insertion}
+    classes = {"wire": GuideWire, "catheter": Catheter, "wall": VesselWall, "grid": Grid, "insertions": Insertions}
+    classes |= {"insertion": Insertion}
     calls: dict[str, Any] = dict(classes) | {"relax": relax, "warm_up": warm_up}
     for kind in classes.values():
         calls |= {n: f for n, f in vars(kind).items() if inspect.isfunction(f) and not n.startswith("_")}
-    # results, and what takes nothing
+    # of the two ways to depths the loop kept one
+    calls["many"] = Insertions.to_depths
     results = {"Snap", "Solution", "Status"}
     assert set(solver.__all__) - results == {c.__name__ for c in classes.values()} | {"relax", "warm_up"}
     for name, call in calls.items():

@@ -1,0 +1,169 @@
+"""Wires side by side: what the lock-step kernels work on, and the way there and back for one of them.
+
+The tips stand in line: node k of each wire is node ``size`` of the block, and so the look-up points, whose number
+depends on how far behind the tip a node is, stand in line as well. A shorter wire begins with joints of length 0 that
+do not bend. The last axis of every array is the lane.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solver._kernels.algebra import load3, load9, store3, store9
+from solver._kernels.data import CURRENT, Problem
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.records import record
+
+NUMBERS = (
+    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted"),
+    *(
+        "decrement",
+        "definite",
+        "pivot",
+        "bending",
+        "wall",
+        "load",
+        "jump",
+        "moment",
+        "largest",
+        "still",
+        "full",
+        "cheap",
+        "clear",
+    ),
+)
+"""Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
+Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0). Answered: the fall
+foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
+that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
+look-ups."""
+(
+    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
+    MOMENT, LARGEST, STILL, FULL, CHEAP, CLEAR,
+) = range(len(NUMBERS))  # fmt: skip
+ALONG, WEIGHT, ANCHOR = 0, 1, 2
+"""Columns of ``Block.site``: the last of four."""
+
+
+class Block(NamedTuple):
+    """Arrays of numbers (..., WIDTH); the same memory again as arrays (...) of lanes.
+
+    length, bend, cosine, sine, hold : (size,) of the joints: mm, N mm/rad, of the rest bend, bend over length².
+    u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
+    site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
+    row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (4,) a place that is
+    looked up, and how clear of the wall it was.     number : see ``NUMBERS``.
+    """
+
+    length: Any
+    bend: Any
+    cosine: Any
+    sine: Any
+    hold: Any
+    u: Any
+    x: Any
+    r: Any
+    gain: Any
+    site: Any
+    touch: Any
+    load: Any
+    force: Any
+    torque: Any
+    turned: Any
+    asked: Any
+    number: Any
+
+
+SHAPES = (
+    *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
+    *("3", "3", "3", "2 3", "4", str(len(NUMBERS))),
+)
+"""Of the arrays of a block: k joints, n nodes, p points."""
+LANE = record(
+    *((name, float) for name in ("depth", "roll", "clamped", "limit", "tolerance", "stiffest", "scale", "noise")),
+    *((name, float) for name in ("accuracy", "pivot")),
+    *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load")),
+    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "filled")),
+)
+"""Where a lane is.
+
+depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise : see
+``energy.scale_of``.     fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
+before : energy that the iteration began with.     bending, wall, load : energies of the current state.
+limit, iterations : of this depth.     phase : see ``lane_relax``.     goal : index of the depth that it is on its way
+to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.
+outcome : how its relaxation ended.     filled : joints of length 0 that are in place, at the roll ``clamped``.
+"""
+
+
+@kernel
+def put_in(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
+    """Put the current state of a wire of k segments into a lane."""
+    chain, state, shift = problem.chain, problem.state, b.length.shape[0] - k
+    for j in range(k):
+        to, rest, length = shift + j, chain.rest[j], chain.length[j]
+        b.length[to, lane], b.bend[to, lane] = length, chain.bend[j]
+        b.hold[to, lane] = chain.bend[j] / (length * length)
+        b.cosine[to, lane] = math.cos(rest) if rest != 0.0 else 1.0
+        b.sine[to, lane] = math.sin(rest) if rest != 0.0 else 0.0
+        b.u[CURRENT, to, 0, lane], b.u[CURRENT, to, 1, lane] = state.u[CURRENT, j, 0], state.u[CURRENT, j, 1]
+    for n in range(k + 1):
+        put_node(b, lane, shift + n, load3(state.x[CURRENT], n), load9(state.r[CURRENT], n))
+    for p in range(first[shift + 1]):
+        b.site[p, WEIGHT, lane] = b.touch[CURRENT, p, 0, lane] = 0.0
+    for p in range(chain.first[k + 1]):
+        to, d = first[shift + 1] + p, state.penetration[CURRENT, p]
+        b.site[to, ALONG, lane], b.site[to, WEIGHT, lane] = chain.offset[p, 2], chain.weight[p]
+        for a in range(4):
+            b.site[to, ANCHOR + a, lane] = problem.scratch.anchor[p, a]
+        b.touch[CURRENT, to, 0, lane] = d
+        if d != 0.0:
+            for a in range(10):
+                b.touch[CURRENT, to, 1 + a, lane] = state.jet[CURRENT, p, a]
+    for a in range(3):
+        b.load[a, lane] = chain.load[k, a]
+
+
+@inlined
+def put_node(b: Block, lane: int, n: int, x: Any, r: Any) -> None:
+    """Put a joint and its frame into a lane."""
+    for a in range(3):
+        b.x[CURRENT, n, a, lane] = x[a]
+        for c in range(3):
+            b.r[CURRENT, n, a, c, lane] = r[3 * a + c]
+
+
+@kernel
+def fill_up(b: Block, lane: int, problem: Problem, start: int, stop: int) -> None:
+    """Put joints of length 0 before a wire."""
+    x, r = load3(problem.state.x[CURRENT], 0), load9(problem.state.r[CURRENT], 0)
+    for j in range(start, stop):
+        b.length[j, lane] = b.hold[j, lane] = b.sine[j, lane] = 0.0
+        b.bend[j, lane] = b.cosine[j, lane] = 1.0
+        b.u[CURRENT, j, 0, lane] = b.u[CURRENT, j, 1, lane] = 0.0
+        put_node(b, lane, j, x, r)
+
+
+@kernel
+def take_out(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
+    """Take the current state of a lane over as that of its wire."""
+    chain, state, shift = problem.chain, problem.state, b.length.shape[0] - k
+    u, x, r, jet = state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], state.jet[CURRENT]
+    for n in range(k + 1):
+        at = shift + n
+        store3(x, n, (b.x[CURRENT, at, 0, lane], b.x[CURRENT, at, 1, lane], b.x[CURRENT, at, 2, lane]))
+        one = (b.r[CURRENT, at, 0, 0, lane], b.r[CURRENT, at, 0, 1, lane], b.r[CURRENT, at, 0, 2, lane])
+        two = (b.r[CURRENT, at, 1, 0, lane], b.r[CURRENT, at, 1, 1, lane], b.r[CURRENT, at, 1, 2, lane])
+        three = (b.r[CURRENT, at, 2, 0, lane], b.r[CURRENT, at, 2, 1, lane], b.r[CURRENT, at, 2, 2, lane])
+        store9(r, n, one + two + three)
+        if n < k:
+            store3(u, n, (b.u[CURRENT, at, 0, lane], b.u[CURRENT, at, 1, lane], 0.0))
+    for p in range(chain.first[k + 1]):
+        at = first[shift + 1] + p
+        d = b.touch[CURRENT, at, 0, lane]
+        state.penetration[CURRENT, p] = d
+        if d != 0.0:
+            for a in range(10):
+                jet[p, a] = b.touch[CURRENT, at, 1 + a, lane]

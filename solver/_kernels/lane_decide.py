@@ -1,0 +1,153 @@
+"""What a lane does next: the decisions of ``newton_method.iterate``, one at a time, on nothing but its records.
+
+me, now, counters : records of ``lane_block.LANE``, ``records.DESCENT`` and ``records.COUNTERS``.     number :
+``Block.number``, in which the lane's column is read.
+"""
+
+import math
+from typing import Any
+
+from solver import _tolerances as tol
+from solver._kernels.data import CONVERGED
+from solver._kernels.energy import FLOOR
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.lane_block import (
+    ACCEPTED,
+    BENDING,
+    DECREMENT,
+    DEFINITE,
+    LARGEST,
+    LOAD,
+    MOMENT,
+    PIVOT,
+    START,
+    STILL,
+    WALL,
+)
+from solver._kernels.newton_method import whole
+
+IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW = range(13)
+"""Phases of a lane: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
+of its search, or the last one; has taken one, and may be at rest by it; may be at a saddle; goes on alone; its
+relaxation has ended, in the lane or in the wire; a wire is to begin."""
+
+
+@inlined
+def next_iteration(me: Any, now: Any) -> None:
+    """Go on with the next iteration, if there is one left."""
+    now.iterations += 1
+    me.phase = SWEEP if now.iterations < me.allowed else ALONE
+
+
+@kernel
+def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> None:
+    """Decide what to do with new gains, as ``newton_method.iterate`` does."""
+    me.decrement = number[DECREMENT, lane]
+    definite = number[DEFINITE, lane] > 0.0
+    if definite and now.damping == 0.0:
+        me.pivot = number[PIVOT, lane] if now.first_free == 0 else min(number[PIVOT, lane], me.pivot)
+    definite = definite and math.isfinite(me.decrement)
+    me.accuracy = me.tolerance * (tol.SOFT_TOLERANCE if me.pivot < tol.SOFT else 1.0)
+    counters.sweeps += 1
+    counters.joints_left_still += now.first_free
+    me.before, me.tries, me.fraction = now.energy, 0, 1.0
+    me.scale = me.bending + me.wall + FLOOR * me.stiffest
+    me.noise = tol.ROUND_OFF * (me.scale + abs(me.load))
+    if now.first_free > 0 and not definite:
+        now.first_free = 0
+        next_iteration(me, now)
+    elif definite and now.damping == 0.0 and me.decrement <= max(me.accuracy * me.scale, me.noise):
+        me.phase = LAST
+    elif definite and now.damping > 0.0 and me.decrement <= me.noise and now.released < tol.SEARCHES:
+        me.phase = ALONE
+    elif definite:
+        me.phase = SEARCH
+    elif now.damping == 0.0:
+        me.phase = JUDGE
+    else:
+        hold_back(me, now, counters)
+
+
+@inlined
+def leads_down(me: Any, now: Any, number: Any, lane: int) -> bool:
+    """Whether a trial's energy is low enough, as ``newton_method.search`` and ``last_step`` ask."""
+    trial = number[BENDING, lane] + number[WALL, lane] + number[LOAD, lane]
+    lower = trial <= now.energy
+    if me.phase == LAST:
+        return bool(trial <= now.energy + me.noise)
+    enough = trial <= now.energy - tol.SUFFICIENT * me.fraction * me.decrement
+    return bool(enough or (me.decrement <= me.noise and lower))
+
+
+@kernel
+def take(me: Any, now: Any, number: Any, lane: int) -> None:
+    """Accept a trial, as ``newton_method.take`` and ``last_step`` do."""
+    number[ACCEPTED, lane] = 1.0
+    me.bending, me.wall, me.load = number[BENDING, lane], number[WALL, lane], number[LOAD, lane]
+    trial = me.bending + me.wall + me.load
+    missed = now.energy - trial - me.decrement
+    now.energy = trial
+    if me.phase == SEARCH:
+        foretold = tol.FORETOLD * missed * missed <= me.accuracy * me.scale * me.decrement
+        me.phase = FORETOLD if foretold and now.damping == 0.0 and whole(now, me) else TAKEN
+
+
+@kernel
+def shorten(me: Any, now: Any, counters: Any) -> None:
+    """Try a shorter step in the next round, or another way, as ``newton_method.iterate`` does."""
+    me.tries += 1
+    me.fraction *= 0.4
+    if me.tries == 1 and now.damping == 0.0 and now.first_free == 0 and me.decrement <= tol.FINE * me.scale:
+        me.phase = ALONE
+    elif me.tries == tol.SEARCHES:
+        hold_back(me, now, counters)
+
+
+@kernel
+def finish_taking(me: Any, now: Any, number: Any, lane: int) -> None:
+    """What follows a step that was taken and is not the last one, see ``newton_method.take``."""
+    still = int(number[STILL, lane] - number[START, lane]) + now.first_free
+    now.first_free = still if now.damping == 0.0 and tol.WORTHWHILE * me.k < still < me.k else 0
+    now.last_damping = now.damping if now.damping > 0.0 else tol.LEAST_DAMPING
+    now.patience -= 1
+    if now.patience <= 0:
+        now.damping = 0.2 * now.damping if now.damping > tol.LEAST_DAMPING else 0.0
+    next_iteration(me, now)
+
+
+@kernel
+def hold_back(me: Any, now: Any, counters: Any) -> None:
+    """``newton_method.hold_back``, but for its end."""
+    damping = 0.5 * now.last_damping if now.damping == 0.0 else 6 * now.damping
+    if now.first_free > 0:
+        now.first_free = 0
+    elif damping <= tol.WORST_DAMPING:
+        counters.levenberg += 1
+        now.patience, now.damping = 2, damping
+    else:
+        me.phase = ALONE
+        return
+    next_iteration(me, now)
+
+
+@kernel
+def after_costate(me: Any, now: Any, counters: Any, number: Any, lane: int) -> None:
+    """Judge the gradient of a lane, as ``newton_method.finish``, ``take`` and ``iterate`` do."""
+    if me.phase not in (LAST, JUDGE, FORETOLD):
+        return
+    rests = number[MOMENT, lane] <= tol.MOMENT * number[LARGEST, lane]
+    if rests and me.phase != JUDGE and whole(now, me):
+        counters.starts_at_rest += me.phase == LAST and now.iterations == 0
+        now.iterations += me.phase == FORETOLD
+        me.outcome, me.phase = CONVERGED, RESTED
+    elif me.phase == FORETOLD:
+        finish_taking(me, now, number, lane)
+    elif me.phase == LAST and now.first_free > 0:
+        now.first_free = 0
+        next_iteration(me, now)
+    elif me.phase == LAST and me.decrement > me.noise and now.energy < me.before:
+        next_iteration(me, now)
+    elif me.phase == JUDGE and not rests:
+        hold_back(me, now, counters)
+    else:
+        me.phase = ALONE

@@ -1,0 +1,191 @@
+"""Relaxations in lock-step: ``newton_method.iterate`` for several wires, each at its own place in it.
+
+In a round all lanes sweep, those that have a step to try do so, and those that may be at rest get their gradient. A
+lane whose step failed tries a shorter one in the next round, with the same gains. What is rare (watchdog, polishing,
+leaving a saddle) a wire does alone, by ``iterate`` itself.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from solver._kernels import newton_method
+from solver._kernels.crossing import free_fraction
+from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
+from solver._kernels.flags import kernel, merged, owner
+from solver._kernels.forces import copy_state
+from solver._kernels.lane_block import ACCEPTED, ACTIVE, DAMPING, FRACTION, JUMP, MOMENT, START, Block, put_in, take_out
+from solver._kernels.lane_decide import (
+    ALONE,
+    DONE,
+    FORETOLD,
+    JUDGE,
+    LAST,
+    SEARCH,
+    SWEEP,
+    TAKEN,
+    after_costate,
+    after_sweep,
+    finish_taking,
+    leads_down,
+    next_iteration,
+    shorten,
+    take,
+)
+from solver._kernels.lane_newton import costate, sweep
+from solver._kernels.lane_trial import accept, rollout, wall_energy
+from solver._kernels.lanes import WIDTH
+from solver._kernels.newton import costate as costate_alone
+
+WORTH_ANOTHER = 3
+"""Lanes whose steps failed that are worth another trial at once: it costs a third of a round, and a lane that waits
+loses an eighth of one."""
+
+
+class Team(NamedTuple):
+    """Wires side by side.
+
+    wires : a handle for each lane.     lanes, nows, counts : (WIDTH,) records ``lane_block.LANE``, ``DESCENT`` and
+    ``COUNTERS`` of ``records``.     first : (size + 2,) first look-up point of each node.
+    """
+
+    wires: Any
+    lanes: Any
+    nows: Any
+    counts: Any
+    first: Any
+    field: Field
+
+
+# Merged into the loop that they are the body of: to take a block out of a tuple costs as much as a short kernel.
+@merged
+def do_round(team: Team, block: Block, raw: Block, number: Any) -> None:
+    """Take every lane that is not idle one step further. number : that of the raw block."""
+    lanes, nows, counts, first = team.lanes, team.nows, team.counts, team.first
+    size = first.size - 2
+    base = size
+    for lane in range(WIDTH):
+        k, now = lanes[lane].k, nows[lane]
+        base = min(base, size - k)
+        number[DAMPING, lane], number[START, lane] = now.damping, size - k + now.first_free
+    sweep(block, first, base)
+    for lane in range(WIDTH):
+        if lanes[lane].phase == SWEEP:
+            after_sweep(lanes[lane], nows[lane], counts[lane], number, lane)
+    trying = ask_for_trials(lanes, number)
+    while trying > 0:
+        rollout(block, base, team.field.spacing)
+        wall_energy(block, raw, team.field, first, base)
+        if judge_trials(team, raw.x, number):
+            accept(block, first, base)
+        for lane in range(WIDTH):
+            if lanes[lane].phase == TAKEN:
+                finish_taking(lanes[lane], nows[lane], number, lane)
+        trying = ask_for_trials(lanes, number)
+        if trying < WORTH_ANOTHER:
+            break
+    if count_judged(lanes) > 0:
+        costate(block, first, base)
+        for lane in range(WIDTH):
+            after_costate(lanes[lane], nows[lane], counts[lane], number, lane)
+    for lane in range(WIDTH):
+        if lanes[lane].phase == ALONE:
+            go_alone(team, raw, lane)
+
+
+@kernel
+def ask_for_trials(lanes: Any, number: Any) -> int:
+    """Say which lanes want a trial and of what part of their step; return how many do."""
+    count = 0
+    for lane in range(WIDTH):
+        trying = lanes[lane].phase == SEARCH or (lanes[lane].phase == LAST and lanes[lane].tries == 0)
+        number[ACTIVE, lane], number[FRACTION, lane] = 1.0 if trying else 0.0, lanes[lane].fraction
+        count += trying
+    return count
+
+
+@kernel
+def judge_trials(team: Team, x: Any, number: Any) -> bool:
+    """Accept the trials that lead down, or else shorten their steps; say whether any was accepted."""
+    lanes, nows, counts = team.lanes, team.nows, team.counts
+    taken = False
+    for lane in range(WIDTH):
+        number[ACCEPTED, lane] = 0.0
+        if number[ACTIVE, lane] > 0.0:
+            me, now = lanes[lane], nows[lane]
+            counts[lane].rollouts += 1
+            if leads_down(me, now, number, lane) and (number[JUMP, lane] == 0.0 or reachable(team, x, lane)):
+                take(me, now, number, lane)
+                taken = True
+            elif me.phase == SEARCH:
+                shorten(me, now, counts[lane])
+            me.tries += me.phase == LAST
+    return taken
+
+
+@kernel
+def count_judged(lanes: Any) -> int:
+    """How many lanes need their gradient."""
+    count = 0
+    for lane in range(WIDTH):
+        count += lanes[lane].phase in (LAST, JUDGE, FORETOLD)
+    return count
+
+
+@kernel
+def reachable(team: Team, x: Any, lane: int) -> bool:
+    """``crossing.admissible`` of a lane's trial; x : that of the raw block."""
+    size, field = team.first.size - 2, team.field
+    limit = 0.25 * field.spacing * field.spacing
+    for n in range(size - team.lanes[lane].k + 1, size + 1):
+        square = 0.0
+        for a in range(3):
+            square += (x[TRIAL, n, a, lane] - x[CURRENT, n, a, lane]) ** 2
+        if square > limit:
+            old = (x[CURRENT, n, 0, lane], x[CURRENT, n, 1, lane], x[CURRENT, n, 2, lane])
+            new = (x[TRIAL, n, 0, lane], x[TRIAL, n, 1, lane], x[TRIAL, n, 2, lane])
+            if free_fraction(field, old, new, math.sqrt(square)) < 1.0:
+                return False
+    return True
+
+
+@merged
+def hand_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) -> None:
+    """Give a lane's state back to its wire."""
+    me = team.lanes[lane]
+    take_out(raw, team.first, lane, problem, me.k)
+    problem.scratch.descent[0] = team.nows[lane]
+    parts = problem.state.energies[CURRENT]
+    parts.bending, parts.wall, parts.load, parts.friction = me.bending, me.wall, me.load, 0.0
+    report.moment, report.pivot = raw.number[MOMENT, lane], me.pivot
+    for a in range(3):
+        report.force[a], report.torque[a] = raw.force[a, lane], raw.torque[a, lane]
+        report.turned[0, a], report.turned[1, a] = raw.turned[0, a, lane], raw.turned[1, a, lane]
+
+
+@merged
+def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) -> None:
+    """Take a wire's current state into its lane."""
+    me, parts = team.lanes[lane], problem.state.energies[CURRENT]
+    put_in(raw, team.first, lane, problem, me.k)
+    team.nows[lane] = problem.scratch.descent[0]
+    me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
+
+
+@owner
+def go_alone(team: Team, raw: Block, lane: int) -> None:
+    """Do one iteration of a lane by itself, or end its relaxation where none is left."""
+    me, wire = team.lanes[lane], team.wires[lane]
+    problem, report = wire.problem, wire.report[0]
+    now = problem.scratch.descent[0]
+    hand_over(team, raw, lane, problem, report)
+    me.phase, me.outcome = DONE, MAX_ITERATIONS
+    if now.iterations >= me.allowed:
+        costate_alone(problem, CURRENT, me.k, report)
+        return
+    me.outcome = newton_method.iterate(problem, me.k, now, wire.limits.tolerance, report)
+    if now.slot != CURRENT:
+        copy_state(problem, now.slot, CURRENT, me.k)
+        now.slot = CURRENT
+    if me.outcome == UNFINISHED:
+        take_over(team, raw, lane, problem, report)
+        next_iteration(me, team.nows[lane])

@@ -1,0 +1,107 @@
+"""Many insertions at once: in lock-step on each core, and on all cores.
+
+An insertion waits for its own last result most of the time. Eight of them, side by side in the processor's vectors,
+take little longer than one; see ``_kernels.lanes``.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from solver import skips
+from solver._kernels.lane_insertion import advance_together
+from solver._kernels.lanes import WIDTH
+from solver._kernels.minimise import NEWTON
+from solver.crew import Crew, Job, go_alone
+from solver.doors import Found, instance, whole
+from solver.errors import refuse
+from solver.insertion import Insertion
+from solver.solution import Solution
+
+LISTS = (list, tuple, np.ndarray)
+MOST_THREADS = 4096
+
+
+class Insertions:
+    """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
+
+    insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
+    from one another by ``VesselWall.like`` go in lock-step, WIDTH at a time; each comes to lie as by itself (to
+    rounding: 1e-9 mm, away from snaps; straight wires 2e-8). With friction, a finite torsional stiffness, a sampled
+    hull, a shaft, a weight, no wall or the closed form each goes by itself.
+    threads : how many of them to use (default: one a core); Python's lock is not held.
+    Raises ValueError where one insertion is given twice, or with a catheter.
+    """
+
+    def __init__(self, insertions: Iterable[Insertion], *, threads: int | None = None) -> None:
+        if not isinstance(insertions, Iterable):
+            refuse("insertions", "insertions", insertions, "a list of Insertion", "make each of them first")
+        self.insertions = tuple(instance("insertions", "insertions", one, Insertion) for one in insertions)
+        if len(set(map(id, self.insertions))) < len(self.insertions):
+            got = Found(f"{len(self.insertions)} of which {len(set(map(id, self.insertions)))} are different")
+            refuse("insertions", "insertions", got, "each of them once", "make another Insertion of the same wire")
+        if any(one._work.catheter is not None for one in self.insertions):
+            refuse("insertions", "insertions", Found("one with a catheter"), "wires without", "use Insertion.to_depths")
+        cores = os.cpu_count() or 1
+        self.threads = whole("insertions", "threads", cores if threads is None else threads, MOST_THREADS)
+
+    def to_depths(
+        self, depths_mm: Sequence[float] | Sequence[Sequence[float]], roll_deg: float | Sequence[Any] = 0.0
+    ) -> list[list[Solution]]:
+        """Push (or pull) every tip to its depths, as ``Insertion.to_depths`` does; a list of solutions for each.
+
+        depths_mm : the same for all (d,), or a sequence for each.     roll_deg : one for all, or for each insertion
+        what ``Insertion.to_depths`` takes.
+        """
+        count = len(self.insertions)
+        given: Any = list(depths_mm) if isinstance(depths_mm, Iterator) else depths_mm
+        own = isinstance(given, LISTS) and any(isinstance(depths, (*LISTS, range)) for depths in given)
+        depths = _one_each("depths_mm", given, count) if own else [given] * count
+        rolls = _one_each("roll_deg", roll_deg, count) if isinstance(roll_deg, LISTS) else [roll_deg] * count
+        goals = [one._goals(d, r) for one, d, r in zip(self.insertions, depths, rolls, strict=True)]
+        jobs = [Job(one, *goal[:2], []) for one, goal in zip(self.insertions, goals, strict=True)]
+        kinds: dict[Any, deque[Job]] = {}
+        # those that go deepest first, so that none of them is left over when all others are done
+        for job in sorted(jobs, key=lambda job: -max(job.depths, default=0.0)):
+            kinds.setdefault(kind_of(job) or id(job), deque()).append(job)
+        with ExitStack() as stack:
+            for job in jobs:
+                job.insertion._hold()
+                stack.callback(job.insertion._release)
+            tasks = [task for kind in kinds.values() for task in _tasks(kind, self.threads)]
+            with ThreadPoolExecutor(self.threads) as pool:
+                for ended in [pool.submit(task) for task in tasks]:
+                    ended.result()
+        return [job.found for job in jobs]
+
+
+def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
+    """What to do in threads for jobs of one kind."""
+    if len(kind) == 1:
+        return [partial(go_alone, kind[0])]
+    crews = [Crew(kind) for _ in range(min(threads, -(-len(kind) // WIDTH)))]
+    return [partial(crew.lead, kind) for crew in crews]
+
+
+def _one_each(name: str, values: Any, count: int) -> list[Any]:
+    """One for each of ``count`` insertions, or a refusal."""
+    if np.shape(values)[:1] != (count,) if isinstance(values, np.ndarray) else len(values) != count:
+        refuse("insertions", name, values, f"{count} of them, as there are insertions", "give each its own")
+    return list(values)
+
+
+def kind_of(job: Job) -> tuple[int, int, int] | None:
+    """What insertions must share to go in lock-step; None for those that cannot."""
+    insertion, wall, work = job.insertion, job.insertion.wall, job.insertion._work
+    plain = wall is not None and wall.friction == 0.0 and wall.samples == 0 and work.shaft.drag == 0.0
+    plain = plain and not insertion.wire.twists and insertion.wire.weight_N_per_mm == 0.0
+    reached = insertion._reaches(max(job.depths, default=0.0))
+    # there are no vectors where nothing is compiled
+    possible = work.limits.method == NEWTON and work.skips == skips.ALL and hasattr(advance_together, "py_func")
+    return (id(work.field), work.rule.zone, work.rule.tip_at.size) if plain and reached and possible else None
