@@ -63,6 +63,9 @@ SLIP_MM = 1e-3
 """Tangential way in mm below which a point in contact still sticks: a thousandth of a usual step."""
 FRICTION_CHANGE = 1e-4
 """Relative change of the contact loads at which friction counts as settled."""
+TURN_RADIUS_MM = 0.2
+"""A contact that turns by FRICTION_CHANGE about a wire of this radius moves by 2 % of SLIP_MM. About a thicker one it
+may turn by less, or it would be called settled while its spring is still being stretched."""
 FRICTION_ROUNDS = 60
 """Relaxations allowed for the contact loads of one step to settle."""
 PARALLEL = 1e-6

@@ -117,7 +117,7 @@ def take_loads(problem: Problem, slot: int, k: int) -> float:
 
 @inlined
 def hold(problem: Problem, frame: Nine, p: int, normal: Three) -> float:
-    """Note where a point touches; return by which angle that turned around the wire, rad."""
+    """Note where a point touches; return by which angle that turned around the wire, rad; more on a thick wire."""
     friction = problem.friction
     store3(friction.normal, p, normal)
     if friction.radius == 0.0:
@@ -125,7 +125,7 @@ def hold(problem: Problem, frame: Nine, p: int, normal: Three) -> float:
     arm = scaled(friction.radius, apply_transposed(frame, normal))
     change = minus(arm, load3(friction.arm, p))
     store3(friction.arm, p, arm)
-    return math.sqrt(dot(change, change)) / friction.radius
+    return math.sqrt(dot(change, change)) / min(friction.radius, tol.TURN_RADIUS_MM)
 
 
 @inlined

@@ -63,8 +63,8 @@ def test_only_what_long_and_short_steps_agree_on_is_certain() -> None:
         np.testing.assert_allclose(mine.joints_mm, short.joints_mm, atol=1e-4)
         assert not mine.uncertain
     assert turned(1.0, 1.0, finest_mm=1.0)[-1].uncertain
-    for size in (0.7, 0.8, 0.9, 1.1):
-        for mine, short in zip(turned(size, 10.0), turned(size, 10.0, step_mm=0.05), strict=True):
+    for segment in (0.7, 0.8, 0.9, 1.1):
+        for mine, short in zip(turned(segment, 10.0), turned(segment, 10.0, step_mm=0.05), strict=True):
             assert mine.uncertain or np.abs(mine.joints_mm - short.joints_mm).max() < 1e-4
 
 
