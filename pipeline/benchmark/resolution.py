@@ -17,7 +17,7 @@ from pipeline.benchmark.stress.axes import moderate
 from pipeline.benchmark.stress.plan import entry, lumen_grid
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
-from pipeline.simulate.resolution import FINEST_MM, lengths_mm, moved_mm, resolve
+from pipeline.simulate.resolution import AGREED_MM, FINEST_MM, lengths_mm, moved_mm, resolve
 from solver import GuideWire, Insertion, Solution, warm_up
 
 LARGEST_MM, COVERED = 0.03, 0.95
@@ -60,7 +60,7 @@ def _claims(name: str, found: list[tuple[Array, Array]]) -> Iterator[Claim]:
 
 
 def _measured(scene: BenchScene) -> tuple[Array, Array]:
-    """Depths (n, 4): distance from segments of FINEST_MM, mm, num_mm, 1 near a snap, 1 where these were taken.
+    """Depths (n, 4): distance from segments of FINEST_MM, mm, num_mm, 1 where uncertain, 1 where these were taken.
 
     There the distance is from segments of half of that. And the seconds of the last length, of the last two, of all.
     """
@@ -81,7 +81,8 @@ def _measured(scene: BenchScene) -> tuple[Array, Array]:
     spent = list(seconds.values())
     limit = insert(min(FINEST_MM, 0.5 * resolved.segment_mm))
     both = list(zip(resolved.wires, limit, strict=True))
-    off, near = [moved_mm(*pair) for pair in both], [a.uncertain or b.uncertain for a, b in both]
+    off = [moved_mm(*pair) for pair in both]
+    near = (resolved.num_mm > AGREED_MM) | [a.uncertain or b.uncertain for a, b in both]
     finest = np.full(len(both), resolved.segment_mm <= FINEST_MM)
     return np.transpose([off, resolved.num_mm, near, finest]), np.array([spent[-1], sum(spent[-2:]), sum(spent)])
 

@@ -65,7 +65,7 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
         wire = frame.simulated
         row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
         row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations, "num_mm": frame.num_mm}
-        row |= {"snaps": len(wire.snaps), "uncertain": wire.uncertain, "least_pivot": wire.least_pivot}
+        row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
     return row
 
 

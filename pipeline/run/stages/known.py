@@ -13,6 +13,7 @@ from pipeline.model import Array, Clamp, Curve, Lumen, Volume
 from pipeline.register import Registration
 from pipeline.run.log import Log, Stage
 from pipeline.run.store import Store, key_of
+from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
@@ -63,6 +64,11 @@ class Frame:
     def trusted_curve(self) -> Curve | None:
         """The traced curve of a frame that loading and tracing found nothing wrong with."""
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
+
+    @property
+    def uncertain(self) -> bool:
+        """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
+        return self.simulated is not None and (self.simulated.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
