@@ -13,8 +13,9 @@ import numpy as np
 
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
+from solver._kernels.insertion import next_place, set_out, settle, sum_up
 from solver._kernels.septum import through_wall
-from solver._kernels.start import lay_along
+from solver._kernels.start import extrapolate_start, lay_along
 from solver.doors import instance
 from solver.grid import Grid
 from solver.relax import Settings, relax
@@ -58,7 +59,9 @@ def warm_up(*, beside: bool = False) -> None:
 def compile_beside() -> None:
     """Compile what is kept on disk and can wait there for ``advance``, then what only a wall needs."""
     with no_collection():
-        _compile(closed_form.iterate, lay_along, contact_forces, push_force, through_wall)
+        # the long ones first: what is not there in time is compiled twice
+        _compile(through_wall, push_force, settle, closed_form.iterate, lay_along, set_out)
+        _compile(next_place, contact_forces, sum_up, extrapolate_start)
         _wall()
 
 
@@ -77,8 +80,11 @@ def _compile(*kernels: Any) -> None:
         "report": work.report[0],
         "force": work.force,
         "weight": np.zeros(3),
-        **dict.fromkeys(("slot", "k", "was"), 1),
-        **dict.fromkeys(("first", "ahead", "tolerance", "margin"), 1.0),
+        "handle": work.handle,
+        "reached": (0.0, 0.0, 0.0),
+        **dict.fromkeys(("slot", "k", "was", "outcome", "laid", "used"), 1),
+        **dict.fromkeys(("depth", "roll", "to_depth", "to_roll"), 1.0),
+        **dict.fromkeys(("first", "ahead", "tolerance", "margin", "share", "last"), 1.0),
     }
     for kernel in kernels:
         names = inspect.signature(kernel.py_func).parameters

@@ -60,6 +60,7 @@ kernel = _internal()
 owner = _internal(_nrt=True)
 # The same, kept on disk as well: another process can compile it meanwhile.
 cached = _internal(on_disk)
+cached_owner = _internal(on_disk, _nrt=True)
 # Called per joint or per point: inlined by LLVM, so that the tuples it takes never leave the registers.
 inlined = _internal(forceinline=True)
 # A part of one other kernel: merged into it before anything is compiled, or it would be compiled twice.

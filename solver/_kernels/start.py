@@ -95,7 +95,7 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
         x[j + 1, a] = x[j, a] + length * r[j + 1, a, 2]
 
 
-@kernel
+@cached
 def extrapolate_start(problem: Problem, slot: int, k: int, share: float, last: float) -> int:
     """Return the slot to start from: ``slot``, or the other one, with a share of the last change, if it is lower.
 
