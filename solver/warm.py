@@ -14,6 +14,7 @@ import numpy as np
 from solver._kernels import closed_form, newton_method
 from solver._kernels.forces import contact_forces, push_force
 from solver._kernels.insertion import next_place, set_out, settle, sum_up
+from solver._kernels.minimise import look_again
 from solver._kernels.septum import through_wall
 from solver._kernels.start import extrapolate_start, lay_along
 from solver.doors import instance
@@ -61,7 +62,7 @@ def compile_beside() -> None:
     with no_collection():
         # the long ones first: what is not there in time is compiled twice
         _compile(through_wall, push_force, settle, closed_form.iterate, lay_along, set_out)
-        _compile(next_place, contact_forces, sum_up, extrapolate_start)
+        _compile(next_place, contact_forces, sum_up, extrapolate_start, newton_method.rest_shape, look_again)
         _wall()
 
 

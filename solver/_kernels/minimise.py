@@ -10,7 +10,7 @@ from solver import _tolerances as tol
 from solver._kernels import closed_form, newton_method
 from solver._kernels.data import CONVERGED, FOLDED, FRICTION, MAX_ITERATIONS, NON_FINITE, UNFINISHED, Limits, Problem
 from solver._kernels.energy import energy_of, total_energy
-from solver._kernels.flags import kernel, merged
+from solver._kernels.flags import cached, kernel, merged
 from solver._kernels.forces import copy_state, forget_forces, least_turn_cosine
 from solver._kernels.friction import take_loads
 from solver._kernels.newton import costate
@@ -70,7 +70,7 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
     cost = k + problem.chain.first[k + 1]
     for _ in range(tol.FRICTION_ROUNDS):
         if rubs:
-            total_energy(problem, slot, 0, k)
+            look_again(problem, slot, k)
         allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // cost)
         own = Limits(limits.method, limits.tolerance, allowed, limits.work)
         outcome, used, result, energy = minimise(problem, slot, k, own, report)
@@ -82,6 +82,12 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
             break
         outcome = FRICTION
     return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, energy
+
+
+@cached
+def look_again(problem: Problem, slot: int, k: int) -> None:
+    """Look the wall up and take the energy with the loads that friction has now."""
+    total_energy(problem, slot, 0, k)
 
 
 @kernel

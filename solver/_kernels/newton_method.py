@@ -72,7 +72,7 @@ def watchdog(problem: Problem, k: int, now: Any, rise: float, report: Any) -> bo
     return False
 
 
-@merged
+@cached
 def rest_shape(problem: Problem, slot: int, k: int) -> bool:
     """Try the wire's own rest shape: where it touches nothing it is the answer, and nothing is iterated."""
     state, u = problem.state, problem.state.u[1 - slot]
