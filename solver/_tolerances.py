@@ -159,5 +159,7 @@ SOFT_TOLERANCE = 1e-4
 STIFF = 0.2
 """Pivot above which a wire that was about to give way comes back to calm: in a round vessel it stays free to turn about
 the axis, and lies on the side that rounding chose."""
+SNAP_WAYS = 2.0
+"""A joint that moves by less than this over the way of the hand in a step is pushed, and does not snap."""
 CALM_MM = 2.5
 """Way after a snap on which a wire may still lie otherwise than after shorter steps."""

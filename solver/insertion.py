@@ -117,6 +117,7 @@ class Insertion:
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base.     catheter_mm : the
         catheter's tip beyond the entry, no deeper than the wire's; each one for all or one per depth. From depth to
         depth wire, roll and catheter go on in proportion; push_force_N is the wire's hand's, with the catheter held.
+        Each call says both anew: left out, the base is turned and the catheter pulled back to 0.
         A depth that cannot be reached yields the last good state with its own depth and a status.
         The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
         and a call while another thread is at work, is a RuntimeError.

@@ -129,6 +129,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "wire": case.wire,
         "wall": case.wall,
         "entry": clamp,
+        **{name: value for name in ("down", "catheter") if (value := getattr(case, name)) is not None},
         "geometry": _geometry(known.scans),
         "inputs": _inputs(known.scans),
         "counters": log.counters,

@@ -62,25 +62,27 @@ def lengths_mm(asked: Segment, rest_curvature_per_mm: ArrayLike) -> list[float]:
 def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
     """Insert with shorter and shorter segments until halving them changes no wire that is not about to snap.
 
-    A length that loses depths which a longer one reached is not taken.
+    A length that loses depths which a longer one reached is not taken; a shorter one may reach them again.
     """
     # the first length is there to be compared with: where it snaps aside, the next pair of lengths is needed, too
     segment, wires, num = lengths[0], insert(lengths[0], len(lengths) == 1), np.full(0, np.nan)
-    reason = "no coarser segments can follow the wire's rest curvature: no estimate of their error"
+    reason, before = "no coarser segments can follow the wire's rest curvature: no estimate of their error", wires
     for shorter in lengths[1:]:
         finer = insert(shorter, True)
-        moved = np.array([moved_mm(a, b) for a, b in zip(wires, finer, strict=True)])
+        moved = np.array([moved_mm(a, b) for a, b in zip(before, finer, strict=True)])
+        before = finer
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
-            reason = f"with {shorter:g} mm fewer depths are reached"
-            wires = insert(segment, True) if segment == lengths[0] else wires
-            break
+            reason = "with shorter ones fewer depths are reached"
+            continue
         # a wire that is about to snap goes one way or the other by a trifle, with segments of any length
         away = ~(moved <= AGREED_MM) & [not wire.uncertain for wire in finer]
         segment, wires, num = shorter, finer, moved
         if not away.any():
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"
             break
-        reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on it"
+        reason = f"at {int(away.sum())} of {len(num)} depths the wire still depends on their length"
+    if segment == lengths[0] and len(lengths) > 1:
+        wires = insert(segment, True)
     return Resolved(segment, wires, num if num.size else np.full(len(wires), np.nan), reason)
 
 

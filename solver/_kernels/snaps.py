@@ -101,13 +101,16 @@ def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
 def note_snap(problem: Problem, at: Any, k: int, was: int, reached: tuple[float, float]) -> None:
     """Write down that a wire of ``was`` segments snapped on its way to k segments.
 
-    reached : the depth, mm, and the energy released, N mm. Where there are too many the last place is taken again.
+    reached : the depth, mm, and the energy released, N mm. Where there are too many the last place is taken again. A
+    wire that went no further than its base was pushed did not snap: that is what the trapezium rule leaves of its work.
     """
     snaps, x = problem.scratch.snaps, problem.state.x
-    snap = snaps[min(at.snaps, snaps.size - 1)]
-    at.snaps = min(at.snaps + 1, snaps.size)
     common = min(k, was)
     at.seen_calm = 0.0
-    snap.from_mm, snap.to_mm, snap.released_N_mm = at.inserted, reached[0], reached[1]
     # joints are counted from the tip: there they stay with the material
-    snap.moved_mm = farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)
+    moved = farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)
+    if moved < tol.SNAP_WAYS * abs(reached[0] - at.inserted):
+        return
+    snap = snaps[min(at.snaps, snaps.size - 1)]
+    at.snaps = min(at.snaps + 1, snaps.size)
+    snap.from_mm, snap.to_mm, snap.released_N_mm, snap.moved_mm = at.inserted, reached[0], reached[1], moved

@@ -98,3 +98,13 @@ def test_a_turn_is_the_angle_between_two_segments() -> None:
     rest = GuideWire(0.5, 0.18, 10.0, 0.2)
     (solution,) = Insertion(rest, None, (0, 0, 0), (0, 0, 1)).to_depths([10.0])
     assert solution.largest_turn_deg == pytest.approx(np.degrees(0.2 * 0.5), abs=1e-9)
+
+
+def test_depths_that_one_length_loses_may_be_reached_by_the_next() -> None:
+    def one(segment_mm: float, _: bool) -> Sequence[Solution]:
+        wires = insert(bend(20.0), segment_mm)
+        return wires if segment_mm != 0.5 else [*wires[:-1], replace(wires[-1], status=Status.FOLDED)]
+
+    found = resolve(one, lengths_mm("auto", 0.0))
+    assert found.segment_mm < 0.5
+    assert all(wire.converged for wire in found.wires)

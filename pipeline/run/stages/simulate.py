@@ -17,6 +17,8 @@ from solver.self_contact import self_overlap_mm
 
 MOST_OVERLAP_RADII = 0.1
 """Of the wire with itself that still counts as a touch: less than a scan can show."""
+NEARLY_MM = 1.0
+"""How much deeper than the traced wire a catheter may be stated without a warning."""
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
@@ -26,6 +28,8 @@ def simulate_frames(run: Context, known: Known) -> Known:
     clamp = _clamp(run, known.frames)
     frames = [_with_depth(frame, config.simulate.depth) for frame in known.frames]
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
+    if case.catheter is not None:
+        log.warnings += [_cut_short(f) for f in replay if f.catheter_mm > f.depth_mm + NEARLY_MM]
 
     def insert(segment_mm: float, refined: bool) -> list[Solution]:
         """The wire of every frame with segments of one length."""
@@ -57,7 +61,7 @@ def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
     if turn > LARGEST_JOINT_TURN_DEG:
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
     if overlap > MOST_OVERLAP_RADII * radius_mm:
-        return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"it lies {overlap:.2f} mm deep in itself")
+        return frame.failed("simulate", FrameStatus.SELF_CONTACT, f"the wire lies {overlap:.2f} mm deep in itself")
     return frame
 
 
@@ -72,6 +76,14 @@ def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: 
         log.progress("simulate", frame.index + 1, total, f"{wire.status.identifier} {wire.depth_mm:.1f} mm")
         yield wire
         clock = perf_counter()
+
+
+def _cut_short(frame: Frame) -> str:
+    """A catheter that is said to lie beyond the wire's tip."""
+    return (
+        f"frame {frame.index}: the catheter's tip is stated at {frame.catheter_mm:.1f} mm, the wire's lies at "
+        f"{frame.depth_mm:.1f} mm: simulated as if both ended there; check insertion_mm of the catheter"
+    )
 
 
 def _told(frame: int, snap: Snap) -> str:
