@@ -331,11 +331,12 @@ def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> 
 def test_a_wire_that_cannot_enter_is_a_failed_frame(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No point of it is there to be compared with; the case must not end as crashed."""
+    """No point of it is there to be compared with or drawn; the case must not end as crashed."""
     clamp = simulate._clamp
     monkeypatch.setattr(simulate, "_clamp", lambda run, frames: aside(clamp(run, frames)))
-    assert run(study, tmp_path, "--until", "compare") == 1
+    assert run(study, tmp_path) == 1
     assert set(errors_of(tmp_path)["status"]) == {"entry_outside"}
+    assert (tmp_path / "cases" / "bifurcation" / "report.html").exists()
 
 
 def aside(clamp: Clamp) -> Clamp:
