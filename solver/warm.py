@@ -77,6 +77,7 @@ def _compile(*kernels: Any) -> None:
         "table": work.table,
         "introducer": work.introducer,
         "limits": work.limits,
+        "at": work.place[0],
         "now": work.problem.scratch.descent[0],
         "report": work.report[0],
         "force": work.force,

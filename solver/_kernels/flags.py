@@ -1,4 +1,4 @@
-"""How compiled functions are compiled: six decorators.
+"""How compiled functions are compiled: seven decorators.
 
 Machine code that Python can call is made for entry points alone. Unpacking a kernel's forty arrays is code too: made
 for every kernel, it would take as long again as compiling the kernels themselves.
@@ -51,16 +51,16 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
 # Called from Python; kept on disk.
 entry_point = on_disk(**FAST)
-# The same for what takes long: other threads of Python run meanwhile.
+# The same for what takes long: other threads of Python run meanwhile. The latter counts no arrays: it makes none.
 released = on_disk(nogil=True, **FAST)
+uncounted = on_disk(nogil=True, _nrt=False, **FAST)
 # Called by other kernels. Arrays are borrowed, not counted: who calls the entry point keeps them. A count is a call in
 # the middle of a recursion, around which all that is in registers goes through memory.
 kernel = _internal()
-# The same for what makes arrays or reads a handle, which takes the counting runtime.
+# The same for what makes arrays, which takes the counting runtime.
 owner = _internal(_nrt=True)
 # The same, kept on disk as well: another process can compile it meanwhile.
 cached = _internal(on_disk)
-cached_owner = _internal(on_disk, _nrt=True)
 # Called per joint or per point: inlined by LLVM, so that the tuples it takes never leave the registers.
 inlined = _internal(forceinline=True)
 # A part of one other kernel: merged into it before anything is compiled, or it would be compiled twice.

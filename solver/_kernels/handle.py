@@ -2,11 +2,15 @@
 
 from typing import Any, NamedTuple
 
-from numba import types
+from numba import extending, types
+from numba.core import cgutils
 from numba.experimental import structref
 
 from solver._kernels.bare import bare
 from solver._kernels.flags import entry_point
+
+extend: Any = extending
+build: Any = cgutils
 
 
 class Contents(NamedTuple):
@@ -28,6 +32,28 @@ class Contents(NamedTuple):
 @structref.register
 class HandleType(types.StructRef):
     """Numba's type of a handle."""
+
+
+def reader(name: str) -> Any:
+    """What makes the instructions that read a field, without counting who holds the arrays in it: they are bare.
+
+    Numba's own count each: for forty arrays that is more code than the solver has, and takes as long to compile.
+    """
+
+    def read(context: Any, builder: Any, kind: Any, handle: Any) -> Any:
+        counted = build.create_struct_proxy(kind)(context, builder, value=handle).meminfo
+        # numba's record of what it counts: the count, the destructor, its argument, the data
+        record = builder.bitcast(counted, counted.type.as_pointer())
+        contents = kind.get_data_type()
+        stored = context.data_model_manager[contents].get_value_type().as_pointer()
+        data = builder.bitcast(builder.load(builder.gep(record, [build.int32_t(3)])), stored)
+        return getattr(build.create_struct_proxy(contents)(context, builder, ref=data), name)
+
+    return read
+
+
+for field in Contents._fields:
+    extend.lower_getattr(HandleType, field)(reader(field))
 
 
 class Handle(structref.StructRefProxy):

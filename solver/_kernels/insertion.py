@@ -12,7 +12,7 @@ from solver._kernels.algebra import load3
 from solver._kernels.chain import lay_out, segments_at, weigh
 from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
-from solver._kernels.flags import cached_owner, inlined, merged, released
+from solver._kernels.flags import cached, inlined, merged, uncounted
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
 from solver._kernels.friction import anchor_friction, settle_friction
 from solver._kernels.minimise import relax_with_friction
@@ -23,7 +23,7 @@ from solver._kernels.snaps import account
 from solver._kernels.start import extrapolate_start, lay_along, note_change, put_load
 
 
-@released
+@uncounted
 def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, int, int]:
     """Step to a depth (mm) and roll (degrees); return the outcome, the iterations and the number of segments.
 
@@ -34,7 +34,7 @@ def advance(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[in
     return outcome, iterations, sum_up(handle, laid)
 
 
-@cached_owner
+@cached
 def sum_up(handle: Any, laid: int) -> int:
     """Fill force and report of the wire reached; return its number of segments."""
     k, _ = segments_at(handle.place[0].inserted, handle.table.segment)
@@ -121,14 +121,14 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     outcome, used, energy = data.CONVERGED, 0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
-        start = extrapolate_start(problem, data.CURRENT, k, likeness(problem, at, depth, roll), at.energy - at.stored)
+        start = extrapolate_start(problem, at, k, likeness(problem, at, depth, roll))
         outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
     return settle(handle, (depth, roll, energy), k, outcome, laid, used), used
 
 
-@cached_owner
+@cached
 def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int) -> int:
     """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
 
@@ -166,7 +166,7 @@ def where(problem: Problem, margin: float, k: int, laid: int) -> int:
     return data.THROUGH_WALL if through_wall(field, x, k, margin) else data.CONVERGED
 
 
-@cached_owner
+@cached
 def next_place(handle: Any, to_depth: float, to_roll: float) -> tuple[float, float]:
     """Depth, mm, and roll, degrees, that the next step leads to; a catheter goes on in proportion."""
     at, goal = handle.place[0], handle.place[0].goal
@@ -212,7 +212,7 @@ def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
     return share if 0.0 < share <= tol.MOST_FORESEEN else 0.0
 
 
-@cached_owner
+@cached
 def set_out(handle: Any, depth: float, roll: float) -> int:
     """Keep the last good state and lay the wire out at a new depth and roll; return its number of segments."""
     problem, table, introducer = handle.problem, handle.table, handle.introducer

@@ -130,7 +130,7 @@ def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
 def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) -> bool:
     """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
     at, k, limits, counters = wire.place[0], me.k, wire.limits, problem.scratch.counters[0]
-    start = extrapolate_start(problem, CURRENT, k, likeness(problem, at, me.depth, me.roll), at.energy)
+    start = extrapolate_start(problem, at, k, likeness(problem, at, me.depth, me.roll))
     counters.relaxations_without_friction += 1
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))

@@ -96,28 +96,42 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
 
 
 @cached
-def extrapolate_start(problem: Problem, slot: int, k: int, share: float, last: float) -> int:
-    """Return the slot to start from: ``slot``, or the other one, with a share of the last change, if it is lower.
+def extrapolate_start(problem: Problem, at: Any, k: int, share: float) -> int:
+    """Return the slot to start from: CURRENT, or TRIAL with a share of the last change where that is clearly lower.
 
     Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
-    last : energy of the wire before the step, N mm; what ``slot`` has more must at least be halved.
+    at : the record ``records.PLACE``. Held against each other is what they lie above the energy that the hand's push
+    leads to; where the change leaves a small part of what the slid start had when it was last asked, it is not asked.
     """
     state, scratch = problem.state, problem.scratch
-    u, tried = state.u[slot], state.u[1 - slot]
+    u, tried = state.u[CURRENT], state.u[TRIAL]
+    goal = at.energy - at.stored + at.push * share * at.last_step
     for j in range(k):
         for a in range(3):
             scratch.start[j, a] = u[j, a]
             tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
-    energy = total_energy(problem, slot, 0, k)
-    if share == 0.0 or state.energies[slot].wall == 0.0:
-        return slot
-    copy_base(state, slot, 1 - slot)
-    place(problem.chain, state, 1 - slot, k)
-    better = total_energy(problem, 1 - slot, 0, k) - last < tol.WORTH_FORESEEING * (energy - last)
-    if better and not crossed(problem, slot, k):
-        scratch.counters[0].starts_foreseen += 1
-        return 1 - slot
-    return slot
+    asked = share != 0.0 and at.rise > 0.0
+    rise = foresee(problem, k) - goal if asked else math.inf
+    if not (rise < tol.SURELY_FORESEEN * at.rise and not crossed(problem, CURRENT, k)):
+        at.rise = total_energy(problem, CURRENT, 0, k) - goal
+        if share == 0.0 or state.energies[CURRENT].wall == 0.0:
+            at.rise = 0.0
+            return CURRENT
+        rise = rise if asked else foresee(problem, k) - goal
+        if not (rise < tol.WORTH_FORESEEING * at.rise and not crossed(problem, CURRENT, k)):
+            return CURRENT
+    else:
+        at.rise *= tol.STILL_RISES
+    scratch.counters[0].starts_foreseen += 1
+    return TRIAL
+
+
+@kernel
+def foresee(problem: Problem, k: int) -> float:
+    """Lay the TRIAL state out from its controls; return its energy, N mm."""
+    copy_base(problem.state, CURRENT, TRIAL)
+    place(problem.chain, problem.state, TRIAL, k)
+    return total_energy(problem, TRIAL, 0, k)
 
 
 @merged
