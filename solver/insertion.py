@@ -17,6 +17,7 @@ from solver import _tolerances as tol
 from solver.catheter import Catheter
 from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
+from solver.long_way import Goal, advance, check_way, nearby
 from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
@@ -89,6 +90,7 @@ class Insertion:
         self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
+        self._near = nearby(*steps[:2], wire.segment_mm)
         self._refused = None if wall is None else _refused(wall, entry)
 
     @property
@@ -139,7 +141,18 @@ class Insertion:
             if tip > depth:
                 advice = "a wire whose tip lies inside the catheter is not modelled: push it out or pull the tube back"
                 refuse("insertion", "catheter_mm", tip, f"{depth:g}, the wire's depth, or less", advice)
+        if depths and not (self._near[0] > max(depths) and self._near[1] > max(max(rolls), -min(rolls))):
+            self._look_ahead(depths, rolls, tips)
         return depths, rolls, tips
+
+    def _look_ahead(self, depths: list[float], rolls: list[float], tips: list[float]) -> None:
+        """Refuse ways that would take for ever; from now on those that are long can be interrupted."""
+        here = Goal(self.depth_mm, self.roll_deg if self._started else rolls[0], self.catheter_mm)
+        for goal in map(Goal, depths, rolls, tips):
+            if self._reaches(goal.depth):
+                check_way(self._work, here, goal)
+                here = goal
+        self._near = 0.0, 0.0
 
     def _each(self, depths: list[float], rolls: list[float], tips: list[float]) -> Iterator[Solution]:
         """Go to each depth, for as long as no later call has begun."""
@@ -206,8 +219,13 @@ class Insertion:
         elif self._refused is not None:
             status, iterations = self._refused, 0
         else:
-            status, iterations = work.advance(depth, roll)
+            status, iterations = work.advance(depth, roll) if self._near[0] else self._advance_far(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+    def _advance_far(self, depth: float, roll: float) -> tuple[Status, int]:
+        """Go to a depth and roll that may be far from here."""
+        here = Goal(self.depth_mm, self.roll_deg, self.catheter_mm)
+        return advance(self._work, here, Goal(depth, roll, float(self._work.place["goal"][0])))
 
 
 def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:
