@@ -90,8 +90,7 @@ class Insertion:
         self._started, self._way, self._lock = False, object(), threading.Lock()
         # the depth at which ``segments_at`` counts one joint too many
         self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
-        self._near = nearby(*steps[:2], wire.segment_mm)
-        self._refused = None if wall is None else _refused(wall, entry)
+        self._near, self._refused = nearby(*steps[:2], wire.segment_mm), None if wall is None else _refused(wall, entry)
 
     @property
     def depth_mm(self) -> float:
@@ -107,6 +106,11 @@ class Insertion:
     def catheter_mm(self) -> float:
         """Where the tip of the catheter is, mm beyond the entry."""
         return float(self._work.place["catheter"][0])
+
+    def __repr__(self) -> str:
+        """Where it is."""
+        stiffness = "no wall" if self.wall is None else f"wall of {self.wall.stiffness_N_mm2:g} N/mm2"
+        return f"Insertion(at {self.depth_mm:g} mm, roll {self.roll_deg:g} degrees, {stiffness}, {self.wire!r})"
 
     def to_depths(
         self,
