@@ -80,7 +80,7 @@ class Insertion:
         steps = _steps(step_mm, roll_step_deg, finest_mm)
         shaft = number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
         drag = number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
-        self.wire, self.wall = wire, wall
+        self.wire, self.wall, self._near = wire, wall, nearby(*steps[:2], wire.segment_mm)
         self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
@@ -88,9 +88,8 @@ class Insertion:
         weight = weight_of("insertion", wire, down)
         self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
-        # the depth at which ``segments_at`` counts one joint too many
-        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
-        self._near, self._refused = nearby(*steps[:2], wire.segment_mm), None if wall is None else _refused(wall, entry)
+        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm  # there ``segments_at`` counts one joint too many
+        self._refused = None if wall is None else _refused(wall, entry)
 
     @property
     def depth_mm(self) -> float:

@@ -105,9 +105,8 @@ class Solution:
     ) -> Self:
         """A solution from joints, frames and forces, and what the kernels noted.
 
-        notes : the contents of ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of
-        ``records.SNAP``, the first of which count.
-        ended : status, iterations, depth, mm, roll, degrees, and the radius, mm.
+        notes : ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of ``records.SNAP``, the
+        first of which count.     ended : status, iterations, depth, mm, roll, degrees, and the wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
         _, _, energy, *_, dissipated, calm, rubbed, _, _, _, _, stored, snapped = place
