@@ -82,7 +82,7 @@ def resampled(grid: Grid, times: int, order: int) -> Grid:
 
 def wall_with(gap: float, voxel: float, change: Callable[[Grid], Grid], stiffness: float = 1.0) -> VesselWall:
     distance = both(HERE, beside(gap))
-    return VesselWall(change(sampled(distance, voxel, (-4, -4, -3), (8, 4, 16), "float64")), stiffness)
+    return VesselWall(change(sampled(distance, voxel, (-3, -3, -2), (6, 3, 16), "float64")), stiffness)
 
 
 @pytest.mark.parametrize(("voxel", "sigma"), [(0.1, 0.2), (0.1, 0.3), (0.1, 0.5), (0.15, 0.3), (0.3, 0.3), (0.3, 0.45)])
