@@ -60,6 +60,7 @@ def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
     return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
+PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
 
 
@@ -91,7 +92,7 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "sections": sections,
         "frames": frames if len(errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
-        "physics": list(flatten({k: result.get(k, {}) for k in ("wire", "wall", "entry", "geometry")})),
+        "physics": list(flatten({key: result.get(key, {}) for key in PHYSICS})),
         "config": settings(result.get("config", {})),
         "provenance": list(flatten(result.get("provenance", {}))),
         "files": _files(case_dir),

@@ -92,6 +92,11 @@ sweeps of 50 joints with one look-up each (the closed form needs up to 75,000 fo
 Newton's iterations at 2000 joints. A hopeless depth so ends after two or three seconds."""
 WORK_PER_ITERATION = 2_500
 """The same, for each of max_iterations on top: raising max_iterations must help."""
+LONGEST_WAY = 1e8
+"""Joints that the steps to one depth may lay out, all together: a wire that touches nothing takes half a minute, and
+400 mm of 0.25 mm segments in steps of 0.01 mm are 6e7."""
+LONG_WAY = 2e5
+"""The same from which a thread, which costs 0.1 ms, makes the way one that Ctrl-C ends: a tenth of a second."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
 UNMOVED = 1e-4
@@ -117,6 +122,12 @@ CREASE_BLOCK = 4
 CREASE = 0.3
 """Fall of the distance's slope from one voxel to the next that counts as a crease: at a ridge between parallel walls it
 falls by 2, of which at least 0.58 is seen along an axis at one voxel; round an obstacle of r voxels it falls by 1/r."""
+CREASE_REACH_MM = 0.8
+"""Longest way over which the slope may fall so: a Gaussian of 0.4 mm spreads it over that; the next vessel's own axis,
+where the slope rises again, is not much further from the ridge of a thin septum."""
+CREASE_SLOPE = 0.7
+"""Slope, by differences over the same way, beyond which there is no crease: on the ridge it is 0 between parallel
+vessels and the sine of half their angle in a fork; round the inner wall of a bend it is 1."""
 FOOT_STEPS = 64
 """Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
 FOOT_MM = 1e-9

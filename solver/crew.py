@@ -68,7 +68,7 @@ class Crew:
             # a free lane waits for the others: a wire at another depth would make all of them sweep its length
             advance_together(tuple(self.wires), self.plan, self.notes, self.block, self.first)
             for lane, job in enumerate(jobs):
-                job.found.extend(_solutions(self.plan, lane))
+                job.found.extend(_solutions(self.plan, lane, job.insertion.wire.radius_mm))
 
     def _start(self, lane: int, job: Job) -> None:
         """Put a wire into a lane."""
@@ -102,7 +102,7 @@ def _plan(most: int, rows: int) -> Plan:
     return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, snaps, blank)
 
 
-def _solutions(plan: Plan, lane: int) -> list[Solution]:
+def _solutions(plan: Plan, lane: int, radius_mm: float) -> list[Solution]:
     """What a lane found at its depths."""
     names = "place", "report", "energies", "counters", "ended", "row"
     noted = zip(*(getattr(plan, name)[lane, : plan.count[lane]].tolist() for name in names), strict=True)
@@ -111,6 +111,6 @@ def _solutions(plan: Plan, lane: int) -> list[Solution]:
         # copies: the next wire of this lane comes to lie there
         arrays = [a[lane, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
         depth, roll, *_ = notes[0]
-        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll
+        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, radius_mm
         found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[lane, n], ended))
     return found

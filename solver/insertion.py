@@ -17,6 +17,7 @@ from solver import _tolerances as tol
 from solver.catheter import Catheter
 from solver.doors import ANGLE_DEG, FORCE_N, LENGTH_MM, Array, Range, choice, number, numbers, unit, vector, whole
 from solver.errors import refuse
+from solver.long_way import Goal, advance, check_way, nearby
 from solver.relax import Settings, base_frame, check_scene, weight_of
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
@@ -79,7 +80,7 @@ class Insertion:
         steps = _steps(step_mm, roll_step_deg, finest_mm)
         shaft = number("insertion", "shaft_mm", shaft_mm, SHAFT_MM)
         drag = number("insertion", "shaft_friction_N", shaft_friction_N, SHAFT_N)
-        self.wire, self.wall = wire, wall
+        self.wire, self.wall, self._near = wire, wall, nearby(*steps[:2], wire.segment_mm)
         self.max_joints = most = whole("insertion", "max_joints", max_joints, tol.MOST_JOINTS)
         frame = base_frame(unit("insertion", "entry_direction", entry_direction), material_axis, 0.0)
         entry, load = vector("insertion", "entry_mm", entry_mm), vector("insertion", "tip_load_N", tip_load_N, FORCE_N)
@@ -87,8 +88,7 @@ class Insertion:
         weight = weight_of("insertion", wire, down)
         self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
-        # the depth at which ``segments_at`` counts one joint too many
-        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm
+        self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm  # there ``segments_at`` counts one joint too many
         self._refused = None if wall is None else _refused(wall, entry)
 
     @property
@@ -105,6 +105,11 @@ class Insertion:
     def catheter_mm(self) -> float:
         """Where the tip of the catheter is, mm beyond the entry."""
         return float(self._work.place["catheter"][0])
+
+    def __repr__(self) -> str:
+        """Where it is."""
+        stiffness = "no wall" if self.wall is None else f"wall of {self.wall.stiffness_N_mm2:g} N/mm2"
+        return f"Insertion(at {self.depth_mm:g} mm, roll {self.roll_deg:g} degrees, {stiffness}, {self.wire!r})"
 
     def to_depths(
         self,
@@ -139,7 +144,18 @@ class Insertion:
             if tip > depth:
                 advice = "a wire whose tip lies inside the catheter is not modelled: push it out or pull the tube back"
                 refuse("insertion", "catheter_mm", tip, f"{depth:g}, the wire's depth, or less", advice)
+        if depths and not (self._near[0] > max(depths) and self._near[1] > max(max(rolls), -min(rolls))):
+            self._look_ahead(depths, rolls, tips)
         return depths, rolls, tips
+
+    def _look_ahead(self, depths: list[float], rolls: list[float], tips: list[float]) -> None:
+        """Refuse ways that would take for ever; from now on those that are long can be interrupted."""
+        here = Goal(self.depth_mm, self.roll_deg if self._started else rolls[0], self.catheter_mm)
+        for goal in map(Goal, depths, rolls, tips):
+            if self._reaches(goal.depth):
+                check_way(self._work, here, goal)
+                here = goal
+        self._near = 0.0, 0.0
 
     def _each(self, depths: list[float], rolls: list[float], tips: list[float]) -> Iterator[Solution]:
         """Go to each depth, for as long as no later call has begun."""
@@ -206,8 +222,13 @@ class Insertion:
         elif self._refused is not None:
             status, iterations = self._refused, 0
         else:
-            status, iterations = work.advance(depth, roll)
+            status, iterations = work.advance(depth, roll) if self._near[0] else self._advance_far(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
+
+    def _advance_far(self, depth: float, roll: float) -> tuple[Status, int]:
+        """Go to a depth and roll that may be far from here."""
+        here = Goal(self.depth_mm, self.roll_deg, self.catheter_mm)
+        return advance(self._work, here, Goal(depth, roll, float(self._work.place["goal"][0])))
 
 
 def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from solver import _tolerances as tol
 from solver._kernels.records import WORK
 from solver.grid import Array
+from solver.self_contact import self_overlap_mm
 
 
 class Status(Enum):
@@ -64,12 +66,14 @@ class Solution:
     push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
     counts : in the order of ``_kernels.records.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
-    least_pivot : distance to instability, see ``_kernels.records.REPORT``: 1 for a free wire, 0 where it snaps.
+    least_pivot : distance to instability: the least, over the joints, of the stiffness that is left where all beyond
+    are free to follow, over the joint's own. 1 for a free wire, 0 where it snaps; below 0.5 it is soft, below 0.05 it
+    nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1.
     dissipated_N_mm : the hand's work on the way to this depth less the change of energy, by the trapezium rule over
     each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) off by half the jump times
     the step, and negative then.     snaps : events on that way.
     uncertain : the wire snapped, was about to, or lay elsewhere after long steps than after short ones, here or a few
-    mm before (as long as it stays soft): shorter steps may lead elsewhere.
+    mm before (as long as it stays soft): shorter steps may lead elsewhere.     radius_mm : the wire's.
     """
 
     joints_mm: Array
@@ -93,15 +97,16 @@ class Solution:
     dissipated_N_mm: float = 0.0
     snaps: tuple[Snap, ...] = ()
     uncertain: bool = False
+    radius_mm: float = 0.0
 
     @classmethod
     def assembled(
-        cls, arrays: list[Array], notes: tuple[Any, ...], snaps: Any, ended: tuple[Status, int, float, float]
+        cls, arrays: list[Array], notes: tuple[Any, ...], snaps: Any, ended: tuple[Status, int, float, float, float]
     ) -> Self:
         """A solution from joints, frames and forces, and what the kernels noted.
 
-        notes : the contents of ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of
-        ``records.SNAP``, the first of which count.     ended : status, iterations, depth, mm, and roll, degrees.
+        notes : ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of ``records.SNAP``, the
+        first of which count.     ended : status, iterations, depth, mm, roll, degrees, and the wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
         _, _, energy, *_, dissipated, calm, rubbed, _, _, _, _, stored, snapped = place
@@ -132,6 +137,7 @@ class Solution:
             dissipated_N_mm=dissipated,
             snaps=tuple(Snap(*snaps.item(n)) for n in range(snapped)) if snapped else (),
             uncertain=calm < tol.CALM_MM,
+            radius_mm=ended[4],
         )
         return solution
 
@@ -154,6 +160,17 @@ class Solution:
         sine = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
         turns = np.degrees(np.arctan2(sine, np.sum(along[:-1] * along[1:], axis=1)))
         return float(turns.max(initial=0.0))
+
+    @cached_property
+    def self_overlap_mm(self) -> float:
+        """How deep the wire lies in itself, mm: its parts do not feel each other. Computed when it is asked for."""
+        return self_overlap_mm(self.joints_mm, self.radius_mm)
+
+    def __repr__(self) -> str:
+        """What one wants to know first."""
+        name, tip = self.status.identifier, ", ".join(f"{x:.2f}" for x in self.joints_mm[-1])
+        doubt = ", uncertain" if self.uncertain else ""
+        return f"Solution({name} at {self.depth_mm:g} mm{doubt}, tip [{tip}] mm, push {self.push_force_N:.3g} N)"
 
     @property
     def converged(self) -> bool:

@@ -3,26 +3,42 @@
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from solver import _tolerances as tol
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
+from solver.creases import creases
 from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
 from solver.grid import Grid
+
+MAKE_A_DISTANCE = (
+    "a mask of the lumen is made one by scipy.ndimage: "
+    "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm)"
+)
+
+
+def _is_mask(values: Array, least: float, largest: float) -> bool:
+    """Whether values are those of a mask, whatever its two numbers are, or of the signs of a distance: one, two, three.
+
+    A lumen thinner than a voxel may have no negative value, and one that fills a few voxels but one: a distance has
+    more values than that where there are four voxels along each axis, or is one value everywhere.
+    """
+    if least == largest:
+        return least in (0.0, 1.0)
+    if least == 0.0 and largest == 1.0 and bool(np.all((values == 0.0) | (values == 1.0))):
+        return True
+    few = np.unique(values[::3, ::3, ::3])
+    return min(values.shape) > 3 and few.size <= 3 and np.unique(values).size <= 3
 
 
 def _checked(grid: Grid) -> Array:
     """The distances as float64, or a refusal of what no distance can be."""
     if grid.values.dtype.kind != "f":
         found, allowed = Found(f"values of type {grid.values.dtype}"), "floating-point signed distances in mm"
-        refuse(
-            "wall", "distance", found, allowed, "a mask has to be made a distance: negative inside, positive outside"
-        )
+        refuse("wall", "distance", found, allowed, MAKE_A_DISTANCE)
     values = np.array(grid.values, dtype=np.float64, order="C")
     if min(values.shape) < 2:
         refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
@@ -32,29 +48,11 @@ def _checked(grid: Grid) -> Array:
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
     least, largest = float(values.min()), float(values.max())
-    # a lumen thinner than a voxel may have no negative value; a mask has but two
-    mask = least >= 0.0 and largest <= 1.0 and bool(np.all((values == 0.0) | (values == 1.0)))
-    if mask or max(-least, largest) > FAR_MM:
-        got, allowed = Found(f"values from {least:g} to {largest:g}"), "signed distances in mm, negative inside"
-        refuse("wall", "grid values", got, allowed, "make a mask a distance")
+    if max(-least, largest) > FAR_MM or _is_mask(values, least, largest):
+        few = "no more than three " if max(-least, largest) <= FAR_MM else ""
+        got = Found(f"{few}values from {least:g} to {largest:g}")
+        refuse("wall", "grid values", got, "signed distances in mm, negative inside", MAKE_A_DISTANCE)
     return values
-
-
-def creases(values: Array, spacing_mm: Array) -> NDArray[np.uint8]:
-    """Blocks of the grid, ``tol.CREASE_BLOCK`` voxels wide, within two voxels of a crease.
-
-    There, as between two vessels, the distance stops to rise and falls again; elsewhere no wire can change lumens.
-    """
-    found = [np.zeros((0, 3), dtype=np.int64)]
-    for axis, spacing in enumerate(spacing_mm):
-        if values.shape[axis] > 2:
-            found.append(np.argwhere(np.diff(values, 2, axis) < -tol.CREASE * spacing) + np.eye(3, dtype=int)[axis])
-    where = np.concatenate(found)
-    marks = np.zeros([-(-n // tol.CREASE_BLOCK) for n in values.shape], dtype=np.uint8)
-    for corner in product((-2, 2), repeat=3):
-        block = np.clip(where + corner, 0, np.array(values.shape) - 1) // tol.CREASE_BLOCK
-        marks[tuple(block.T)] = 1
-    return marks
 
 
 @dataclass(frozen=True, eq=False)

@@ -244,7 +244,8 @@ class Workspace:
         n, state = self.k + 1, self.problem.state
         arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n])]
         notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
-        solution = Solution.assembled(arrays, notes, self.snaps, (status, iterations, depth_mm, roll_deg))
+        ended = status, iterations, depth_mm, roll_deg, self.wire.radius_mm
+        solution = Solution.assembled(arrays, notes, self.snaps, ended)
         if self.shaft.drag:
             sliding, turning = shaft_forces(self.shaft)
             push, torque = solution.push_force_N + sliding, solution.reaction_torque_N_mm + turning

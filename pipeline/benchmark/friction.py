@@ -11,6 +11,7 @@ from pipeline.benchmark import scenes
 from pipeline.benchmark.claims import Claim
 from pipeline.benchmark.scenes import RADIUS_MM, BenchScene
 from pipeline.benchmark.vessels import BEND_LUMEN_MM, BEND_TURN_MM, lumen_distance
+from pipeline.benchmark.whip import whip
 from pipeline.model import Array
 from solver import GuideWire, Insertion, Solution
 
@@ -26,6 +27,7 @@ def friction() -> Iterator[Claim]:
     yield from work_and_loss()
     yield capstan()
     yield torque()
+    yield whip()
 
 
 def _inserted(scene: BenchScene, depths: Array, step_mm: float = 1.0, **more: object) -> list[Solution]:

@@ -24,6 +24,11 @@ def sheath_distance(points: Array, bore_mm: float) -> Array:
     return np.asarray(np.where(z < MOUTH_MM, tube, bend_distance(points)))
 
 
+def bent_tube(points: Array) -> Array:
+    """The bend without its inlet, and with a lumen of 0.5 mm."""
+    return _axis_distance(points, 0.0, BEND_TURN_MM) - 0.5
+
+
 def lumen_distance(kind: str, points: Array, radius: float) -> Array:
     """A lumen of the stress study, by its kind; what has no case of its own is a straight tube."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]

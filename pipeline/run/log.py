@@ -21,13 +21,14 @@ Progress = Callable[[str, int, int, str], None]
 
 @dataclass
 class Log:
-    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage)."""
+    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage).     chosen : and why."""
 
     progress: Progress
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    chosen: dict[str, str] = field(default_factory=dict)
     _counts: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
     _levels: dict[str, dict[str, list[float]]] = field(default_factory=lambda: defaultdict(dict))
 

@@ -133,6 +133,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "geometry": _geometry(known.scans),
         "inputs": _inputs(known.scans),
         "counters": log.counters,
+        "chosen": log.chosen,
     }
 
 

@@ -141,16 +141,24 @@ class Case(Strict):
         return self
 
     @model_validator(mode="after")
-    def _down_for_a_weight(self) -> "Case":
+    def _fits_together(self) -> "Case":
+        problems = []
         if self.wire.weight_N_per_mm > 0 and self.down is None:
-            problem = f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
-            raise _problem(problem)
+            problems.append(
+                f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
+            )
+        # a single file may hold many volumes; their number is known once its header is read
+        one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
+        problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
+        problems += self._over_the_wire()
+        if problems:
+            raise _problem(*problems)
         return self
 
-    @model_validator(mode="after")
-    def _catheter_over_the_wire(self) -> "Case":
+    def _over_the_wire(self) -> list[str]:
+        """What is wrong with the catheter."""
         if self.catheter is None:
-            return self
+            return []
         radius, own = self.catheter.radius_mm, self.wire.radius_mm
         problems = [f"catheter radius_mm = {radius:g} is no more than the wire's {own:g}; a catheter goes over it"]
         problems *= radius <= own
@@ -161,17 +169,7 @@ class Case(Strict):
             if tip > depth:
                 what = f"catheter insertion_mm = {tip:g} of frame {frame} is deeper than the wire, {depth:g}"
                 problems.append(f"{what}; a wire whose tip lies inside the catheter is not modelled")
-        if problems:
-            raise _problem(*problems)
-        return self
-
-    @model_validator(mode="after")
-    def _one_per_frame(self) -> "Case":
-        # a single file may hold many volumes; their number is known once its header is read
-        one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
-        if problems := () if one_file else not_one_per_frame(self.lists, self.frame_count):
-            raise _problem(*problems)
-        return self
+        return problems
 
 
 def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:

@@ -21,7 +21,7 @@ class Field(NamedTuple):
 
     coefficients : (nx + 2, ny + 2, nz + 2) float32.     to_index : (3, 3), index per mm.     origin : (3,) mm.
     gap : bound on |trilinear look-up - spline|, mm.     slope : bound on |gradient|.     spacing : the least, mm.
-    creases : uint8, for each block of the grid whether the distance has a crease near it, see ``wall.creases``.
+    creases : uint8, for each block of the grid whether the distance has a crease near it, see ``solver.creases``.
     """
 
     coefficients: Any

@@ -97,6 +97,21 @@ def test_all_problems_come_at_once(tmp_path: Path) -> None:
     assert "did you mean 'id'?" in found
 
 
+def test_all_problems_of_a_whole_case_come_at_once(tmp_path: Path) -> None:
+    """A weight without a direction, a list of the wrong length, a thin catheter that is too deep: told in one go."""
+    catheter = "catheter = { bending_stiffness_N_mm2 = 5, radius_mm = 0.1, insertion_mm = [1, 9, 3] }"
+    text = GOOD.replace("radius_mm = 0.18", "radius_mm = 0.18\nweight_N_per_mm = 1e-5")
+    text = text.replace("entry_mm", f"{catheter}\ninsertion_mm = [4, 8, 12]\nroll_deg = [1, 2]\nentry_mm", 1)
+    found = problems(tmp_path, text)
+    for part in (
+        "down is missing",
+        "roll_deg has 2 entries",
+        "no more than the wire's 0.18",
+        "deeper than the wire, 8",
+    ):
+        assert part in found
+
+
 def test_ids_are_unique(tmp_path: Path) -> None:
     twice = GOOD + GOOD[GOOD.index("[[case]]") :]
     assert "used more than once" in problems(tmp_path, twice)

@@ -13,10 +13,11 @@ from pipeline.cli import main
 from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
+from pipeline.run.stages.simulate import _pressed_deep, judged
 from pipeline.simulate import guide_wire, insertion_of, simulate
 from pipeline.simulate.config import SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
-from solver import Solution
+from solver import GuideWire, Insertion, Solution, VesselWall
 from solver.grid import Grid
 
 MANIFEST = """
@@ -153,3 +154,28 @@ def test_a_wire_that_comes_through_the_wall_fails_its_frame(case: Case) -> None:
     assert frame.status == "through_wall"
     assert "through the wall" in frame.sentence
     assert not frame.ok
+
+
+def test_a_wire_deep_in_a_soft_wall_is_told_and_one_that_presses_is_not() -> None:
+    """Straight across a tube of 1 mm with a wall that hardly holds it, and one that does."""
+    axes = [np.arange(a, b, 0.3) for a, b in ((-4, 9), (-4, 4), (-3, 15))]
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    grid = Grid((np.hypot(x, y) - 1.0).astype(np.float32), np.full(3, 0.3), np.array([-4.0, -4.0, -3.0]))
+    told = {}
+    for stiffness in (1e-4, 20.0):
+        insertion = Insertion(GuideWire(0.5, 0.18, 20.0), VesselWall(grid, stiffness), [0, 0, 0], [0.5, 0, 1.0])
+        wires = [s for s in insertion.to_depths([2.0, 5.0, 6.0]) if s.converged]
+        told[stiffness] = _pressed_deep([Frame(n, simulated=w) for n, w in enumerate(wires)], wires, 0.18)
+    assert told[20.0] == []
+    (sentence,) = told[1e-4]
+    assert "2 frames" in sentence
+    assert "deeper into the wall than its radius of 0.18 mm, in frame 2 by 1." in sentence
+
+
+def test_a_wire_that_lies_in_itself_says_so_and_fails_its_frame() -> None:
+    turned = GuideWire(0.25, 0.18, 2.0, 0.5)
+    wire = next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([20.0]))
+    assert "self_overlap_mm" not in vars(wire)
+    assert wire.self_overlap_mm == pytest.approx(0.36, abs=0.01)
+    assert judged(Frame(0, simulated=wire), wire, 0.18).status == "self_contact"
+    assert next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([6.0])).self_overlap_mm == 0.0

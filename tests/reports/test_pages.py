@@ -159,6 +159,14 @@ def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
     assert f"<td>{errors['p95_mm'][5]:.3f}</td>" in text
 
 
+def test_what_was_simulated_stands_on_the_page(run: Path) -> None:
+    """Also the catheter, where down is, and the length of the segments that nobody typed, with its reason."""
+    folder = next(p.parent for p in sorted(run.glob("cases/*/result.json")) if "catheter" in p.read_text())
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for text in ("catheter.radius_mm", "catheter.insertion_mm", "<code>down</code>", "half as long ones lie within"):
+        assert text in page, text
+
+
 def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=3),))
     dead = out / "cases" / "dead"

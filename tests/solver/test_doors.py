@@ -19,6 +19,8 @@ from tests.solver.scenes import tube_grid
 WIRE = GuideWire(1.0, 0.18, 10.0)
 TUBE = np.full((3, 4, 5), -1.0)
 WALL = VesselWall(Grid(TUBE), 1.0)
+MASK = np.hypot(*np.mgrid[-3:3.5, -3:3.5, 0:5][:2]) < 2.0
+MASKS = [1.0 - 2.0 * MASK, 0.5 - MASK, np.where(MASK, -1e3, 1e3), np.sign(np.mgrid[-3.0:4, 0:7, 0:7][0])]
 
 NOT_NUMBERS = [np.nan, np.inf, -np.inf, "12", "nan", b"1", None, True, np.True_, [1.0], [[1.0]], {}, 1j, object()]
 NOT_NUMBERS += [np.array([1.0, 2.0]), np.array(True), np.array("1"), np.ma.masked, 10**400]
@@ -99,7 +101,8 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
         wall,
         {
             "distance": ["x", None, TUBE, TUBE < 0, Grid(TUBE < 0), Grid((TUBE < 0).astype(np.uint8)), Grid(-TUBE)]
-            + [Grid(np.where(np.arange(60).reshape(3, 4, 5) == 7, bad, -1.0)) for bad in (np.nan, np.inf, -1e30)],
+            + [Grid(np.where(np.arange(60).reshape(3, 4, 5) == 7, bad, -1.0)) for bad in (np.nan, np.inf, -1e30)]
+            + [Grid(mask.astype(kind)) for mask in MASKS for kind in (np.float32, np.float64)],
             "stiffness_N_mm2": NOT_NUMBERS + HUGE + BELOW,
             "friction": NOT_NUMBERS + HUGE + [-0.1],
             "hull": [

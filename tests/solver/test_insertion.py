@@ -199,3 +199,11 @@ def test_solution_is_read_only() -> None:
     solution = last(Insertion(GuideWire(1.0, 0.18, 10.0), None, [0, 0, 0], [0, 0, 1]), [5.0])
     with pytest.raises(ValueError, match="read-only"):
         solution.joints_mm[0] = 1.0
+
+
+def test_what_is_printed_says_where_the_wire_is() -> None:
+    insertion = Insertion(GuideWire(1.0, 0.18, 10.0), None, [0, 0, 0], [0, 0, 1])
+    assert repr(insertion).startswith("Insertion(at 0 mm, roll 0 degrees, no wall, GuideWire(")
+    (solution,) = insertion.to_depths([12.5])
+    assert repr(solution) == "Solution(converged at 12.5 mm, tip [0.00, 0.00, 12.50] mm, push 0 N)"
+    assert "at 12.5 mm" in repr(insertion)

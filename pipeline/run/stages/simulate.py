@@ -13,7 +13,6 @@ from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from solver import Snap, Solution
-from solver.self_contact import self_overlap_mm
 
 MOST_OVERLAP_RADII = 0.1
 """Of the wire with itself that still counts as a touch: less than a scan can show."""
@@ -46,10 +45,12 @@ def simulate_frames(run: Context, known: Known) -> Known:
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
+    log.chosen["segment_mm"] = f"{resolved.segment_mm:g}: {resolved.reason}"
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
+    log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
     return replace(known, frames=tuple(frames), clamp=clamp)
 
 
@@ -57,7 +58,7 @@ def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
     """The frame, failed where its wire is not at rest, cannot follow a bend or passes through itself."""
     if not wire.converged:
         return frame.failed("simulate", wire.status)
-    turn, overlap = wire.largest_turn_deg, self_overlap_mm(wire.joints_mm, radius_mm)
+    turn, overlap = wire.largest_turn_deg, wire.self_overlap_mm
     if turn > LARGEST_JOINT_TURN_DEG:
         return frame.failed("simulate", FrameStatus.UNDER_RESOLVED, f"a joint is turned by {turn:.0f} degrees")
     if overlap > MOST_OVERLAP_RADII * radius_mm:
@@ -84,6 +85,20 @@ def _cut_short(frame: Frame) -> str:
         f"frame {frame.index}: the catheter's tip is stated at {frame.catheter_mm:.1f} mm, the wire's lies at "
         f"{frame.depth_mm:.1f} mm: simulated as if both ended there; check insertion_mm of the catheter"
     )
+
+
+def _pressed_deep(frames: Sequence[Frame], wires: Sequence[Solution], radius_mm: float) -> list[str]:
+    """A warning where wires at rest lie deeper in the wall than their radius."""
+    deep = {frame.index: wire.max_penetration_mm for frame, wire in zip(frames, wires, strict=True) if wire.converged}
+    deep = {frame: depth for frame, depth in deep.items() if depth > radius_mm > 0.0}
+    if not deep:
+        return []
+    worst = max(deep, key=lambda frame: deep[frame])
+    return [
+        f"{len(deep)} frames: the simulated wire is pressed deeper into the wall than its radius of {radius_mm:g} mm, "
+        f"in frame {worst} by {deep[worst]:.2f} mm: the wall gives way more than a vessel may; "
+        "raise wall.stiffness_N_mm2, or check lumen and entry"
+    ]
 
 
 def _told(frame: int, snap: Snap) -> str:

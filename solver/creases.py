@@ -1,0 +1,64 @@
+"""Creases: where between two lumens the distance stops to rise and falls again; nowhere else can a wire change lumens.
+
+In an exact distance the slope falls at once. A Gaussian, or resampling to finer voxels, spreads that fall over as many
+voxels as the smoothing is wide: so it is looked for over ever longer ways.
+"""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import _tolerances as tol
+from solver.doors import Array
+
+Marks = NDArray[np.uint8]
+
+
+def creases(values: Array, spacing_mm: Array) -> Marks:
+    """Blocks of the grid, ``tol.CREASE_BLOCK`` voxels wide, near a crease of the distance."""
+    marks = np.zeros([-(-n // tol.CREASE_BLOCK) for n in values.shape], dtype=np.uint8)
+    for axis, spacing in enumerate(spacing_mm):
+        if values.shape[axis] > 2:
+            sharp = np.argwhere(np.diff(values, 2, axis) < -tol.CREASE * spacing)
+            _mark(marks, values, sharp + np.eye(3, dtype=int)[axis], 2)
+    voxels, finest = 2, float(spacing_mm.min())
+    while voxels == 2 or voxels * finest <= tol.CREASE_REACH_MM:
+        _mark(marks, values, _rounded(values, spacing_mm, voxels), max(2, voxels // 2))
+        voxels *= 2
+    return marks
+
+
+def _rounded(values: Array, spacing_mm: Array, voxels: int) -> NDArray[np.int64]:
+    """Voxels (n, 3) on which the slope falls within ``voxels`` of the finest axis to each side.
+
+    Looked for at every other one of these ways' ends. Where the distance still rises one way there is no crease: round
+    the inner wall of a tight bend it falls to both sides along the vessel, but rises away from it.
+    """
+    way = voxels * float(spacing_mm.min())
+    stride = np.maximum(np.minimum(voxels // 2, (0.5 * way / spacing_mm).astype(int)), 1)
+    coarse = values[:: stride[0], :: stride[1], :: stride[2]]
+    reach = np.maximum(np.rint(way / (stride * spacing_mm)).astype(int), 1)
+    inner = [slice(n, size - n) for n, size in zip(reach, coarse.shape, strict=True)]
+    middle = coarse[tuple(inner)]
+    if 0 in middle.shape:
+        return np.zeros((0, 3), dtype=np.int64)
+    falls = np.zeros(middle.shape, dtype=bool)
+    for axis, n in enumerate(reach):
+        ahead, behind = (
+            coarse[tuple(ends if a == axis else inner[a] for a in range(3))]
+            for ends in (slice(2 * n, None), slice(coarse.shape[axis] - 2 * n))
+        )
+        falls |= ahead + behind < 2.0 * middle - tol.CREASE * n * stride[axis] * spacing_mm[axis]
+    where = np.argwhere(falls) + reach
+    ways = np.diag(reach)
+    slopes = [(coarse[tuple((where + w).T)] - coarse[tuple((where - w).T)]) for w in ways]
+    square = np.sum((np.stack(slopes) / (2.0 * reach * stride * spacing_mm)[:, None]) ** 2, axis=0)
+    return np.asarray(where[square < tol.CREASE_SLOPE**2] * stride)
+
+
+def _mark(marks: Marks, values: Array, where: NDArray[np.int64], near: int) -> None:
+    """Mark the blocks within ``near`` voxels of some of them (n, 3)."""
+    for corner in product((-near, near), repeat=3):
+        block = np.clip(where + corner, 0, np.array(values.shape) - 1) // tol.CREASE_BLOCK
+        marks[tuple(block.T)] = 1
