@@ -85,8 +85,9 @@ def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
     """What to do in threads for jobs of one kind."""
     if len(kind) == 1:
         return [partial(go_alone, kind[0])]
-    crews = [Crew(kind) for _ in range(min(threads, -(-len(kind) // WIDTH)))]
-    return [partial(crew.lead, kind) for crew in crews]
+    crews = min(threads, -(-len(kind) // WIDTH))
+    teams = [Crew(kind, -(-len(kind) // crews)) for _ in range(crews)]
+    return [partial(crew.lead, kind) for crew in teams]
 
 
 def _one_each(name: str, values: Any, count: int) -> list[Any]:

@@ -82,20 +82,22 @@ SHAPES = (
 )
 """Of the arrays of a block: k joints, n nodes, p points."""
 LANE = record(
-    *((name, float) for name in ("depth", "roll", "clamped", "limit", "tolerance", "stiffest", "scale", "noise")),
+    *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),
     *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load")),
-    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "filled")),
+    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations")),
 )
-"""Where a lane is.
+"""Where a wire is.
 
 depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise : see
 ``energy.scale_of``.     fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
 before : energy that the iteration began with.     bending, wall, load : energies of the current state.
 limit, iterations : of this depth.     phase : see ``lane_relax``.     goal : index of the depth that it is on its way
 to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.
-outcome : how its relaxation ended.     filled : joints of length 0 that are in place, at the roll ``clamped``.
+outcome : how its relaxation ended.
 """
+SEAT = record(("wire", np.int64), ("filled", np.int64))
+"""Which wire a lane works for, POOL is none; and the block's joint from which on it is in place, see ``fill_up``."""
 
 
 @kernel
@@ -111,8 +113,6 @@ def put_in(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
         b.u[CURRENT, to, 0, lane], b.u[CURRENT, to, 1, lane] = state.u[CURRENT, j, 0], state.u[CURRENT, j, 1]
     for n in range(k + 1):
         put_node(b, lane, shift + n, load3(state.x[CURRENT], n), load9(state.r[CURRENT], n))
-    for p in range(first[shift + 1]):
-        b.site[p, WEIGHT, lane] = b.touch[CURRENT, p, 0, lane] = 0.0
     for p in range(chain.first[k + 1]):
         to, d = first[shift + 1] + p, state.penetration[CURRENT, p]
         b.site[to, ALONG, lane], b.site[to, WEIGHT, lane] = chain.offset[p, 2], chain.weight[p]
@@ -136,14 +136,19 @@ def put_node(b: Block, lane: int, n: int, x: Any, r: Any) -> None:
 
 
 @kernel
-def fill_up(b: Block, lane: int, problem: Problem, start: int, stop: int) -> None:
-    """Put joints of length 0 before a wire."""
-    x, r = load3(problem.state.x[CURRENT], 0), load9(problem.state.r[CURRENT], 0)
+def fill_up(b: Block, first: Any, lane: int, start: int, stop: int) -> None:
+    """Put joints of length 0 before a wire that begins at joint ``stop``, from joint ``start`` on."""
+    x = (b.x[CURRENT, stop, 0, lane], b.x[CURRENT, stop, 1, lane], b.x[CURRENT, stop, 2, lane])
     for j in range(start, stop):
         b.length[j, lane] = b.hold[j, lane] = b.sine[j, lane] = 0.0
         b.bend[j, lane] = b.cosine[j, lane] = 1.0
         b.u[CURRENT, j, 0, lane] = b.u[CURRENT, j, 1, lane] = 0.0
-        put_node(b, lane, j, x, r)
+        for a in range(3):
+            b.x[CURRENT, j, a, lane] = x[a]
+            for c in range(3):
+                b.r[CURRENT, j, a, c, lane] = b.r[CURRENT, stop, a, c, lane]
+    for p in range(first[start + 1], first[stop + 1]):
+        b.site[p, WEIGHT, lane] = b.touch[CURRENT, p, 0, lane] = 0.0
 
 
 @kernel

@@ -26,10 +26,10 @@ from solver._kernels.lane_block import (
 )
 from solver._kernels.newton_method import whole
 
-IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW = range(13)
-"""Phases of a lane: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
+IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW, WAITING = range(14)
+"""Phases of a wire: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
 of its search, or the last one; has taken one, and may be at rest by it; may be at a saddle; goes on alone; its
-relaxation has ended, in the lane or in the wire; a wire is to begin."""
+relaxation has ended, in the lane or in the wire; it is to begin; has a start, but no lane yet."""
 
 
 @inlined
