@@ -60,7 +60,7 @@ class Crew:
         # in pools of one size: a small one would leave lanes idle
         self.most = -(-share // -(-share // POOL))
         self.plan = _plan(self.most, max(map(len, nodes)), max(map(sum, nodes)))
-        axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1])}
+        axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1]), "a": int(self.first[-1]) + 1}
         self.block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
         kinds = LANE, records.DESCENT, records.COUNTERS
         self.notes = tuple(np.zeros(POOL + 1, kind).view(np.recarray) for kind in kinds)

@@ -29,7 +29,6 @@ NUMBERS = (
         "largest",
         "still",
         "full",
-        "cheap",
         "clear",
     ),
 )
@@ -40,7 +39,7 @@ that a wall may lie between; largest moment left, and in the wire; first joint t
 look-ups."""
 (
     STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
-    MOMENT, LARGEST, STILL, FULL, CHEAP, CLEAR,
+    MOMENT, LARGEST, STILL, FULL, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
 """Columns of ``Block.site``: the last of four."""
@@ -53,8 +52,9 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (4,) a place that is
-    looked up, and how clear of the wall it was.     number : see ``NUMBERS``.
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (p + 1,) points that are
+    to be looked up, one after the other: WIDTH times the point, plus its lane.     found : (11,), see
+    ``lane_field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -73,14 +73,15 @@ class Block(NamedTuple):
     torque: Any
     turned: Any
     asked: Any
+    found: Any
     number: Any
 
 
 SHAPES = (
     *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
-    *("3", "3", "3", "2 3", "4", str(len(NUMBERS))),
+    *("3", "3", "3", "2 3", "a", "11", str(len(NUMBERS))),
 )
-"""Of the arrays of a block: k joints, n nodes, p points."""
+"""Of the arrays of a block: k joints, n nodes, p points, and room for one more (a)."""
 LANE = record(
     *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),

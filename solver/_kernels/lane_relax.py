@@ -16,7 +16,6 @@ from solver._kernels.forces import copy_state
 from solver._kernels.lane_block import (
     ACCEPTED,
     ACTIVE,
-    CHEAP,
     CLEAR,
     DAMPING,
     FRACTION,
@@ -200,7 +199,6 @@ def hand_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
         report.force[a], report.torque[a] = raw.force[a, lane], raw.torque[a, lane]
         report.turned[0, a], report.turned[1, a] = raw.turned[0, a, lane], raw.turned[1, a, lane]
     counted.wall_look_ups += int(number[FULL, lane])
-    counted.wall_look_ups_cheap += int(number[CHEAP, lane])
     counted.wall_look_ups_proven_unnecessary += int(number[CLEAR, lane])
 
 
@@ -214,7 +212,7 @@ def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     team.nows[w] = problem.scratch.descent[0]
     me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
     number[STIFFNESS, lane], number[REACH, lane] = problem.stiffness, problem.chain.reach
-    number[FULL, lane] = number[CHEAP, lane] = number[CLEAR, lane] = 0.0
+    number[FULL, lane] = number[CLEAR, lane] = 0.0
 
 
 @owner

@@ -6,7 +6,6 @@ from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import Three, apply_transposed, dot, load3, load9, minus, store3, store9, times
 from solver._kernels.data import CURRENT, TRIAL, Field
-from solver._kernels.field import Cell, depth_in_grid, indices, jet_at, locate, trilinear, value
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.lane_block import (
     ACCEPTED,
@@ -14,7 +13,6 @@ from solver._kernels.lane_block import (
     ALONG,
     ANCHOR,
     BENDING,
-    CHEAP,
     CLEAR,
     FRACTION,
     FULL,
@@ -28,11 +26,10 @@ from solver._kernels.lane_block import (
     WEIGHT,
     Block,
 )
+from solver._kernels.lane_field import look_up
 from solver._kernels.lane_newton import turn_of
 from solver._kernels.lanes import WIDTH, anywhere, bits, greater, select, select3, size, spread
 from solver._kernels.rollout import limited, relative
-
-NO_JET = (0.0,) * 10
 
 
 @kernel
@@ -90,17 +87,26 @@ def select9(condition: Any, one: Any, other: Any) -> Any:
 
 @kernel
 def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> None:
-    """``energy.wall_energy`` of the trial in every active lane.
+    """``energy.wall_energy`` of the trial in every active lane. raw : the numbers of b."""
+    stiffness, site, touch = b.number[STIFFNESS], b.site, b.touch[TRIAL]
+    count, total = ask(b, raw.asked, field.slope, first, base), spread(0.0)
+    for start in range(0, count, WIDTH):
+        look(b, raw, field, start, min(count, start + WIDTH))
+    if count > 0:
+        for p in range(first[base + 1], first[b.length.shape[0] + 1]):
+            total = total + wall_law.energy(stiffness, site[p, WEIGHT], touch[p, 0])
+    b.number[WALL] = total
 
-    The way from a point's last look-up decides for all lanes at once; those that need a look-up get one each.
-    raw : the numbers of b.
+
+@kernel
+def ask(b: Block, asked: Any, slope: float, first: Any, base: int) -> int:
+    """List the points of the trial that may touch, and return how many. asked : the numbers of ``b.asked``.
+
+    The way from a point's last look-up decides, for all lanes at once. Where a listed point is stands in ``b.touch``.
     """
-    c, m, o, gap, square = field.coefficients, field.to_index, field.origin, field.gap, field.slope * field.slope
-    spacing = field.spacing
-    x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
-    sites, touches, numbers, asks = raw.site, raw.touch[TRIAL], raw.number, raw.asked
-    reach, zero = number[REACH], spread(0.0)
-    total, clear = zero, number[CLEAR]
+    x, r, site, touch, number = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number
+    reach, zero, active, square = number[REACH], spread(0.0), number[ACTIVE] > 0.0, slope * slope
+    clear, count = number[CLEAR], 0
     for n in range(base + 1, b.length.shape[0] + 1):
         for p in range(first[n], first[n + 1]):
             along = site[p, ALONG]
@@ -108,59 +114,42 @@ def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> No
             room = -site[p, ANCHOR + 3] - reach
             way = minus(q, (site[p, ANCHOR], site[p, ANCHOR + 1], site[p, ANCHOR + 2]))
             still = (room >= 0.0) & (square * dot(way, way) <= room * room)
-            here = (number[ACTIVE] > 0.0) & (site[p, WEIGHT] > 0.0)
+            here = active & (site[p, WEIGHT] > 0.0)
             clear = clear + select(here & still, 1.0, zero)
             touch[p, 0] = zero
             wanted = bits(here & ~still)
             if wanted != 0:
-                asked[0], asked[1], asked[2], asked[3] = q[0], q[1], q[2], room
+                touch[p, 1], touch[p, 2], touch[p, 3] = q
+                # without a branch: whether a lane wants this point cannot be foretold
                 for lane in range(WIDTH):
-                    if wanted >> lane & 1:
-                        at = (asks[0, lane], asks[1, lane], asks[2, lane])
-                        f = indices(m, o, at)
-                        how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, -spacing * depth_in_grid(c, f)
-                        found = look(c, m, locate(c, f), how)
-                        numbers[CHEAP if found[0] < 0.0 else FULL, lane] += 1.0
-                        keep(sites, touches, p, lane, at, found)
-                total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
-    number[WALL], number[CLEAR] = total, clear
-
-
-@inlined
-def keep(sites: Any, touches: Any, p: int, lane: int, at: Three, found: tuple[float, float, Any]) -> None:
-    """Keep what the look-up of a point said."""
-    d, known, jet = found
-    sites[p, ANCHOR, lane], sites[p, ANCHOR + 1, lane], sites[p, ANCHOR + 2, lane] = at
-    sites[p, ANCHOR + 3, lane] = known
-    if d > 0.0:
-        touches[p, 0, lane] = d
-        for a in range(10):
-            touches[p, 1 + a, lane] = jet[a]
+                    asked[count // WIDTH, count % WIDTH] = p * WIDTH + lane
+                    count += wanted >> lane & 1
+    number[CLEAR] = clear
+    return count
 
 
 @kernel
-def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, float]) -> tuple[float, float, Any]:
-    """Look a point up as ``energy.wall_energy`` does: penetration, what is known of the distance, and the jet.
-
-    how : reach, the field's gap, whether it touched when it was looked up last, and how far outside the grid it is, mm.
-    The penetration is 0 off contact, and -1 where the first, cheap look was enough.
-    """
-    reach, gap, touched, border = how
-    d, jet, cheap = -1.0, NO_JET, False
-    if not touched:
-        phi = trilinear(c, cell)
-        cheap = border <= 0.0 and phi + gap + reach <= 0.0
-        # as good as certain to touch: its value alone is not asked first
-        touched = phi - gap + reach > 0.0
-        if cheap:
-            d = phi + gap + reach
-        elif not touched:
-            d = value(c, cell) + reach
-    if touched or d > 0.0:
-        first, second = jet_at(c, m, cell)
-        jet = first + second
-        d = first[0] + reach
-    return -1.0 if cheap else max(d, 0.0), max(d - reach, border) if border <= 0.0 else 1.0, jet
+def look(b: Block, raw: Block, field: Field, start: int, stop: int) -> None:
+    """Look up to eight points of the list up, from ``start`` on, and keep what is found. raw : the numbers of b."""
+    asked, found, sites, touches, numbers = raw.asked[start // WIDTH], raw.found, raw.site, raw.touch[TRIAL], raw.number
+    for n in range(WIDTH):
+        point = int(asked[min(n, stop - start - 1)])
+        p, lane = point // WIDTH, point % WIDTH
+        for a in range(3):
+            found[a, n] = touches[p, 1 + a, lane]
+    look_up(field, b.found)
+    for n in range(stop - start):
+        point = int(asked[n])
+        p, lane = point // WIDTH, point % WIDTH
+        for a in range(3):
+            sites[p, ANCHOR + a, lane] = touches[p, 1 + a, lane]
+        sites[p, ANCHOR + 3, lane] = found[10, n]
+        numbers[FULL, lane] += 1.0
+        d = found[0, n] + numbers[REACH, lane]
+        if d > 0.0:
+            touches[p, 0, lane] = d
+            for a in range(10):
+                touches[p, 1 + a, lane] = found[a, n]
 
 
 @kernel

@@ -1,0 +1,85 @@
+"""The distance at eight places at once, with its derivatives: ``field`` in lanes.
+
+The coefficients of a place come four in a row. They are loaded for one place after the other and transposed in
+registers: a gather of single ones takes three times as long.
+"""
+
+import math
+from typing import Any
+
+from solver._kernels.algebra import Six, Three
+from solver._kernels.data import Field
+from solver._kernels.field import Four, across, bends, cubic, indices, per_mm, slopes
+from solver._kernels.flags import inlined, kernel
+from solver._kernels.lanes import greater, lesser, rows, select
+
+Layer = tuple[Four, Four, Four]
+
+
+@inlined
+def cell_of(f: float, last: float) -> float:
+    """``field.clipped``, as a float; 0 where there is no number."""
+    return math.floor(lesser(greater(f, 0.0), last))
+
+
+@inlined
+def depth_in_grid(c: Any, f: Three) -> float:
+    """``field.depth_in_grid``."""
+    s = c.shape
+    low = lesser(lesser(f[0], f[1]), f[2])
+    return lesser(low, lesser(lesser(s[0] - 3.0 - f[0], s[1] - 3.0 - f[1]), s[2] - 3.0 - f[2]))  # type: ignore[no-any-return]
+
+
+@inlined
+def fours(w: Four, a: Four, b: Four, c: Four, d: Four) -> Four:
+    """``field.across`` of four."""
+    return (
+        across(w, a[0], b[0], c[0], d[0]),
+        across(w, a[1], b[1], c[1], d[1]),
+        across(w, a[2], b[2], c[2], d[2]),
+        across(w, a[3], b[3], c[3], d[3]),
+    )
+
+
+@inlined
+def layer(c: Any, at: float, shift: int, q: tuple[Four, Four, Four]) -> Layer:
+    """``field.layer`` of the plane ``shift`` coefficients on."""
+    n = c.shape[2]
+    a, b, e, f = rows(c, at, shift), rows(c, at, shift + n), rows(c, at, shift + 2 * n), rows(c, at, shift + 3 * n)
+    return fours(q[0], a, b, e, f), fours(q[1], a, b, e, f), fours(q[2], a, b, e, f)
+
+
+@inlined
+def weighted(x: Four, w: Four) -> float:
+    """``lanes.weighted``."""
+    return (x[0] * w[0] + x[2] * w[2]) + (x[1] * w[1] + x[3] * w[3])
+
+
+@inlined
+def spline(c: Any, at: float, place: Three) -> tuple[Four, Six]:
+    """``field.spline`` of the cells whose first coefficients are the at-th of all."""
+    u, v, w = place
+    p, dp, ddp, q = cubic(u), slopes(u), bends(u), (cubic(v), slopes(v), bends(v))
+    r, dr, plane = cubic(w), slopes(w), c.shape[1] * c.shape[2]
+    a, b, e, f = layer(c, at, 0, q), layer(c, at, plane, q), layer(c, at, 2 * plane, q), layer(c, at, 3 * plane, q)
+    here, x = fours(p, a[0], b[0], e[0], f[0]), fours(dp, a[0], b[0], e[0], f[0])
+    y, xy = fours(p, a[1], b[1], e[1], f[1]), fours(dp, a[1], b[1], e[1], f[1])
+    xx, yy = fours(ddp, a[0], b[0], e[0], f[0]), fours(p, a[2], b[2], e[2], f[2])
+    first = weighted(here, r), weighted(x, r), weighted(y, r), weighted(here, dr)
+    second = weighted(xx, r), weighted(yy, r), weighted(here, bends(w))
+    return first, (*second, weighted(xy, r), weighted(x, dr), weighted(y, dr))
+
+
+@kernel
+def look_up(field: Field, found: Any) -> None:
+    """Look up the places in found (11,) of lanes, 0 to 2, mm: the jets there, then what is known of the distance."""
+    c = field.coefficients
+    f = indices(field.to_index, field.origin, (found[0], found[1], found[2]))
+    i, j = cell_of(f[0], float(c.shape[0] - 4)), cell_of(f[1], float(c.shape[1] - 4))
+    k = cell_of(f[2], float(c.shape[2] - 4))
+    at = (i * float(c.shape[1]) + j) * float(c.shape[2]) + k
+    first, second = per_mm(field.to_index, spline(c, at, (f[0] - i, f[1] - j, f[2] - k)))
+    border = -field.spacing * depth_in_grid(c, f)
+    found[0], found[1], found[2], found[3] = first
+    found[4], found[5], found[6], found[7], found[8], found[9] = second
+    found[10] = select(border <= 0.0, greater(first[0], border), 1.0)
