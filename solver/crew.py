@@ -60,8 +60,10 @@ class Crew:
         # in pools of one size: a small one would leave lanes idle
         self.most = -(-share // -(-share // POOL))
         self.plan = _plan(self.most, max(map(len, nodes)), max(map(sum, nodes)))
-        axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1]), "a": int(self.first[-1]) + 1}
-        self.block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
+        axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1])}
+        block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
+        # one more, which the last of a list is followed by
+        self.block = block._replace(asked=np.zeros((3, WIDTH * axes["p"] + 1 + WIDTH), np.int64))
         kinds = LANE, records.DESCENT, records.COUNTERS
         self.notes = tuple(np.zeros(POOL + 1, kind).view(np.recarray) for kind in kinds)
         self.seats = np.zeros(WIDTH, SEAT).view(np.recarray)

@@ -16,7 +16,7 @@ from solver._kernels.flags import inlined, kernel
 from solver._kernels.records import record
 
 NUMBERS = (
-    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted"),
+    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted", "room"),
     *(
         "decrement",
         "definite",
@@ -33,12 +33,12 @@ NUMBERS = (
     ),
 )
 """Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
-Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0). Answered: the fall
-foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
+Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0); the
+energy up to which it is, and then how much of that the wall may still take. Answered: the fall foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
 that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
 look-ups."""
 (
-    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
+    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
     MOMENT, LARGEST, STILL, FULL, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
@@ -52,9 +52,9 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (p + 1,) points that are
-    to be looked up, one after the other: WIDTH times the point, plus its lane.     found : (11,), see
-    ``lane_field.look_up``.     number : see ``NUMBERS``.
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of points
+    that are to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
+    eight that are.     found : (11,), see ``lane_field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -79,9 +79,9 @@ class Block(NamedTuple):
 
 SHAPES = (
     *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
-    *("3", "3", "3", "2 3", "a", "11", str(len(NUMBERS))),
+    *("3", "3", "3", "2 3", "", "11", str(len(NUMBERS))),
 )
-"""Of the arrays of a block: k joints, n nodes, p points, and room for one more (a)."""
+"""Of the arrays of a block: k joints, n nodes, p points; what is asked is no numbers in lanes."""
 LANE = record(
     *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),

@@ -54,7 +54,7 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
         in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
         in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
         in_lanes(raw.touch), in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque), in_lanes(raw.turned),
-        in_lanes(raw.asked), in_lanes(raw.found), in_lanes(raw.number),
+        raw.asked, in_lanes(raw.found), in_lanes(raw.number),
     )  # fmt: skip
     plan, raw, (lanes, nows, counts, seats) = bare(plan), bare(raw), bare(records)
     team = Team(wires, lanes, nows, counts, seats, bare(first), wires[0].problem.field)

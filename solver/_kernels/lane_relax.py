@@ -23,6 +23,7 @@ from solver._kernels.lane_block import (
     JUMP,
     MOMENT,
     REACH,
+    ROOM,
     START,
     STIFFNESS,
     Block,
@@ -43,6 +44,7 @@ from solver._kernels.lane_decide import (
     after_sweep,
     finish_taking,
     leads_down,
+    most_energy,
     next_iteration,
     shorten,
     take,
@@ -136,6 +138,7 @@ def ask_for_trials(team: Team, number: Any) -> int:
         me = team.lanes[team.seats[lane].wire]
         trying = me.phase == SEARCH or (me.phase == LAST and me.tries == 0)
         number[ACTIVE, lane], number[FRACTION, lane] = 1.0 if trying else 0.0, me.fraction
+        number[ROOM, lane] = most_energy(me, team.nows[team.seats[lane].wire])
         count += trying
     return count
 

@@ -19,6 +19,7 @@ from solver._kernels.lane_block import (
     JUMP,
     LOAD,
     REACH,
+    ROOM,
     START,
     STIFFNESS,
     STILL,
@@ -26,7 +27,7 @@ from solver._kernels.lane_block import (
     WEIGHT,
     Block,
 )
-from solver._kernels.lane_field import look_up
+from solver._kernels.lane_field import look_first, look_up
 from solver._kernels.lane_newton import turn_of
 from solver._kernels.lanes import WIDTH, anywhere, bits, greater, select, select3, size, spread
 from solver._kernels.rollout import limited, relative
@@ -87,69 +88,116 @@ def select9(condition: Any, one: Any, other: Any) -> Any:
 
 @kernel
 def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> None:
-    """``energy.wall_energy`` of the trial in every active lane. raw : the numbers of b."""
-    stiffness, site, touch = b.number[STIFFNESS], b.site, b.touch[TRIAL]
-    count, total = ask(b, raw.asked, field.slope, first, base), spread(0.0)
-    for start in range(0, count, WIDTH):
-        look(b, raw, field, start, min(count, start + WIDTH))
-    if count > 0:
+    """``energy.wall_energy`` of the trial in every active lane, or enough of it to be too much. raw : the numbers of b.
+
+    Points that touched are looked up first: a trial that fails does so by them, mostly, and needs no others.
+    """
+    number, site, touch, total = b.number, b.site, b.touch[TRIAL], spread(0.0)
+    # what is lost to rounding, with room: which side of a limit a sum is on must not hang on its order
+    number[ROOM] = number[ROOM] - (number[BENDING] + number[LOAD]) + 1e-9 * number[BENDING]
+    sure, unsure = ask(b, field.slope, first, base)
+    touch_at(b, raw, field, sure)
+    touch_at(b, raw, field, sift(b, raw, field, unsure))
+    if sure + unsure > 0:
         for p in range(first[base + 1], first[b.length.shape[0] + 1]):
-            total = total + wall_law.energy(stiffness, site[p, WEIGHT], touch[p, 0])
-    b.number[WALL] = total
+            total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
+    number[WALL] = total
 
 
 @kernel
-def ask(b: Block, asked: Any, slope: float, first: Any, base: int) -> int:
-    """List the points of the trial that may touch, and return how many. asked : the numbers of ``b.asked``.
+def ask(b: Block, slope: float, first: Any, base: int) -> tuple[int, int]:
+    """List the points of the trial that touched when they were looked up last, and those that may; count both.
 
     The way from a point's last look-up decides, for all lanes at once. Where a listed point is stands in ``b.touch``.
     """
-    x, r, site, touch, number = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number
+    x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
     reach, zero, active, square = number[REACH], spread(0.0), number[ACTIVE] > 0.0, slope * slope
-    clear, count = number[CLEAR], 0
+    clear, sure, unsure = number[CLEAR], 0, 0
     for n in range(base + 1, b.length.shape[0] + 1):
         for p in range(first[n], first[n + 1]):
             along = site[p, ALONG]
             q = (x[n, 0] + along * r[n, 0, 2], x[n, 1] + along * r[n, 1, 2], x[n, 2] + along * r[n, 2, 2])
             room = -site[p, ANCHOR + 3] - reach
             way = minus(q, (site[p, ANCHOR], site[p, ANCHOR + 1], site[p, ANCHOR + 2]))
-            still = (room >= 0.0) & (square * dot(way, way) <= room * room)
+            off = room >= 0.0
+            still = off & (square * dot(way, way) <= room * room)
             here = active & (site[p, WEIGHT] > 0.0)
             clear = clear + select(here & still, 1.0, zero)
             touch[p, 0] = zero
-            wanted = bits(here & ~still)
-            if wanted != 0:
+            near, far = bits(here & ~off), bits(here & off & ~still)
+            if near + far != 0:
                 touch[p, 1], touch[p, 2], touch[p, 3] = q
                 # without a branch: whether a lane wants this point cannot be foretold
                 for lane in range(WIDTH):
-                    asked[count // WIDTH, count % WIDTH] = p * WIDTH + lane
-                    count += wanted >> lane & 1
+                    asked[0, sure] = asked[1, unsure] = p * WIDTH + lane
+                    sure, unsure = sure + (near >> lane & 1), unsure + (far >> lane & 1)
     number[CLEAR] = clear
-    return count
+    return sure, unsure
 
 
 @kernel
-def look(b: Block, raw: Block, field: Field, start: int, stop: int) -> None:
-    """Look up to eight points of the list up, from ``start`` on, and keep what is found. raw : the numbers of b."""
-    asked, found, sites, touches, numbers = raw.asked[start // WIDTH], raw.found, raw.site, raw.touch[TRIAL], raw.number
-    for n in range(WIDTH):
-        point = int(asked[min(n, stop - start - 1)])
+def gather(raw: Block, which: int, at: int, count: int) -> tuple[int, int]:
+    """Gather up to eight points of a list from ``at`` on; return how many, and where to go on.
+
+    Points of trials that cost too much already are left out.
+    """
+    asked, found, touches, numbers, n = raw.asked, raw.found, raw.touch[TRIAL], raw.number, 0
+    while at < count and n < WIDTH:
+        point = asked[which, at]
         p, lane = point // WIDTH, point % WIDTH
+        at += 1
+        if numbers[ROOM, lane] >= 0.0:
+            for a in range(3):
+                found[a, n] = touches[p, 1 + a, lane]
+            numbers[FULL, lane] += 1.0
+            asked[2, n] = point
+            n += 1
+    for m in range(n, WIDTH):
         for a in range(3):
-            found[a, n] = touches[p, 1 + a, lane]
-    look_up(field, b.found)
-    for n in range(stop - start):
-        point = int(asked[n])
-        p, lane = point // WIDTH, point % WIDTH
-        for a in range(3):
-            sites[p, ANCHOR + a, lane] = touches[p, 1 + a, lane]
-        sites[p, ANCHOR + 3, lane] = found[10, n]
-        numbers[FULL, lane] += 1.0
-        d = found[0, n] + numbers[REACH, lane]
-        if d > 0.0:
-            touches[p, 0, lane] = d
-            for a in range(10):
-                touches[p, 1 + a, lane] = found[a, n]
+            found[a, m] = found[a, 0]
+    return n, at
+
+
+@inlined
+def keep(raw: Block, n: int) -> tuple[int, int]:
+    """Keep where the n-th point of those gathered is, and what is known of the distance there; return it and its lane."""
+    point, sites, touches = raw.asked[2, n], raw.site, raw.touch[TRIAL]
+    p, lane = point // WIDTH, point % WIDTH
+    for a in range(3):
+        sites[p, ANCHOR + a, lane] = touches[p, 1 + a, lane]
+    sites[p, ANCHOR + 3, lane] = raw.found[10, n]
+    return p, lane
+
+
+@kernel
+def sift(b: Block, raw: Block, field: Field, count: int) -> int:
+    """Look up the distance alone of points that may touch; list those that do, and count them."""
+    found, asked, numbers, at, sure = raw.found, raw.asked, raw.number, 0, 0
+    while at < count:
+        some, at = gather(raw, 1, at, count)
+        look_first(field, b.found)
+        for n in range(some):
+            _, lane = keep(raw, n)
+            asked[0, sure] = asked[2, n]
+            sure += found[0, n] + numbers[REACH, lane] > 0.0
+    return sure
+
+
+@kernel
+def touch_at(b: Block, raw: Block, field: Field, count: int) -> None:
+    """Look up the points of the list of those that will touch."""
+    found, sites, touches, numbers, at = raw.found, raw.site, raw.touch[TRIAL], raw.number, 0
+    while at < count:
+        some, at = gather(raw, 0, at, count)
+        look_up(field, b.found)
+        for n in range(some):
+            p, lane = keep(raw, n)
+            d = found[0, n] + numbers[REACH, lane]
+            if d > 0.0:
+                touches[p, 0, lane] = d
+                for a in range(10):
+                    touches[p, 1 + a, lane] = found[a, n]
+                numbers[ROOM, lane] -= wall_law.energy(numbers[STIFFNESS, lane], sites[p, WEIGHT, lane], d)
 
 
 @kernel
