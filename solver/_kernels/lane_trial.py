@@ -4,7 +4,7 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import wall_law
-from solver._kernels.algebra import Three, apply_transposed, dot, load3, load9, minus, store3, store9, times
+from solver._kernels.algebra import Three, dot, load3, load9, minus, store3, store9, times
 from solver._kernels.data import CURRENT, TRIAL, Field
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.lane_block import (
@@ -47,8 +47,7 @@ def rollout(b: Block, base: int, spacing: float) -> None:
     energy, furthest = zero, zero
     for j in range(base, b.length.shape[0]):
         ahead, there, before = load9(old_r, j + 1), load3(old_x, j + 1), (old_u[j, 0], old_u[j, 1], zero)
-        moved = apply_transposed(ahead, minus(at, load3(old_x, j)))
-        turned = apply_transposed(ahead, relative(load9(old_r, j), frame))
+        moved, turned = minus(at, load3(old_x, j)), relative(load9(old_r, j), frame)
         v = limited(before, answer(b.gain, j, fraction, moved, turned))
         length, held = b.length[j], start > float(j)
         if anywhere(held):
