@@ -33,13 +33,13 @@ NUMBERS = (
     ),
 )
 """Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
-Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0); the
-energy up to which it is, and then how much of that the wall may still take. Answered: the fall foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
-that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
-look-ups."""
+Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0); the energy that it
+must not exceed, and then what the wall may still take of it. Answered: the fall foretold; whether all blocks were
+positive; the least pivot; energies of the trial; whether a joint of it went so far that a wall may lie between; largest
+moment left, and in the wire; first joint that the accepted step turned; counts of look-ups."""
 (
-    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
-    MOMENT, LARGEST, STILL, FULL, CLEAR,
+    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD,
+    JUMP, MOMENT, LARGEST, STILL, FULL, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
 """Columns of ``Block.site``: the last of four."""
@@ -52,8 +52,8 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of points
-    that are to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of
+    points to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
     eight that are.     found : (11,), see ``lane_field.look_up``.     number : see ``NUMBERS``.
     """
 

@@ -7,19 +7,48 @@ registers: a gather of single ones takes three times as long.
 import math
 from typing import Any
 
+from llvmlite import ir
+
 from solver._kernels.algebra import Six, Three
 from solver._kernels.data import Field
 from solver._kernels.field import Four, across, bends, cubic, indices, per_mm, slopes
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lanes import greater, lesser, rows, select
+from solver._kernels.lanes import LANES, WIDTH, arrays, extend, greater, lesser, select, typing, untyped
 
 Layer = tuple[Four, Four, Four]
+
+
+@extend.intrinsic
+def rows(_: Any, c: Any, at: Any, shift: Any) -> Any:
+    """Four float32 in a row for each lane, from the place ``at + shift`` of all on: four numbers in lanes."""
+
+    def lower(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
+        array = arrays.make_array(kinds.args[0])(context, builder, args[0])
+        four, word = ir.VectorType(ir.FloatType(), 4), ir.IntType(32)
+        places, loaded = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), WIDTH)), []
+        for lane in range(WIDTH):
+            place = builder.add(builder.extract_element(places, ir.Constant(word, lane)), args[2])
+            pointer = builder.bitcast(builder.gep(array.data, [place]), four.as_pointer())
+            loaded.append(builder.load(pointer, align=4))
+
+        def mixed(x: Any, y: Any, order: Any) -> Any:
+            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(word, WIDTH), order))
+
+        # lanes n and n + 4 in one register, then the transposition that such halves have instructions for
+        a, b, c, d = (mixed(loaded[n], loaded[n + 4], list(range(WIDTH))) for n in range(4))
+        result = []
+        for order in ([0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]):
+            one, two = mixed(a, b, order), mixed(c, d, order)
+            result += [mixed(one, two, [0, 1, 8, 9, 4, 5, 12, 13]), mixed(one, two, [2, 3, 10, 11, 6, 7, 14, 15])]
+        return context.make_tuple(builder, kinds.return_type, [builder.fpext(r, LANES.value) for r in result])
+
+    return typing.signature(untyped.UniTuple(LANES, 4), c, LANES, untyped.intp), lower
 
 
 @inlined
 def cell_of(f: float, last: float) -> float:
     """``field.clipped``, as a float; 0 where there is no number."""
-    return math.floor(lesser(greater(f, 0.0), last))
+    return math.floor(lesser(greater(f, 0.0), last))  # type: ignore[no-any-return]
 
 
 @inlined

@@ -127,7 +127,7 @@ def get_ready(team: Team, raw: Block, number: Any) -> int:
         if team.seats[lane].filled > base:
             fill_up(raw, team.first, lane, base, team.seats[lane].filled)
             team.seats[lane].filled = base
-    return base
+    return int(base)
 
 
 @kernel

@@ -159,7 +159,7 @@ def gather(raw: Block, which: int, at: int, count: int) -> tuple[int, int]:
 
 @inlined
 def keep(raw: Block, n: int) -> tuple[int, int]:
-    """Keep where the n-th point of those gathered is, and what is known of the distance there; return it and its lane."""
+    """Keep where the n-th gathered point is, and what is known of the distance there; return it and its lane."""
     point, sites, touches = raw.asked[2, n], raw.site, raw.touch[TRIAL]
     p, lane = point // WIDTH, point % WIDTH
     for a in range(3):

@@ -2,8 +2,8 @@
 
 A recursion along a wire waits for the result before, not for the processor, which does eight multiplications in the
 time of one. A kernel whose numbers are ``Lanes`` therefore does eight wires in lock-step in the time of one, and its
-source is that of one wire: sums and products, ``math.sqrt``, ``sin``, ``cos`` and ``floor``. Where one wire would take a branch,
-lanes may disagree: ``select`` takes a value for each lane, ``anywhere`` asks whether any lane needs the branch at all.
+source is that of one wire: sums and products, ``math.sqrt``, ``sin``, ``cos`` and ``floor``. Where one wire would take
+a branch, lanes may disagree: ``select`` takes a value for each, ``anywhere`` asks whether any needs the branch at all.
 Both are plain Python for plain numbers. A vector of four, a quad, is a row of the wall's coefficients.
 """
 
@@ -229,33 +229,6 @@ def four(c: Any, i: int, j: int, k: int) -> Any:
 @extend.overload(four, jit_options={"forceinline": True}, strict=False)
 def _four_of(c: Any, i: Any, j: Any, k: Any) -> Any:
     return lambda c, i, j, k: _four(c, i, j, k)
-
-
-@extend.intrinsic
-def rows(_: Any, c: Any, at: Any, shift: Any) -> Any:
-    """Four float32 in a row for each lane, from the place ``at + shift`` of all on: four numbers in lanes."""
-
-    def lower(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-        array = arrays.make_array(kinds.args[0])(context, builder, args[0])
-        four, word = ir.VectorType(ir.FloatType(), 4), ir.IntType(32)
-        places, loaded = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), WIDTH)), []
-        for lane in range(WIDTH):
-            place = builder.add(builder.extract_element(places, ir.Constant(word, lane)), args[2])
-            pointer = builder.bitcast(builder.gep(array.data, [place]), four.as_pointer())
-            loaded.append(builder.load(pointer, align=4))
-
-        def mixed(x: Any, y: Any, order: Any) -> Any:
-            return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(word, WIDTH), order))
-
-        # lanes n and n + 4 in one register, then the transposition that such halves have instructions for
-        a, b, c, d = (mixed(loaded[n], loaded[n + 4], list(range(WIDTH))) for n in range(4))
-        result = []
-        for order in ([0, 8, 1, 9, 4, 12, 5, 13], [2, 10, 3, 11, 6, 14, 7, 15]):
-            one, two = mixed(a, b, order), mixed(c, d, order)
-            result += [mixed(one, two, [0, 1, 8, 9, 4, 5, 12, 13]), mixed(one, two, [2, 3, 10, 11, 6, 7, 14, 15])]
-        return context.make_tuple(builder, kinds.return_type, [builder.fpext(r, LANES.value) for r in result])
-
-    return typing.signature(untyped.UniTuple(LANES, 4), c, LANES, untyped.intp), lower
 
 
 @extend.intrinsic
