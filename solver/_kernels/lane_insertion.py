@@ -17,10 +17,10 @@ from solver._kernels.insertion import arrived, judge, likeness, next_place, prep
 from solver._kernels.lane_block import Block
 from solver._kernels.lane_decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
 from solver._kernels.lane_relax import POOL, Team, do_round, hand_over, take_over
+from solver._kernels.lane_start import Desk, chosen_start
 from solver._kernels.lanes import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
 from solver._kernels.newton_method import rests
-from solver._kernels.start import extrapolate_start
 
 
 class Plan(NamedTuple):
@@ -57,7 +57,8 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
         raw.asked, in_lanes(raw.found), in_lanes(raw.number),
     )  # fmt: skip
     plan, raw, (lanes, nows, counts, seats) = bare(plan), bare(raw), bare(records)
-    team = Team(wires, lanes, nows, counts, seats, bare(first), wires[0].problem.field)
+    desk = Desk(raw.asked, raw.found, in_lanes(raw.found))
+    team = Team(wires, lanes, nows, counts, seats, bare(first), desk, wires[0].problem.field)
     for w in range(POOL):
         if lanes[w].phase == NEW:
             lanes[w].goal, lanes[w].tolerance = -1, wires[w].limits.tolerance
@@ -133,17 +134,18 @@ def proceed(team: Team, plan: Plan, w: int) -> None:
         me.depth, me.roll = next_place(wire, depth, roll)
         me.k = set_out(wire, me.depth, me.roll)
         me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
-        if me.k > 0 and start_relaxing(me, now, wire, problem, report):
+        if me.k > 0 and start_relaxing(me, now, wire, team.desk, report):
             me.stiffest, me.phase = stiffest(problem.chain, me.k), WAITING
             return
         end_step(me, now, wire, problem)
 
 
 @merged
-def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) -> bool:
+def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> bool:
     """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
-    at, k, limits, counters = wire.place[0], me.k, wire.limits, problem.scratch.counters[0]
-    start = extrapolate_start(problem, CURRENT, k, likeness(problem, at, me.depth, me.roll), at.energy)
+    at, k, limits, problem = wire.place[0], me.k, wire.limits, wire.problem
+    counters = problem.scratch.counters[0]
+    start = chosen_start(problem, desk, k, likeness(problem, at, me.depth, me.roll), at.energy)
     counters.relaxations_without_friction += 1
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))

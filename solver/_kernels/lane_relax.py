@@ -50,6 +50,7 @@ from solver._kernels.lane_decide import (
     take,
 )
 from solver._kernels.lane_newton import costate, sweep
+from solver._kernels.lane_start import Desk
 from solver._kernels.lane_trial import accept, rollout, wall_energy
 from solver._kernels.lanes import WIDTH
 from solver._kernels.newton import costate as costate_alone
@@ -67,7 +68,7 @@ class Team(NamedTuple):
 
     wires : POOL handles.     lanes, nows, counts : (POOL + 1,) records of them, ``lane_block.LANE``, ``DESCENT`` and
     ``COUNTERS`` of ``records``; the last is that of no wire.     seats : (WIDTH,) records ``lane_block.SEAT``.
-    first : (size + 2,) first look-up point of each node.
+    first : (size + 2,) first look-up point of each node.     desk : room for the look-ups of one wire.
     """
 
     wires: Any
@@ -76,6 +77,7 @@ class Team(NamedTuple):
     counts: Any
     seats: Any
     first: Any
+    desk: Desk
     field: Field
 
 
