@@ -30,8 +30,7 @@ conversions: Any = typeconv
 WIDTH = 8
 """Lanes: what AVX-512 holds. Where the processor's vectors are shorter the compiler takes two or four for each."""
 BITS = ir.VectorType(ir.IntType(1), WIDTH)
-CONTRACT = ("contract",)
-"""As in ``flags.FAST``."""
+CONTRACT = ("contract",)  # as in ``flags.FAST``
 
 
 class VectorType(untyped.Type):  # type: ignore[misc]
