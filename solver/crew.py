@@ -1,4 +1,4 @@
-"""A crew: eight lanes that take insertions from a queue, eight at a time; other threads' crews take from it too."""
+"""A crew: eight lanes that work for a pool of insertions from a queue; other threads' crews take from it too."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import data, records
-from solver._kernels.lane_block import LANE, SHAPES, Block
+from solver._kernels.lane_block import LANE, SEAT, SHAPES, Block
 from solver._kernels.lane_decide import NEW
 from solver._kernels.lane_insertion import Plan, advance_together
+from solver._kernels.lane_relax import POOL
 from solver._kernels.lanes import WIDTH, room
 from solver.insertion import Insertion
 from solver.solution import Solution, Status
@@ -47,40 +48,48 @@ def _next(queue: deque[Job]) -> Job | None:
 
 
 class Crew:
-    """Room for eight wires in lanes, and for what they find. Whoever makes it holds the insertions."""
+    """Room for eight wires in lanes, and for what a pool of them finds. Whoever makes it holds the insertions.
 
-    def __init__(self, jobs: Sequence[Job]) -> None:
+    share : how many of the jobs this crew is to do, about.
+    """
+
+    def __init__(self, jobs: Sequence[Job], share: int) -> None:
         nodes = [job.nodes() for job in jobs]
         size = max(max(n, default=2) for n in nodes) - 1
         self.first = first_points(jobs[0].insertion._work, max(size, 1))
-        self.plan = _plan(max(map(len, nodes)), max(map(sum, nodes)))
+        # in pools of one size: a small one would leave lanes idle
+        self.most = -(-share // -(-share // POOL))
+        self.plan = _plan(self.most, max(map(len, nodes)), max(map(sum, nodes)))
         axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1])}
-        self.block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
+        block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
+        # one more, which the last of a list is followed by
+        self.block = block._replace(asked=np.zeros((3, WIDTH * axes["p"] + 1 + WIDTH), np.int64))
         kinds = LANE, records.DESCENT, records.COUNTERS
-        self.notes = tuple(np.zeros(WIDTH, kind).view(np.recarray) for kind in kinds)
-        self.wires = [jobs[0].insertion._work.handle] * WIDTH
+        self.notes = tuple(np.zeros(POOL + 1, kind).view(np.recarray) for kind in kinds)
+        self.seats = np.zeros(WIDTH, SEAT).view(np.recarray)
+        self.wires = [jobs[0].insertion._work.handle] * POOL
 
     def lead(self, queue: deque[Job]) -> None:
         """Do jobs of a queue that others may take from as well until none is left."""
-        while jobs := [job for job in (_next(queue) for _ in range(WIDTH)) if job is not None]:
-            for lane, job in enumerate(jobs):
-                self._start(lane, job)
-            # a free lane waits for the others: a wire at another depth would make all of them sweep its length
-            advance_together(tuple(self.wires), self.plan, self.notes, self.block, self.first)
-            for lane, job in enumerate(jobs):
-                job.found.extend(_solutions(self.plan, lane, job.insertion.wire.radius_mm))
+        while jobs := [job for job in (_next(queue) for _ in range(self.most)) if job is not None]:
+            for w, job in enumerate(jobs):
+                self._start(w, job)
+            notes = (*self.notes, self.seats)
+            advance_together(tuple(self.wires), self.plan, notes, self.block, self.first)
+            for w, job in enumerate(jobs):
+                job.found.extend(_solutions(self.plan, w, job.insertion.wire.radius_mm))
 
-    def _start(self, lane: int, job: Job) -> None:
-        """Put a wire into a lane."""
+    def _start(self, w: int, job: Job) -> None:
+        """Put a wire into the pool."""
         job.insertion._begin(job.depths, job.rolls)
-        self.wires[lane] = job.insertion._work.handle
+        self.wires[w] = job.insertion._work.handle
         for note in self.notes:
-            note[lane] = np.zeros((), note.dtype)
-        self.notes[0]["phase"][lane] = NEW
+            note[w] = np.zeros((), note.dtype)
+        self.notes[0]["phase"][w] = NEW
         count, nodes = len(job.depths), job.nodes()
-        self.plan.count[lane] = count
-        self.plan.goal[lane, :count] = np.column_stack([job.depths, job.rolls])
-        self.plan.row[lane, :count] = np.cumsum(nodes) - nodes
+        self.plan.count[w] = count
+        self.plan.goal[w, :count] = np.column_stack([job.depths, job.rolls])
+        self.plan.row[w, :count] = np.cumsum(nodes) - nodes
 
 
 def first_points(work: Workspace, size: int) -> NDArray[np.int64]:
@@ -91,26 +100,26 @@ def first_points(work: Workspace, size: int) -> NDArray[np.int64]:
     return np.concatenate([[0, 0], np.cumsum(counts)])
 
 
-def _plan(most: int, rows: int) -> Plan:
-    """Room for what eight wires find at up to so many depths, with so many joints in all."""
-    goal, row, count = np.zeros((WIDTH, most, 2)), np.zeros((WIDTH, most), np.int64), np.zeros(WIDTH, np.int64)
-    x, r, force = np.zeros((WIDTH, rows, 3)), np.zeros((WIDTH, rows, 3, 3)), np.zeros((WIDTH, rows, 3))
+def _plan(wires: int, most: int, rows: int) -> Plan:
+    """Room for what some wires find at up to so many depths, with so many joints in all."""
+    goal, row, count = np.zeros((wires, most, 2)), np.zeros((wires, most), np.int64), np.zeros(wires, np.int64)
+    x, r, force = np.zeros((wires, rows, 3)), np.zeros((wires, rows, 3, 3)), np.zeros((wires, rows, 3))
     kinds = (records.PLACE, records.REPORT, records.ENERGIES, records.COUNTERS)
-    place, report, energies, counters = (np.zeros((WIDTH, most), kind).view(np.recarray) for kind in kinds)
-    ended = np.zeros((WIDTH, most, 3), np.int64)
-    snaps, blank = np.zeros((WIDTH, most, SNAPS_KEPT), records.SNAP), np.zeros(1, records.COUNTERS)
+    place, report, energies, counters = (np.zeros((wires, most), kind).view(np.recarray) for kind in kinds)
+    ended = np.zeros((wires, most, 3), np.int64)
+    snaps, blank = np.zeros((wires, most, SNAPS_KEPT), records.SNAP), np.zeros(1, records.COUNTERS)
     return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, snaps, blank)
 
 
-def _solutions(plan: Plan, lane: int, radius_mm: float) -> list[Solution]:
-    """What a lane found at its depths."""
+def _solutions(plan: Plan, w: int, radius_mm: float) -> list[Solution]:
+    """What a wire found at its depths."""
     names = "place", "report", "energies", "counters", "ended", "row"
-    noted = zip(*(getattr(plan, name)[lane, : plan.count[lane]].tolist() for name in names), strict=True)
+    noted = zip(*(getattr(plan, name)[w, : plan.count[w]].tolist() for name in names), strict=True)
     found = []
     for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
-        # copies: the next wire of this lane comes to lie there
-        arrays = [a[lane, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
+        # copies: the next wire comes to lie there
+        arrays = [a[w, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
         depth, roll, *_ = notes[0]
         ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, radius_mm
-        found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[lane, n], ended))
+        found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[w, n], ended))
     return found

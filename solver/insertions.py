@@ -32,7 +32,7 @@ class Insertions:
     """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
 
     insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
-    from one another by ``VesselWall.like`` go in lock-step, WIDTH at a time; each comes to lie as by itself, to
+    from one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes; each comes to lie as by itself, to
     rounding (1e-9 mm, away from snaps); straight wires, which by themselves are swept without their roll, in 1 % of
     depths to what the tolerance of a relaxation leaves (1e-5 mm). With friction, a finite torsional stiffness, a
     sampled hull, a shaft, a weight, no wall or the closed form each goes by itself.
@@ -86,8 +86,9 @@ def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
     """What to do in threads for jobs of one kind."""
     if len(kind) == 1:
         return [partial(go_alone, kind[0])]
-    crews = [Crew(kind) for _ in range(min(threads, -(-len(kind) // WIDTH)))]
-    return [partial(crew.lead, kind) for crew in crews]
+    crews = min(threads, -(-len(kind) // WIDTH))
+    teams = [Crew(kind, -(-len(kind) // crews)) for _ in range(crews)]
+    return [partial(crew.lead, kind) for crew in teams]
 
 
 def _one_each(name: str, values: Any, count: int) -> list[Any]:

@@ -177,8 +177,14 @@ def spline(c: Any, cell: Cell) -> tuple[Four, Six]:
 
 @inlined
 def jet_at(c: Any, m: Any, cell: Cell) -> tuple[Four, Six]:
-    """``spline`` with its derivatives per mm: g <- Mᵀ g, H <- Mᵀ H M; m is a field's to_index."""
-    (phi, g0, g1, g2), h = spline(c, cell)
+    """``spline`` with its derivatives per mm; m is a field's to_index."""
+    return per_mm(m, spline(c, cell))
+
+
+@inlined
+def per_mm(m: Any, jet: tuple[Four, Six]) -> tuple[Four, Six]:
+    """Derivatives per mm from those per index: g <- Mᵀ g, H <- Mᵀ H M; m is a field's to_index."""
+    (phi, g0, g1, g2), h = jet
     turn = (m[0, 0], m[1, 0], m[2, 0], m[0, 1], m[1, 1], m[2, 1], m[0, 2], m[1, 2], m[2, 2])
     g0, g1, g2 = apply(turn, (g0, g1, g2))
     return (phi, g0, g1, g2), conjugate(turn, h)

@@ -16,7 +16,7 @@ from solver._kernels.flags import inlined, kernel
 from solver._kernels.records import record
 
 NUMBERS = (
-    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted"),
+    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted", "room"),
     *(
         "decrement",
         "definite",
@@ -29,18 +29,17 @@ NUMBERS = (
         "largest",
         "still",
         "full",
-        "cheap",
         "clear",
     ),
 )
 """Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
-Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0). Answered: the fall
-foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
-that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
-look-ups."""
+Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0); the energy that it
+must not exceed, and then what the wall may still take of it. Answered: the fall foretold; whether all blocks were
+positive; the least pivot; energies of the trial; whether a joint of it went so far that a wall may lie between; largest
+moment left, and in the wire; first joint that the accepted step turned; counts of look-ups."""
 (
-    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD, JUMP,
-    MOMENT, LARGEST, STILL, FULL, CHEAP, CLEAR,
+    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD,
+    JUMP, MOMENT, LARGEST, STILL, FULL, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
 """Columns of ``Block.site``: the last of four."""
@@ -53,8 +52,9 @@ class Block(NamedTuple):
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (4,) a place that is
-    looked up, and how clear of the wall it was.     number : see ``NUMBERS``.
+    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of
+    points to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
+    eight that are.     found : (11,), see ``lane_field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -73,29 +73,32 @@ class Block(NamedTuple):
     torque: Any
     turned: Any
     asked: Any
+    found: Any
     number: Any
 
 
 SHAPES = (
     *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
-    *("3", "3", "3", "2 3", "4", str(len(NUMBERS))),
+    *("3", "3", "3", "2 3", "", "11", str(len(NUMBERS))),
 )
-"""Of the arrays of a block: k joints, n nodes, p points."""
+"""Of the arrays of a block: k joints, n nodes, p points; what is asked is no numbers in lanes."""
 LANE = record(
-    *((name, float) for name in ("depth", "roll", "clamped", "limit", "tolerance", "stiffest", "scale", "noise")),
+    *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),
     *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load")),
-    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "filled")),
+    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations")),
 )
-"""Where a lane is.
+"""Where a wire is.
 
 depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise : see
 ``energy.scale_of``.     fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
 before : energy that the iteration began with.     bending, wall, load : energies of the current state.
 limit, iterations : of this depth.     phase : see ``lane_relax``.     goal : index of the depth that it is on its way
 to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.
-outcome : how its relaxation ended.     filled : joints of length 0 that are in place, at the roll ``clamped``.
+outcome : how its relaxation ended.
 """
+SEAT = record(("wire", np.int64), ("filled", np.int64))
+"""Which wire a lane works for, POOL is none; and the block's joint from which on it is in place, see ``fill_up``."""
 
 
 @kernel
@@ -111,8 +114,6 @@ def put_in(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
         b.u[CURRENT, to, 0, lane], b.u[CURRENT, to, 1, lane] = state.u[CURRENT, j, 0], state.u[CURRENT, j, 1]
     for n in range(k + 1):
         put_node(b, lane, shift + n, load3(state.x[CURRENT], n), load9(state.r[CURRENT], n))
-    for p in range(first[shift + 1]):
-        b.site[p, WEIGHT, lane] = b.touch[CURRENT, p, 0, lane] = 0.0
     for p in range(chain.first[k + 1]):
         to, d = first[shift + 1] + p, state.penetration[CURRENT, p]
         b.site[to, ALONG, lane], b.site[to, WEIGHT, lane] = chain.offset[p, 2], chain.weight[p]
@@ -136,14 +137,19 @@ def put_node(b: Block, lane: int, n: int, x: Any, r: Any) -> None:
 
 
 @kernel
-def fill_up(b: Block, lane: int, problem: Problem, start: int, stop: int) -> None:
-    """Put joints of length 0 before a wire."""
-    x, r = load3(problem.state.x[CURRENT], 0), load9(problem.state.r[CURRENT], 0)
+def fill_up(b: Block, first: Any, lane: int, start: int, stop: int) -> None:
+    """Put joints of length 0 before a wire that begins at joint ``stop``, from joint ``start`` on."""
+    x = (b.x[CURRENT, stop, 0, lane], b.x[CURRENT, stop, 1, lane], b.x[CURRENT, stop, 2, lane])
     for j in range(start, stop):
         b.length[j, lane] = b.hold[j, lane] = b.sine[j, lane] = 0.0
         b.bend[j, lane] = b.cosine[j, lane] = 1.0
         b.u[CURRENT, j, 0, lane] = b.u[CURRENT, j, 1, lane] = 0.0
-        put_node(b, lane, j, x, r)
+        for a in range(3):
+            b.x[CURRENT, j, a, lane] = x[a]
+            for c in range(3):
+                b.r[CURRENT, j, a, c, lane] = b.r[CURRENT, stop, a, c, lane]
+    for p in range(first[start + 1], first[stop + 1]):
+        b.site[p, WEIGHT, lane] = b.touch[CURRENT, p, 0, lane] = 0.0
 
 
 @kernel

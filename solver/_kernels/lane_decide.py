@@ -26,10 +26,10 @@ from solver._kernels.lane_block import (
 )
 from solver._kernels.newton_method import whole
 
-IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW = range(13)
-"""Phases of a lane: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
+IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW, WAITING = range(14)
+"""Phases of a wire: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
 of its search, or the last one; has taken one, and may be at rest by it; may be at a saddle; goes on alone; its
-relaxation has ended, in the lane or in the wire; a wire is to begin."""
+relaxation has ended, in the lane or in the wire; it is to begin; has a start, but no lane yet."""
 
 
 @inlined
@@ -69,14 +69,18 @@ def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> Non
 
 
 @inlined
-def leads_down(me: Any, now: Any, number: Any, lane: int) -> bool:
-    """Whether a trial's energy is low enough, as ``newton_method.search`` and ``last_step`` ask."""
-    trial = number[BENDING, lane] + number[WALL, lane] + number[LOAD, lane]
-    lower = trial <= now.energy
+def most_energy(me: Any, now: Any) -> float:
+    """The energy that a trial must not exceed, as ``newton_method.search`` and ``last_step`` ask."""
     if me.phase == LAST:
-        return bool(trial <= now.energy + me.noise)
-    enough = trial <= now.energy - tol.SUFFICIENT * me.fraction * me.decrement
-    return bool(enough or (me.decrement <= me.noise and lower))
+        return now.energy + me.noise  # type: ignore[no-any-return]
+    enough = now.energy - tol.SUFFICIENT * me.fraction * me.decrement
+    return now.energy if me.decrement <= me.noise else enough  # type: ignore[no-any-return]
+
+
+@inlined
+def leads_down(me: Any, now: Any, number: Any, lane: int) -> bool:
+    """Whether a trial's energy is low enough."""
+    return bool(number[BENDING, lane] + number[WALL, lane] + number[LOAD, lane] <= most_energy(me, now))
 
 
 @kernel

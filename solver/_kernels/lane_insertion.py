@@ -14,22 +14,22 @@ from solver._kernels.energy import energy_of, stiffest
 from solver._kernels.flags import merged, owner, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
-from solver._kernels.lane_block import CHEAP, CLEAR, FULL, REACH, STIFFNESS, Block, fill_up
-from solver._kernels.lane_decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP
-from solver._kernels.lane_relax import Team, do_round, hand_over, take_over
+from solver._kernels.lane_block import Block
+from solver._kernels.lane_decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
+from solver._kernels.lane_relax import POOL, Team, do_round, hand_over, take_over
+from solver._kernels.lane_start import Desk, chosen_start
 from solver._kernels.lanes import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
 from solver._kernels.newton_method import rests
-from solver._kernels.start import extrapolate_start
 
 
 class Plan(NamedTuple):
-    """Where the wires go, and room for what they find there; the first axis is the lane, the second the depth.
+    """Where the wires go, and room for what they find there; the first axis is the wire, the second the depth.
 
-    goal : (WIDTH, d, 2) depth, mm, and roll, degrees.     count : (WIDTH,) how many of them.
-    row : (WIDTH, d) where a solution's joints begin in x, r and force, (WIDTH, rows, ...).
-    ended : (WIDTH, d, 3) outcome, iterations, segments.     place, report, energies, counters : (WIDTH, d) records.
-    snaps : (WIDTH, d, n) records.     blank : (1,), counters at 0.
+    goal : (POOL, d, 2) depth, mm, and roll, degrees.     count : (POOL,) how many of them.
+    row : (POOL, d) where a solution's joints begin in x, r and force, (POOL, rows, ...).
+    ended : (POOL, d, 3) outcome, iterations, segments.     place, report, energies, counters : (POOL, d) records.
+    snaps : (POOL, d, n) records.     blank : (1,), counters at 0.
     """
 
     goal: Any
@@ -49,88 +49,103 @@ class Plan(NamedTuple):
 
 @released
 def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any) -> None:
-    """Lead each wire whose lane is NEW through all its depths."""
+    """Lead each wire that is NEW through all its depths."""
     block = Block(
         in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
         in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
         in_lanes(raw.touch), in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque), in_lanes(raw.turned),
-        in_lanes(raw.asked), in_lanes(raw.number),
+        raw.asked, in_lanes(raw.found), in_lanes(raw.number),
     )  # fmt: skip
-    plan, raw, (lanes, nows, counts) = bare(plan), bare(raw), bare(records)
-    team = Team(wires, lanes, nows, counts, bare(first), wires[0].problem.field)
-    number = raw.number
-    left = 0
+    plan, raw, (lanes, nows, counts, seats) = bare(plan), bare(raw), bare(records)
+    desk = Desk(raw.asked, raw.found, in_lanes(raw.found))
+    team = Team(wires, lanes, nows, counts, seats, bare(first), desk, wires[0].problem.field)
+    for w in range(POOL):
+        if lanes[w].phase == NEW:
+            lanes[w].goal, lanes[w].tolerance = -1, wires[w].limits.tolerance
+            next_goal(team, plan, w)
+            proceed(team, plan, w)
+    working = 0
     for lane in range(WIDTH):
-        if lanes[lane].phase == NEW:
-            set_up(team, number, lane)
-            next_goal(team, plan, lane)
-            proceed(team, plan, raw, lane)
-        left += lanes[lane].phase != IDLE
-    while left > 0:
-        do_round(team, block, raw, number)
-        left = 0
+        working += take_next(team, raw, lane)
+    while working > 0:
+        do_round(team, block, raw, raw.number)
         for lane in range(WIDTH):
-            if lanes[lane].phase == DONE or lanes[lane].phase == RESTED:
-                proceed(team, plan, raw, lane)
-            left += lanes[lane].phase != IDLE
+            w = seats[lane].wire
+            if lanes[w].phase == DONE or lanes[w].phase == RESTED:
+                finish(team, plan, raw, lane)
+                working += take_next(team, raw, lane) - 1
 
 
 @owner
-def set_up(team: Team, number: Any, lane: int) -> None:
-    """Put into a lane what stays the same all the way."""
-    me, wire = team.lanes[lane], team.wires[lane]
-    number[STIFFNESS, lane], number[REACH, lane] = wire.problem.stiffness, wire.problem.chain.reach
-    me.goal, me.tolerance = -1, wire.limits.tolerance
-
-
-@owner
-def next_goal(team: Team, plan: Plan, lane: int) -> None:
-    """Set the next depth as the goal, or let the lane idle where there is none."""
-    me, wire = team.lanes[lane], team.wires[lane]
+def next_goal(team: Team, plan: Plan, w: int) -> None:
+    """Set the next depth as the goal of a wire, or let it idle where there is none."""
+    me, wire = team.lanes[w], team.wires[w]
     me.goal += 1
-    me.phase, me.k, team.nows[lane].first_free = IDLE, 0, 0
-    if me.goal < plan.count[lane]:
+    me.phase, me.k, team.nows[w].first_free = IDLE, 0, 0
+    if me.goal < plan.count[w]:
         wire.problem.scratch.counters[0] = plan.blank[0]
-        me.limit = prepare(wire, plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1])
+        me.limit = prepare(wire, plan.goal[w, me.goal, 0], plan.goal[w, me.goal, 1])
         me.outcome, me.iterations, me.phase = data.CONVERGED, 0, READY
 
 
 @owner
-def proceed(team: Team, plan: Plan, raw: Block, lane: int) -> None:
-    """End a relaxation, and go on until the next step has to be relaxed or nothing is left to do."""
-    me, wire = team.lanes[lane], team.wires[lane]
+def take_next(team: Team, raw: Block, lane: int) -> int:
+    """Give a lane the shortest wire that waits for one; return 0 where none does.
+
+    So all go in at the same pace: the gains of eight wires take as long as those of the longest.
+    """
+    best = POOL
+    for w in range(POOL):
+        if team.lanes[w].phase == WAITING and (best == POOL or team.lanes[w].k < team.lanes[best].k):
+            best = w
+    team.seats[lane].wire, team.seats[lane].filled = best, 0
+    if best == POOL:
+        return 0
+    me, wire = team.lanes[best], team.wires[best]
+    take_over(team, raw, lane, wire.problem, wire.report[0])
+    me.phase = SWEEP if me.allowed > 0 else ALONE
+    return 1
+
+
+@owner
+def finish(team: Team, plan: Plan, raw: Block, lane: int) -> None:
+    """End the relaxation in a lane, and lead its wire to the start of the next one."""
+    w = team.seats[lane].wire
+    me, wire = team.lanes[w], team.wires[w]
+    problem = wire.problem
+    if me.phase == RESTED:
+        hand_over(team, raw, lane, problem, wire.report[0])
+    end_step(me, problem.scratch.descent[0], wire, problem)
+    proceed(team, plan, w)
+
+
+@owner
+def proceed(team: Team, plan: Plan, w: int) -> None:
+    """Lead a wire on until the next step has to be relaxed or nothing is left to do."""
+    me, wire = team.lanes[w], team.wires[w]
     problem, report, at = wire.problem, wire.report[0], wire.place[0]
     now = problem.scratch.descent[0]
-    relaxed = me.phase == DONE or me.phase == RESTED
-    if me.phase == RESTED:
-        hand_over(team, raw, lane, problem, report)
     while me.phase != IDLE:
-        if relaxed:
-            end_step(me, now, wire, problem)
-        depth, roll = plan.goal[lane, me.goal, 0], plan.goal[lane, me.goal, 1]
-        relaxed = False
+        depth, roll = plan.goal[w, me.goal, 0], plan.goal[w, me.goal, 1]
         if me.phase == STOPPED or arrived(at, depth, roll):
-            write_down(team, plan, raw.number, lane)
-            next_goal(team, plan, lane)
+            write_down(team, plan, w)
+            next_goal(team, plan, w)
             continue
         me.depth, me.roll = next_place(wire, depth, roll)
         me.k = set_out(wire, me.depth, me.roll)
         me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
-        if me.k > 0 and start_relaxing(me, now, wire, problem, report):
-            shift = raw.length.shape[0] - me.k
-            fill_up(raw, lane, problem, min(me.filled, shift) if me.roll == me.clamped else 0, shift)
-            take_over(team, raw, lane, problem, report)
-            me.filled, me.clamped, me.stiffest = shift, me.roll, stiffest(problem.chain, me.k)
-            me.phase = SWEEP if me.allowed > 0 else ALONE
+        if me.k > 0 and start_relaxing(me, now, wire, team.desk, report):
+            me.stiffest, me.phase = stiffest(problem.chain, me.k), WAITING
             return
-        relaxed = True
+        end_step(me, now, wire, problem)
 
 
 @merged
-def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) -> bool:
+def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> bool:
     """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
-    at, k, limits, counters = wire.place[0], me.k, wire.limits, problem.scratch.counters[0]
-    start = extrapolate_start(problem, at, k, likeness(problem, at, me.depth, me.roll))
+    at, k, limits, problem = wire.place[0], me.k, wire.limits, wire.problem
+    counters = problem.scratch.counters[0]
+    start = chosen_start(problem, desk, at, k, likeness(problem, at, me.depth, me.roll))
     counters.relaxations_without_friction += 1
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
@@ -147,7 +162,7 @@ def start_relaxing(me: Any, now: Any, wire: Any, problem: Problem, report: Any) 
     return finite and not resting
 
 
-@merged
+@owner
 def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
     """Keep a step or take it back, as in ``minimise.relax_with_friction``, ``insertion.step`` and ``go``."""
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
@@ -160,31 +175,29 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
 
 
 @owner
-def write_down(team: Team, plan: Plan, number: Any, lane: int) -> None:
-    """Write down the wire at a depth."""
-    me, wire = team.lanes[lane], team.wires[lane]
+def write_down(team: Team, plan: Plan, w: int) -> None:
+    """Write down a wire at a depth."""
+    me, wire = team.lanes[w], team.wires[w]
     state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
     wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)
     k = sum_up(wire, 0)
-    counted = team.counts[lane]
+    counted = team.counts[w]
     counters.sweeps += counted.sweeps
     counters.rollouts += counted.rollouts
     counters.levenberg += counted.levenberg
     counters.joints_left_still += counted.joints_left_still
     counters.starts_at_rest += counted.starts_at_rest
-    counters.wall_look_ups += int(number[FULL, lane])
-    counters.wall_look_ups_cheap += int(number[CHEAP, lane])
-    counters.wall_look_ups_proven_unnecessary += int(number[CLEAR, lane])
-    number[FULL, lane] = number[CHEAP, lane] = number[CLEAR, lane] = 0.0
-    team.counts[lane] = plan.blank[0]
-    plan.ended[lane, goal, 0], plan.ended[lane, goal, 1], plan.ended[lane, goal, 2] = me.outcome, me.iterations, k
-    plan.place[lane, goal], plan.report[lane, goal] = wire.place[0], wire.report[0]
-    plan.energies[lane, goal], plan.counters[lane, goal] = state.energies[CURRENT], counters
+    counters.wall_look_ups += counted.wall_look_ups
+    counters.wall_look_ups_proven_unnecessary += counted.wall_look_ups_proven_unnecessary
+    team.counts[w] = plan.blank[0]
+    plan.ended[w, goal, 0], plan.ended[w, goal, 1], plan.ended[w, goal, 2] = me.outcome, me.iterations, k
+    plan.place[w, goal], plan.report[w, goal] = wire.place[0], wire.report[0]
+    plan.energies[w, goal], plan.counters[w, goal] = state.energies[CURRENT], counters
     for n in range(wire.place[0].snaps):
-        plan.snaps[lane, goal, n] = wire.problem.scratch.snaps[n]
-    x, r, row = state.x[CURRENT], state.r[CURRENT], plan.row[lane, goal]
+        plan.snaps[w, goal, n] = wire.problem.scratch.snaps[n]
+    x, r, row = state.x[CURRENT], state.r[CURRENT], plan.row[w, goal]
     for n in range(k + 1):
         for a in range(3):
-            plan.x[lane, row + n, a], plan.force[lane, row + n, a] = x[n, a], wire.force[n, a]
+            plan.x[w, row + n, a], plan.force[w, row + n, a] = x[n, a], wire.force[n, a]
             for c in range(3):
-                plan.r[lane, row + n, a, c] = r[n, a, c]
+                plan.r[w, row + n, a, c] = r[n, a, c]

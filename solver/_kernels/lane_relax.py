@@ -13,7 +13,24 @@ from solver._kernels.crossing import free_fraction
 from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
 from solver._kernels.flags import kernel, merged, owner
 from solver._kernels.forces import copy_state
-from solver._kernels.lane_block import ACCEPTED, ACTIVE, DAMPING, FRACTION, JUMP, MOMENT, START, Block, put_in, take_out
+from solver._kernels.lane_block import (
+    ACCEPTED,
+    ACTIVE,
+    CLEAR,
+    DAMPING,
+    FRACTION,
+    FULL,
+    JUMP,
+    MOMENT,
+    REACH,
+    ROOM,
+    START,
+    STIFFNESS,
+    Block,
+    fill_up,
+    put_in,
+    take_out,
+)
 from solver._kernels.lane_decide import (
     ALONE,
     DONE,
@@ -27,15 +44,20 @@ from solver._kernels.lane_decide import (
     after_sweep,
     finish_taking,
     leads_down,
+    most_energy,
     next_iteration,
     shorten,
     take,
 )
 from solver._kernels.lane_newton import costate, sweep
+from solver._kernels.lane_start import Desk
 from solver._kernels.lane_trial import accept, rollout, wall_energy
 from solver._kernels.lanes import WIDTH
 from solver._kernels.newton import costate as costate_alone
 
+POOL = 32
+"""Wires that eight lanes work for: a lane whose wire is at rest takes another one, for all to be at about the same
+depth, and only the last few steps of so many wires find lanes idle."""
 WORTH_ANOTHER = 3
 """Lanes whose steps failed that are worth another trial at once: it costs a third of a round, and a lane that waits
 loses an eighth of one."""
@@ -44,15 +66,18 @@ loses an eighth of one."""
 class Team(NamedTuple):
     """Wires side by side.
 
-    wires : a handle for each lane.     lanes, nows, counts : (WIDTH,) records ``lane_block.LANE``, ``DESCENT`` and
-    ``COUNTERS`` of ``records``.     first : (size + 2,) first look-up point of each node.
+    wires : POOL handles.     lanes, nows, counts : (POOL + 1,) records of them, ``lane_block.LANE``, ``DESCENT`` and
+    ``COUNTERS`` of ``records``; the last is that of no wire.     seats : (WIDTH,) records ``lane_block.SEAT``.
+    first : (size + 2,) first look-up point of each node.     desk : room for the look-ups of one wire.
     """
 
     wires: Any
     lanes: Any
     nows: Any
     counts: Any
+    seats: Any
     first: Any
+    desk: Desk
     field: Field
 
 
@@ -60,45 +85,62 @@ class Team(NamedTuple):
 @merged
 def do_round(team: Team, block: Block, raw: Block, number: Any) -> None:
     """Take every lane that is not idle one step further. number : that of the raw block."""
-    lanes, nows, counts, first = team.lanes, team.nows, team.counts, team.first
-    size = first.size - 2
-    base = size
-    for lane in range(WIDTH):
-        k, now = lanes[lane].k, nows[lane]
-        base = min(base, size - k)
-        number[DAMPING, lane], number[START, lane] = now.damping, size - k + now.first_free
+    lanes, nows, counts, seats, first = team.lanes, team.nows, team.counts, team.seats, team.first
+    base = get_ready(team, raw, number)
     sweep(block, first, base)
     for lane in range(WIDTH):
-        if lanes[lane].phase == SWEEP:
-            after_sweep(lanes[lane], nows[lane], counts[lane], number, lane)
-    trying = ask_for_trials(lanes, number)
+        w = seats[lane].wire
+        if lanes[w].phase == SWEEP:
+            after_sweep(lanes[w], nows[w], counts[w], number, lane)
+    trying = ask_for_trials(team, number)
     while trying > 0:
         rollout(block, base, team.field.spacing)
         wall_energy(block, raw, team.field, first, base)
         if judge_trials(team, raw.x, number):
             accept(block, first, base)
         for lane in range(WIDTH):
-            if lanes[lane].phase == TAKEN:
-                finish_taking(lanes[lane], nows[lane], number, lane)
-        trying = ask_for_trials(lanes, number)
+            w = seats[lane].wire
+            if lanes[w].phase == TAKEN:
+                finish_taking(lanes[w], nows[w], number, lane)
+        trying = ask_for_trials(team, number)
         if trying < WORTH_ANOTHER:
             break
-    if count_judged(lanes) > 0:
+    if count_judged(team) > 0:
         costate(block, first, base)
         for lane in range(WIDTH):
-            after_costate(lanes[lane], nows[lane], counts[lane], number, lane)
+            w = seats[lane].wire
+            after_costate(lanes[w], nows[w], counts[w], number, lane)
     for lane in range(WIDTH):
-        if lanes[lane].phase == ALONE:
+        if lanes[seats[lane].wire].phase == ALONE:
             go_alone(team, raw, lane)
 
 
 @kernel
-def ask_for_trials(lanes: Any, number: Any) -> int:
+def get_ready(team: Team, raw: Block, number: Any) -> int:
+    """Say what the gains of each lane need; return the first joint of the longest wire."""
+    size = team.first.size - 2
+    base = size
+    for lane in range(WIDTH):
+        w = team.seats[lane].wire
+        k, now = team.lanes[w].k, team.nows[w]
+        base = min(base, size - k)
+        number[DAMPING, lane], number[START, lane] = now.damping, size - k + now.first_free
+    for lane in range(WIDTH):
+        if team.seats[lane].filled > base:
+            fill_up(raw, team.first, lane, base, team.seats[lane].filled)
+            team.seats[lane].filled = base
+    return int(base)
+
+
+@kernel
+def ask_for_trials(team: Team, number: Any) -> int:
     """Say which lanes want a trial and of what part of their step; return how many do."""
     count = 0
     for lane in range(WIDTH):
-        trying = lanes[lane].phase == SEARCH or (lanes[lane].phase == LAST and lanes[lane].tries == 0)
-        number[ACTIVE, lane], number[FRACTION, lane] = 1.0 if trying else 0.0, lanes[lane].fraction
+        me = team.lanes[team.seats[lane].wire]
+        trying = me.phase == SEARCH or (me.phase == LAST and me.tries == 0)
+        number[ACTIVE, lane], number[FRACTION, lane] = 1.0 if trying else 0.0, me.fraction
+        number[ROOM, lane] = most_energy(me, team.nows[team.seats[lane].wire])
         count += trying
     return count
 
@@ -106,28 +148,28 @@ def ask_for_trials(lanes: Any, number: Any) -> int:
 @kernel
 def judge_trials(team: Team, x: Any, number: Any) -> bool:
     """Accept the trials that lead down, or else shorten their steps; say whether any was accepted."""
-    lanes, nows, counts = team.lanes, team.nows, team.counts
     taken = False
     for lane in range(WIDTH):
         number[ACCEPTED, lane] = 0.0
         if number[ACTIVE, lane] > 0.0:
-            me, now = lanes[lane], nows[lane]
-            counts[lane].rollouts += 1
+            w = team.seats[lane].wire
+            me, now, counted = team.lanes[w], team.nows[w], team.counts[w]
+            counted.rollouts += 1
             if leads_down(me, now, number, lane) and (number[JUMP, lane] == 0.0 or reachable(team, x, lane)):
                 take(me, now, number, lane)
                 taken = True
             elif me.phase == SEARCH:
-                shorten(me, now, counts[lane])
+                shorten(me, now, counted)
             me.tries += me.phase == LAST
     return taken
 
 
 @kernel
-def count_judged(lanes: Any) -> int:
+def count_judged(team: Team) -> int:
     """How many lanes need their gradient."""
     count = 0
     for lane in range(WIDTH):
-        count += lanes[lane].phase in (LAST, JUDGE, FORETOLD)
+        count += team.lanes[team.seats[lane].wire].phase in (LAST, JUDGE, FORETOLD)
     return count
 
 
@@ -136,7 +178,7 @@ def reachable(team: Team, x: Any, lane: int) -> bool:
     """``crossing.admissible`` of a lane's trial; x : that of the raw block."""
     size, field = team.first.size - 2, team.field
     limit = 0.25 * field.spacing * field.spacing
-    for n in range(size - team.lanes[lane].k + 1, size + 1):
+    for n in range(size - team.lanes[team.seats[lane].wire].k + 1, size + 1):
         square = 0.0
         for a in range(3):
             square += (x[TRIAL, n, a, lane] - x[CURRENT, n, a, lane]) ** 2
@@ -151,30 +193,38 @@ def reachable(team: Team, x: Any, lane: int) -> bool:
 @merged
 def hand_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) -> None:
     """Give a lane's state back to its wire."""
-    me = team.lanes[lane]
+    w, number = team.seats[lane].wire, raw.number
+    me, counted = team.lanes[w], team.counts[w]
     take_out(raw, team.first, lane, problem, me.k)
-    problem.scratch.descent[0] = team.nows[lane]
+    problem.scratch.descent[0] = team.nows[w]
     parts = problem.state.energies[CURRENT]
     parts.bending, parts.wall, parts.load, parts.friction = me.bending, me.wall, me.load, 0.0
-    report.moment, report.pivot = raw.number[MOMENT, lane], me.pivot
+    report.moment, report.pivot = number[MOMENT, lane], me.pivot
     for a in range(3):
         report.force[a], report.torque[a] = raw.force[a, lane], raw.torque[a, lane]
         report.turned[0, a], report.turned[1, a] = raw.turned[0, a, lane], raw.turned[1, a, lane]
+    counted.wall_look_ups += int(number[FULL, lane])
+    counted.wall_look_ups_proven_unnecessary += int(number[CLEAR, lane])
 
 
 @merged
 def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) -> None:
     """Take a wire's current state into its lane."""
-    me, parts = team.lanes[lane], problem.state.energies[CURRENT]
+    w, number, parts = team.seats[lane].wire, raw.number, problem.state.energies[CURRENT]
+    me = team.lanes[w]
     put_in(raw, team.first, lane, problem, me.k)
-    team.nows[lane] = problem.scratch.descent[0]
+    team.seats[lane].filled = raw.length.shape[0] - me.k
+    team.nows[w] = problem.scratch.descent[0]
     me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
+    number[STIFFNESS, lane], number[REACH, lane] = problem.stiffness, problem.chain.reach
+    number[FULL, lane] = number[CLEAR, lane] = 0.0
 
 
 @owner
 def go_alone(team: Team, raw: Block, lane: int) -> None:
     """Do one iteration of a lane by itself, or end its relaxation where none is left."""
-    me, wire = team.lanes[lane], team.wires[lane]
+    w = team.seats[lane].wire
+    me, wire = team.lanes[w], team.wires[w]
     problem, report = wire.problem, wire.report[0]
     now = problem.scratch.descent[0]
     hand_over(team, raw, lane, problem, report)
@@ -188,4 +238,4 @@ def go_alone(team: Team, raw: Block, lane: int) -> None:
         now.slot = CURRENT
     if me.outcome == UNFINISHED:
         take_over(team, raw, lane, problem, report)
-        next_iteration(me, team.nows[lane])
+        next_iteration(me, team.nows[w])

@@ -4,9 +4,8 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import wall_law
-from solver._kernels.algebra import Three, apply_transposed, dot, load3, load9, minus, store3, store9, times
+from solver._kernels.algebra import Three, dot, load3, load9, minus, store3, store9, times
 from solver._kernels.data import CURRENT, TRIAL, Field
-from solver._kernels.field import Cell, depth_in_grid, indices, jet_at, locate, trilinear, value
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.lane_block import (
     ACCEPTED,
@@ -14,13 +13,13 @@ from solver._kernels.lane_block import (
     ALONG,
     ANCHOR,
     BENDING,
-    CHEAP,
     CLEAR,
     FRACTION,
     FULL,
     JUMP,
     LOAD,
     REACH,
+    ROOM,
     START,
     STIFFNESS,
     STILL,
@@ -28,11 +27,10 @@ from solver._kernels.lane_block import (
     WEIGHT,
     Block,
 )
+from solver._kernels.lane_field import look_first, look_up
 from solver._kernels.lane_newton import turn_of
 from solver._kernels.lanes import WIDTH, anywhere, bits, greater, select, select3, size, spread
 from solver._kernels.rollout import limited, relative
-
-NO_JET = (0.0,) * 10
 
 
 @kernel
@@ -49,8 +47,7 @@ def rollout(b: Block, base: int, spacing: float) -> None:
     energy, furthest = zero, zero
     for j in range(base, b.length.shape[0]):
         ahead, there, before = load9(old_r, j + 1), load3(old_x, j + 1), (old_u[j, 0], old_u[j, 1], zero)
-        moved = apply_transposed(ahead, minus(at, load3(old_x, j)))
-        turned = apply_transposed(ahead, relative(load9(old_r, j), frame))
+        moved, turned = minus(at, load3(old_x, j)), relative(load9(old_r, j), frame)
         v = limited(before, answer(b.gain, j, fraction, moved, turned))
         length, held = b.length[j], start > float(j)
         if anywhere(held):
@@ -90,77 +87,116 @@ def select9(condition: Any, one: Any, other: Any) -> Any:
 
 @kernel
 def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> None:
-    """``energy.wall_energy`` of the trial in every active lane.
+    """``energy.wall_energy`` of the trial in every active lane, or enough of it to be too much. raw : the numbers of b.
 
-    The way from a point's last look-up decides for all lanes at once; those that need a look-up get one each.
-    raw : the numbers of b.
+    Points that touched are looked up first: a trial that fails does so by them, mostly, and needs no others.
     """
-    c, m, o, gap, square = field.coefficients, field.to_index, field.origin, field.gap, field.slope * field.slope
-    spacing = field.spacing
+    number, site, touch, total = b.number, b.site, b.touch[TRIAL], spread(0.0)
+    # what is lost to rounding, with room: which side of a limit a sum is on must not hang on its order
+    number[ROOM] = number[ROOM] - (number[BENDING] + number[LOAD]) + 1e-9 * number[BENDING]
+    sure, unsure = ask(b, field.slope, first, base)
+    touch_at(b, raw, field, sure)
+    touch_at(b, raw, field, sift(b, raw, field, unsure))
+    if sure + unsure > 0:
+        for p in range(first[base + 1], first[b.length.shape[0] + 1]):
+            total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
+    number[WALL] = total
+
+
+@kernel
+def ask(b: Block, slope: float, first: Any, base: int) -> tuple[int, int]:
+    """List the points of the trial that touched when they were looked up last, and those that may; count both.
+
+    The way from a point's last look-up decides, for all lanes at once. Where a listed point is stands in ``b.touch``.
+    """
     x, r, site, touch, number, asked = b.x[TRIAL], b.r[TRIAL], b.site, b.touch[TRIAL], b.number, b.asked
-    sites, touches, numbers, asks = raw.site, raw.touch[TRIAL], raw.number, raw.asked
-    reach, zero = number[REACH], spread(0.0)
-    total, clear = zero, number[CLEAR]
+    reach, zero, active, square = number[REACH], spread(0.0), number[ACTIVE] > 0.0, slope * slope
+    clear, sure, unsure = number[CLEAR], 0, 0
     for n in range(base + 1, b.length.shape[0] + 1):
         for p in range(first[n], first[n + 1]):
             along = site[p, ALONG]
             q = (x[n, 0] + along * r[n, 0, 2], x[n, 1] + along * r[n, 1, 2], x[n, 2] + along * r[n, 2, 2])
             room = -site[p, ANCHOR + 3] - reach
             way = minus(q, (site[p, ANCHOR], site[p, ANCHOR + 1], site[p, ANCHOR + 2]))
-            still = (room >= 0.0) & (square * dot(way, way) <= room * room)
-            here = (number[ACTIVE] > 0.0) & (site[p, WEIGHT] > 0.0)
+            off = room >= 0.0
+            still = off & (square * dot(way, way) <= room * room)
+            here = active & (site[p, WEIGHT] > 0.0)
             clear = clear + select(here & still, 1.0, zero)
             touch[p, 0] = zero
-            wanted = bits(here & ~still)
-            if wanted != 0:
-                asked[0], asked[1], asked[2], asked[3] = q[0], q[1], q[2], room
+            near, far = bits(here & ~off), bits(here & off & ~still)
+            if near + far != 0:
+                touch[p, 1], touch[p, 2], touch[p, 3] = q
+                # without a branch: whether a lane wants this point cannot be foretold
                 for lane in range(WIDTH):
-                    if wanted >> lane & 1:
-                        at = (asks[0, lane], asks[1, lane], asks[2, lane])
-                        f = indices(m, o, at)
-                        how = numbers[REACH, lane], gap, asks[3, lane] < 0.0, -spacing * depth_in_grid(c, f)
-                        found = look(c, m, locate(c, f), how)
-                        numbers[CHEAP if found[0] < 0.0 else FULL, lane] += 1.0
-                        keep(sites, touches, p, lane, at, found)
-                total = total + wall_law.energy(number[STIFFNESS], site[p, WEIGHT], touch[p, 0])
-    number[WALL], number[CLEAR] = total, clear
-
-
-@inlined
-def keep(sites: Any, touches: Any, p: int, lane: int, at: Three, found: tuple[float, float, Any]) -> None:
-    """Keep what the look-up of a point said."""
-    d, known, jet = found
-    sites[p, ANCHOR, lane], sites[p, ANCHOR + 1, lane], sites[p, ANCHOR + 2, lane] = at
-    sites[p, ANCHOR + 3, lane] = known
-    if d > 0.0:
-        touches[p, 0, lane] = d
-        for a in range(10):
-            touches[p, 1 + a, lane] = jet[a]
+                    asked[0, sure] = asked[1, unsure] = p * WIDTH + lane
+                    sure, unsure = sure + (near >> lane & 1), unsure + (far >> lane & 1)
+    number[CLEAR] = clear
+    return sure, unsure
 
 
 @kernel
-def look(c: Any, m: Any, cell: Cell, how: tuple[float, float, bool, float]) -> tuple[float, float, Any]:
-    """Look a point up as ``energy.wall_energy`` does: penetration, what is known of the distance, and the jet.
+def gather(raw: Block, which: int, at: int, count: int) -> tuple[int, int]:
+    """Gather up to eight points of a list from ``at`` on; return how many, and where to go on.
 
-    how : reach, the field's gap, whether it touched when it was looked up last, and how far outside the grid it is, mm.
-    The penetration is 0 off contact, and -1 where the first, cheap look was enough.
+    Points of trials that cost too much already are left out.
     """
-    reach, gap, touched, border = how
-    d, jet, cheap = -1.0, NO_JET, False
-    if not touched:
-        phi = trilinear(c, cell)
-        cheap = border <= 0.0 and phi + gap + reach <= 0.0
-        # as good as certain to touch: its value alone is not asked first
-        touched = phi - gap + reach > 0.0
-        if cheap:
-            d = phi + gap + reach
-        elif not touched:
-            d = value(c, cell) + reach
-    if touched or d > 0.0:
-        first, second = jet_at(c, m, cell)
-        jet = first + second
-        d = first[0] + reach
-    return -1.0 if cheap else max(d, 0.0), max(d - reach, border) if border <= 0.0 else 1.0, jet
+    asked, found, touches, numbers, n = raw.asked, raw.found, raw.touch[TRIAL], raw.number, 0
+    while at < count and n < WIDTH:
+        point = asked[which, at]
+        p, lane = point // WIDTH, point % WIDTH
+        at += 1
+        if numbers[ROOM, lane] >= 0.0:
+            for a in range(3):
+                found[a, n] = touches[p, 1 + a, lane]
+            numbers[FULL, lane] += 1.0
+            asked[2, n] = point
+            n += 1
+    for m in range(n, WIDTH):
+        for a in range(3):
+            found[a, m] = found[a, 0]
+    return n, at
+
+
+@inlined
+def keep(raw: Block, n: int) -> tuple[int, int]:
+    """Keep where the n-th gathered point is, and what is known of the distance there; return it and its lane."""
+    point, sites, touches = raw.asked[2, n], raw.site, raw.touch[TRIAL]
+    p, lane = point // WIDTH, point % WIDTH
+    for a in range(3):
+        sites[p, ANCHOR + a, lane] = touches[p, 1 + a, lane]
+    sites[p, ANCHOR + 3, lane] = raw.found[10, n]
+    return p, lane
+
+
+@kernel
+def sift(b: Block, raw: Block, field: Field, count: int) -> int:
+    """Look up the distance alone of points that may touch; list those that do, and count them."""
+    found, asked, numbers, at, sure = raw.found, raw.asked, raw.number, 0, 0
+    while at < count:
+        some, at = gather(raw, 1, at, count)
+        look_first(field, b.found)
+        for n in range(some):
+            _, lane = keep(raw, n)
+            asked[0, sure] = asked[2, n]
+            sure += found[0, n] + numbers[REACH, lane] > 0.0
+    return sure
+
+
+@kernel
+def touch_at(b: Block, raw: Block, field: Field, count: int) -> None:
+    """Look up the points of the list of those that will touch."""
+    found, sites, touches, numbers, at = raw.found, raw.site, raw.touch[TRIAL], raw.number, 0
+    while at < count:
+        some, at = gather(raw, 0, at, count)
+        look_up(field, b.found)
+        for n in range(some):
+            p, lane = keep(raw, n)
+            d = found[0, n] + numbers[REACH, lane]
+            if d > 0.0:
+                touches[p, 0, lane] = d
+                for a in range(10):
+                    touches[p, 1 + a, lane] = found[a, n]
+                numbers[ROOM, lane] -= wall_law.energy(numbers[STIFFNESS, lane], sites[p, WEIGHT, lane], d)
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 A recursion along a wire waits for the result before, not for the processor, which does eight multiplications in the
 time of one. A kernel whose numbers are ``Lanes`` therefore does eight wires in lock-step in the time of one, and its
-source is that of one wire: sums and products, ``math.sqrt``, ``sin`` and ``cos``. Where one wire would take a branch,
-lanes may disagree: ``select`` takes a value for each lane, ``anywhere`` asks whether any lane needs the branch at all.
+source is that of one wire: sums and products, ``math.sqrt``, ``sin``, ``cos`` and ``floor``. Where one wire would take
+a branch, lanes may disagree: ``select`` takes a value for each, ``anywhere`` asks whether any needs the branch at all.
 Both are plain Python for plain numbers. A vector of four, a quad, is a row of the wall's coefficients.
 """
 
@@ -30,8 +30,7 @@ conversions: Any = typeconv
 WIDTH = 8
 """Lanes: what AVX-512 holds. Where the processor's vectors are shorter the compiler takes two or four for each."""
 BITS = ir.VectorType(ir.IntType(1), WIDTH)
-CONTRACT = ("contract",)
-"""As in ``flags.FAST``."""
+CONTRACT = ("contract",)  # as in ``flags.FAST``
 
 
 class VectorType(untyped.Type):  # type: ignore[misc]
@@ -131,7 +130,7 @@ def _mathematical(function: Any) -> None:
         return (lambda x: of_lanes(x)) if x == LANES else None
 
 
-for _function in (math.sqrt, math.sin, math.cos):
+for _function in (math.sqrt, math.sin, math.cos, math.floor):
     _mathematical(_function)
 
 
@@ -174,6 +173,22 @@ def _anywhere(condition: Any) -> Any:
 def greater(one: Any, other: Any) -> Any:
     """The greater of two in each lane."""
     return select(one > other, one, other)
+
+
+@inlined
+def lesser(one: Any, other: Any) -> Any:
+    """The lesser of two in each lane."""
+    return select(one < other, one, other)
+
+
+@extend.overload(max, strict=False)
+def _max(x: Any, y: Any) -> Any:
+    return (lambda x, y: greater(x, y)) if x == LANES else None
+
+
+@extend.overload(min, strict=False)
+def _min(x: Any, y: Any) -> Any:
+    return (lambda x, y: lesser(x, y)) if x == LANES else None
 
 
 @inlined

@@ -103,18 +103,13 @@ def extrapolate_start(problem: Problem, at: Any, k: int, share: float) -> int:
     at : the record ``records.PLACE``. Held against each other is what they lie above the energy that the hand's push
     leads to; where the change leaves a small part of what the slid start had when it was last asked, it is not asked.
     """
-    state, scratch = problem.state, problem.scratch
-    u, tried = state.u[CURRENT], state.u[TRIAL]
     goal = at.energy - at.stored + at.push * share * at.last_step
-    for j in range(k):
-        for a in range(3):
-            scratch.start[j, a] = u[j, a]
-            tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
+    change_again(problem, k, share)
     asked = share != 0.0 and at.rise > 0.0
     rise = foresee(problem, k) - goal if asked else math.inf
     if not (rise < tol.SURELY_FORESEEN * at.rise and not crossed(problem, CURRENT, k)):
         at.rise = total_energy(problem, CURRENT, 0, k) - goal
-        if share == 0.0 or state.energies[CURRENT].wall == 0.0:
+        if share == 0.0 or problem.state.energies[CURRENT].wall == 0.0:
             at.rise = 0.0
             return CURRENT
         rise = rise if asked else foresee(problem, k) - goal
@@ -122,8 +117,18 @@ def extrapolate_start(problem: Problem, at: Any, k: int, share: float) -> int:
             return CURRENT
     else:
         at.rise *= tol.STILL_RISES
-    scratch.counters[0].starts_foreseen += 1
+    problem.scratch.counters[0].starts_foreseen += 1
     return TRIAL
+
+
+@inlined
+def change_again(problem: Problem, k: int, share: float) -> None:
+    """Keep the controls that the step starts from, and put a share of the last change on those of TRIAL."""
+    scratch, u, tried = problem.scratch, problem.state.u[CURRENT], problem.state.u[TRIAL]
+    for j in range(k):
+        for a in range(3):
+            scratch.start[j, a] = u[j, a]
+            tried[j, a] = u[j, a] + share * scratch.change[k - 1 - j, a]
 
 
 @kernel

@@ -6,8 +6,9 @@ from typing import Any
 
 import numba
 
-from solver._kernels import closed_form, energy, newton, rollout, rotation, start
+from solver._kernels import closed_form, energy, lane_field, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
+from solver._kernels.lanes import in_lanes
 
 entry_point = numba.njit(**FAST)
 
@@ -50,3 +51,12 @@ def sine_terms(q: float) -> Any:
 @entry_point
 def jacobian_terms(q: float, s: float, a: float) -> Any:
     return rotation.jacobian_terms(q, s, a)
+
+
+@entry_point
+def look_up_eight(field: Any, found: Any, distance_alone: bool) -> None:
+    lanes = in_lanes(found)
+    if distance_alone:
+        lane_field.look_first(field, lanes)
+    else:
+        lane_field.look_up(field, lanes)

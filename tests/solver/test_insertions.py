@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from solver import GuideWire, Insertion, Insertions, Solution, VesselWall, skips
+from solver._kernels.lane_relax import POOL
+from solver._kernels.lanes import WIDTH, room
 from solver.crew import Job, first_points
 from solver.insertions import kind_of
+from tests.solver.entry_points import look_up_eight
 from tests.solver.scenes import bend_grid, fork_grid, sampled, sheath_grid
 from tests.solver.test_snaps import ringed
 
@@ -97,6 +100,38 @@ def test_a_way_may_be_gone_in_parts_and_alone_in_between() -> None:
     for n, more in enumerate(many.to_depths([30.0, 40.0], 30.0)):
         parts[n] += more
     assert_same(parts, [list(one.to_depths([10.0, 20.0, 25.0, 30.0, 40.0], 30.0)) for one in whole])
+
+
+def test_more_wires_than_a_pool_some_in_some_out() -> None:
+    """Forty wires, in and out, of all lengths: lanes take others over, and a second pool follows."""
+    wall = bend_wall()
+
+    def make() -> list[Insertion]:
+        wires = [GuideWire(1.0, 0.18, [[0, 0.5 + 0.05 * n], [20, 6.0]], CURVED) for n in range(POOL + 8)]
+        return [Insertion(wire, wall, [0.01 * n, 0, 0], [0, 0, 1]) for n, wire in enumerate(wires)]
+
+    count = POOL + 8
+    depths = [np.linspace(1.0, 4.0 + n, 4) if n % 2 else np.linspace(4.0 + n, 1.0, 3) for n in range(count)]
+    depths[7] = np.zeros(2)
+    both(make, depths, [9.0 * n for n in range(count)])
+
+
+@pytest.mark.parametrize("away", [0.0, 100.0])
+def test_eight_places_are_looked_up_as_one_by_one(away: float) -> None:
+    """Eight places beside each other, in the grid and beyond it: the jets that ``VesselWall.look_up`` finds."""
+    wall, found = bend_wall(), room(11)
+    points = np.random.default_rng(3).uniform(-2.0, 20.0, (WIDTH, 3)) + away
+    value, slope, bend = wall.look_up(points)
+    second = bend[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    found[:3] = points.T
+    look_up_eight(wall.field, found, False)
+    np.testing.assert_allclose(found[:10].T, np.column_stack([value, slope, second]), rtol=1e-12, atol=1e-12)
+    # beyond the grid it counts as touching
+    assert np.all((found[10] >= value - 1e-12) | (found[10] == 1.0))
+    assert np.all(found[10] == 1.0) == (away > 0.0)
+    found[:3] = points.T
+    look_up_eight(wall.field, found, True)
+    np.testing.assert_allclose(found[0], value, rtol=1e-12, atol=1e-12)
 
 
 def test_one_that_can_go_no_further_holds_nobody_up() -> None:
