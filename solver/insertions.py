@@ -32,9 +32,9 @@ class Insertions:
     """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
 
     insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
-    from one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes; each comes to lie as by itself, to
-    rounding (1e-9 mm, away from snaps); straight wires, which by themselves are swept without their roll, in 1 % of
-    depths to what the tolerance of a relaxation leaves (1e-5 mm). With friction, a finite torsional stiffness, a
+    from one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes; each comes to lie as by
+    itself, to rounding (1e-9 mm, away from snaps); straight wires, which by themselves are swept without their roll, in
+    1 % of depths to what the tolerance of a relaxation leaves (1e-5 mm). With friction, a finite torsional stiffness, a
     sampled hull, a shaft, a weight, no wall or the closed form each goes by itself.
     threads : how many of them to use (default: one a core); Python's lock is not held.
     Raises ValueError where one insertion is given twice, or with a catheter.

@@ -71,7 +71,7 @@ class Solution:
     nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1.
     dissipated_N_mm : the hand's work on the way to this depth less the change of energy, by the trapezium rule over
     each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) off by half the jump times
-    the step, and negative then.     snaps : events on that way.
+    the step, and negative then. With friction it holds friction_energy_N_mm.     snaps : events on that way.
     uncertain : the wire snapped, was about to, or lay elsewhere after long steps than after short ones, here or a few
     mm before (as long as it stays soft): shorter steps may lead elsewhere.     radius_mm : the wire's.
     """

@@ -164,31 +164,45 @@ def anchor_friction(problem: Problem, was: int, k: int, ahead: float, shaft_mm: 
 
 
 @kernel
-def settle_friction(problem: Problem, k: int) -> float:
-    """Remember the springs after a step, by material; return the work that was lost by slipping, N mm."""
-    friction, chain, state = problem.friction, problem.chain, problem.state
+def friction_loss(problem: Problem, k: int) -> float:
+    """Work that was lost by slipping in the step that is ending, N mm."""
+    friction, chain = problem.friction, problem.chain
     end, work = chain.first[k + 1] - 1, 0.0
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
-            back = end - p
-            load, before = friction.load[p], friction.pressed[back]
-            way = ZERO3
-            if load > 0.0:
-                way = way_of(problem, CURRENT, n, p)
-            elif before > 0.0:
-                at = add3(load3(state.x[CURRENT], n), apply(load9(state.r[CURRENT], n), lever_of(problem, p)))
-                way = minus(at, load3(friction.start, p))
-            arc = arc_of(problem, n, p, way)
-            size, slid = math.sqrt(dot(way, way)), math.sqrt(dot(arc, arc)) - tol.SLIP_MM
-            # the load of the step is the mean of its two ends: with the last one alone the error is of first order
-            work += 0.5 * friction.coefficient * (load + before) * max(slid, 0.0)
-            kept = tol.SLIP_MM / size if size > tol.SLIP_MM else 1.0
-            store3(friction.stretch, back, scaled(kept if load > 0.0 else 0.0, way))
-            friction.pressed[back] = load
+            load, before = friction.load[p], friction.pressed[end - p]
+            if load + before > 0.0:
+                arc = arc_of(problem, n, p, way_in(problem, n, p, load))
+                # the load of the step is the mean of its two ends: with the last one alone the error is of first order
+                slid = max(math.sqrt(dot(arc, arc)) - tol.SLIP_MM, 0.0)
+                work += 0.5 * friction.coefficient * (load + before) * slid
+    return work
+
+
+@inlined
+def way_in(problem: Problem, n: int, p: int, load: float) -> Three:
+    """How far a point has come from what it held on to, mm: along the wall, or any way where it has left that."""
+    if load > 0.0:
+        return way_of(problem, CURRENT, n, p)
+    state = problem.state
+    at = add3(load3(state.x[CURRENT], n), apply(load9(state.r[CURRENT], n), lever_of(problem, p)))
+    return minus(at, load3(problem.friction.start, p))
+
+
+@kernel
+def settle_friction(problem: Problem, k: int) -> None:
+    """Remember the springs after a step, by material."""
+    friction, chain = problem.friction, problem.chain
+    end = chain.first[k + 1] - 1
+    for n in range(1, k + 1):
+        for p in range(chain.first[n], chain.first[n + 1]):
+            way = way_of(problem, CURRENT, n, p) if friction.load[p] > 0.0 else ZERO3
+            size = math.sqrt(dot(way, way))
+            store3(friction.stretch, end - p, scaled(tol.SLIP_MM / size if size > tol.SLIP_MM else 1.0, way))
+            friction.pressed[end - p] = friction.load[p]
     for back in range(end + 1, friction.pressed.size):
         store3(friction.stretch, back, ZERO3)
         friction.pressed[back] = 0.0
-    return work
 
 
 @inlined

@@ -14,7 +14,7 @@ from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
 from solver._kernels.flags import cached, inlined, merged, uncounted
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
-from solver._kernels.friction import anchor_friction, settle_friction
+from solver._kernels.friction import anchor_friction, friction_loss, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, settle_shaft
@@ -72,12 +72,29 @@ def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
     """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
     at, introducer = handle.place[0], handle.introducer
     at.rubbed, at.dissipated, at.snaps, at.seen_depth = 0.0, 0.0, 0, math.nan
+    if turns_back(handle, to_depth - at.inserted, to_roll - at.roll):
+        at.shrink = min(at.shrink, tol.REFINE * introducer.finest)
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
     steps += abs(at.goal - at.catheter) / introducer.step
     if introducer.idle_roll and at.roll != to_roll:
         at.roll = to_roll
         handle.problem.scratch.counters[0].rolls_proven_idle += 1
     return float(handle.limits.max_iterations * (tol.BUDGET_STEPS + 4 * steps))
+
+
+@merged
+def turns_back(handle: Any, ahead: float, turn: float) -> bool:
+    """Whether the hand now slides the wire another way than before, so that friction on it changes within micrometres.
+
+    The trapezium rule over a step in which that happens knows nothing of the hand's work.
+    """
+    at, problem = handle.place[0], handle.problem
+    if (problem.friction.coefficient == 0.0 and problem.shaft.drag == 0.0) or handle.introducer.finest == 1.0:
+        return False
+    around = math.radians(problem.shaft.radius)
+    turn, before = around * turn, around * at.last_turn
+    both = math.sqrt((ahead * ahead + turn * turn) * (at.last_step * at.last_step + before * before))
+    return bool(ahead * at.last_step + turn * before < tol.SAME_WAY * both)
 
 
 @inlined
@@ -118,21 +135,21 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, energy = data.CONVERGED, 0, 0.0
+    outcome, used, most, energy = data.CONVERGED, 0, 0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, at, k, likeness(problem, at, depth, roll))
-        outcome, used, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
+        outcome, used, most, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
-    return settle(handle, (depth, roll, energy), k, outcome, laid, used), used
+    return settle(handle, (depth, roll, energy), k, outcome, laid, most), used
 
 
 @cached
 def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int) -> int:
     """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
 
-    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations.
+    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
     """
     problem, at, (depth, roll, energy) = handle.problem, handle.place[0], reached
     energy -= problem.state.energies[data.CURRENT].friction
@@ -145,11 +162,12 @@ def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: in
         outcome = account(handle, k, (depth, roll, energy), used)
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
-        at.last_step = depth - at.inserted if roll == at.roll else 0.0
+        at.last_step, at.last_turn = depth - at.inserted, roll - at.roll
         at.inserted, at.roll, at.energy = depth, roll, energy
         at.catheter, at.stored = at.next, stored
         if problem.friction.coefficient > 0.0:
-            at.rubbed += settle_friction(problem, k)
+            at.rubbed += friction_loss(problem, k)
+            settle_friction(problem, k)
         if problem.shaft.drag > 0.0:
             at.rubbed += settle_shaft(problem, k)
     else:
@@ -206,7 +224,7 @@ def allowed(
 @inlined
 def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
     """How long this step is over the last one, or 0 where it is of another kind: rolled, back, or much longer."""
-    if not problem.skips.foresight or at.last_step == 0.0 or roll != at.roll:
+    if not problem.skips.foresight or at.last_step == 0.0 or at.last_turn != 0.0 or roll != at.roll:
         return 0.0
     share = (depth - at.inserted) / at.last_step
     return share if 0.0 < share <= tol.MOST_FORESEEN else 0.0

@@ -56,17 +56,20 @@ def begin(now: Any, slot: int, energy: float) -> None:
 
 
 @merged
-def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, report: Any) -> tuple[int, int, float]:
-    """Relax the state in a slot, whose energy is known, in place; return the outcome, iterations and energy, N mm.
+def relax_with_friction(
+    problem: Problem, slot: int, k: int, limits: Limits, report: Any
+) -> tuple[int, int, int, float]:
+    """Relax the state in a slot, whose energy is known, in place.
 
-    With friction the contact loads are taken from the last relaxation until they settle.
+    With friction the contact loads are taken from the last relaxation until they settle. Returns the outcome, the
+    iterations of all and of the longest of these relaxations, and the energy, N mm.
     """
     rubs, counters = problem.friction.coefficient > 0.0, problem.scratch.counters[0]
     counters.relaxations_without_friction += not rubs
     counters.relaxations_without_twist += not problem.twisting
     if rubs:
         take_loads(problem, slot, k)
-    outcome, iterations, energy = FRICTION, 0, 0.0
+    outcome, iterations, most, energy = FRICTION, 0, 0, 0.0
     cost = k + problem.chain.first[k + 1]
     for _ in range(tol.FRICTION_ROUNDS):
         if rubs:
@@ -74,14 +77,14 @@ def relax_with_friction(problem: Problem, slot: int, k: int, limits: Limits, rep
         allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // cost)
         own = Limits(limits.method, limits.tolerance, allowed, limits.work)
         outcome, used, result, energy = minimise(problem, slot, k, own, report)
-        iterations += used
+        iterations, most = iterations + used, max(most, used)
         counters.passed += used * cost
         if result != slot:
             copy_state(problem, result, slot, k)
         if outcome != CONVERGED or not rubs or take_loads(problem, slot, k) < tol.FRICTION_CHANGE:
             break
         outcome = FRICTION
-    return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, energy
+    return shape_of(problem, slot, k) if outcome == CONVERGED else outcome, iterations, most, energy
 
 
 @cached

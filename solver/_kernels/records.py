@@ -71,14 +71,14 @@ one that last led down.     patience : steps to take before it is lowered.     r
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(
-    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "rise")),
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise")),
     *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm")),
     *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
     *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
     ("snaps", np.int64),
 )
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm (0 after a roll).
+step, mm and degrees.
 rise : energy of a start that is not foreseen above what the hand's push leads to, N mm, when last asked; it fades.
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and

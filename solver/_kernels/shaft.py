@@ -73,6 +73,18 @@ def shaft_forces(shaft: Shaft) -> tuple[float, float]:
 
 
 @kernel
+def loss_by_turning(problem: Problem, k: int) -> float:
+    """Work that friction at the entry takes from the wire turning there in this step, N mm: by the torque of the hand.
+
+    What pushing costs is not in the hand's force of this step, see ``shaft_forces``.
+    """
+    turn = turned(problem, load9(problem.state.r[CURRENT], min(k, 1)))[0]
+    along, around = ways(problem, turn)
+    size = math.sqrt(along * along + around * around)
+    return 0.5 * problem.shaft.drag * around * around / size * (1.0 - tol.SLIP_MM / size) if size > tol.SLIP_MM else 0.0
+
+
+@kernel
 def settle_shaft(problem: Problem, k: int) -> float:
     """Remember the springs after a step; return the work that was lost by slipping, N mm."""
     shaft, work = problem.shaft, 0.0

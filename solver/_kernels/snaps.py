@@ -5,24 +5,68 @@ snapped, or the step was so long that it hopped over a barrier that shorter step
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
 from solver._kernels.algebra import dot, load3, minus, store3
 from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
-from solver._kernels.flags import merged
+from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
+from solver._kernels.friction import friction_loss
 from solver._kernels.minimise import NEWTON
+from solver._kernels.shaft import loss_by_turning
 from solver._kernels.sleeve import tip_force
+
+
+class Books(NamedTuple):
+    """A step's work and energy.
+
+    push, torque, pull : the hand's at its end, see ``records.PLACE``.     way : longest way of a hand, mm.
+    share : of the longest step.     lost : work less the change of energy, N mm.     missing : what of that friction
+    did not take.     large : what the trapezium rule may leave of work and energy.     change : of the hand's forces,
+    times their ways.
+    """
+
+    push: float
+    torque: float
+    pull: float
+    way: float
+    share: float
+    lost: float
+    missing: float
+    large: float
+    change: float
 
 
 @merged
 def account(handle: Any, k: int, reached: tuple[float, float, float], used: int) -> int:
     """Hold the hand's work in a step against the wire's energy; ROUGH where a shorter step may lead elsewhere.
 
-    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations.
+    reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
     """
+    problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
+    books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
+    moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
+    leapt = moved > tol.SNAP_WAYS * books.way
+    doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot)
+    # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
+    told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
+    if doubtful and not told and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
+        if not pending:
+            remember(problem, at, k, reached)
+        return ROUGH
+    # a wire that went no further than its base was pushed did not snap: the trapezium rule left that of its work
+    if doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change:
+        note_snap(problem, at, moved, (reached[0], books.missing))
+    trust(handle, k, reached, doubtful and moved > tol.ELSEWHERE_MM)
+    at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
+    return CONVERGED
+
+
+@merged
+def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
+    """Work out the hand's work in a step, by the trapezium rule, and what became of it."""
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     ahead, turn = reached[0] - at.inserted, math.radians(reached[1] - at.roll)
     push = push_force(problem, handle.table, introducer.weight, k, report) if k > 0 else 0.0
@@ -34,29 +78,30 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
         push -= pull
     lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn + (pull + at.pull) * onwards)
     lost -= reached[2] - at.energy
+    rubbed = friction_loss(problem, k) if problem.friction.coefficient > 0.0 else 0.0
+    if problem.shaft.drag > 0.0:
+        rubbed += loss_by_turning(problem, k)
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)
     work += max(abs(pull), abs(at.pull)) * abs(onwards)
-    large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy))
-    share = max(abs(ahead), abs(onwards)) / introducer.step
-    share = max(share, abs(reached[1] - at.roll) / introducer.turn)
-    soft, pending = report.pivot < tol.SOFT, not math.isnan(at.seen_depth)
-    if soft:
-        doubtful = used > tol.TOIL or (used > tol.EASY and abs(lost) > tol.SOFT_SHARE * large)
-    else:
-        large += tol.CHANGE_SHARE * share * (abs((push - at.push) * ahead) + abs((torque - at.torque) * turn))
-        doubtful = used > tol.EASY and (lost > large or lost < -tol.GAINED * large)
-    doubtful = doubtful and handle.limits.method == NEWTON and problem.friction.coefficient == 0.0
-    # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
-    told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
-    if doubtful and not told and share > (1.0 + tol.OVERSHOOT) * introducer.finest:
-        if not pending:
-            remember(problem, at, k, reached)
-        return ROUGH
-    if doubtful and lost > large:
-        note_snap(problem, at, k, segments_at(at.inserted, handle.table.segment)[0], (reached[0], lost))
-    trust(handle, k, reached, doubtful)
-    at.push, at.torque, at.pull, at.dissipated = push, torque, pull, at.dissipated + lost
-    return CONVERGED
+    large = tol.WORK_SHARE * work + tol.ENERGY_SHARE * max(abs(reached[2]), abs(at.energy)) + tol.LOSS_SHARE * rubbed
+    change = abs((push - at.push) * ahead) + abs((torque - at.torque) * turn)
+    way = max(abs(ahead), abs(onwards))
+    share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
+    return Books(push, torque, pull, way, share, lost, lost - rubbed, large, change)
+
+
+@inlined
+def doubt(books: Books, used: int, shrink: float, pivot: float) -> bool:
+    """Whether a shorter step may lead elsewhere. used, shrink, pivot : of the step."""
+    missing, large = books.missing, books.large
+    # a step that the tip's sight alone keeps short is easier than a long one
+    toil = tol.TOIL * max(min(books.share, 1.0), tol.SIGHT_SHARE) if shrink == 1.0 else tol.TOIL
+    if used > toil or abs(missing) > tol.STRANGE * large + books.change:
+        return True
+    if pivot < tol.SOFT:
+        return used > tol.EASY and abs(missing) > tol.SOFT_SHARE * large
+    large += tol.CHANGE_SHARE * books.share * books.change
+    return (used > tol.EASY and missing > large) or (used > tol.SWIFT and missing < -tol.GAINED * large)
 
 
 @merged
@@ -98,19 +143,20 @@ def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
 
 
 @merged
-def note_snap(problem: Problem, at: Any, k: int, was: int, reached: tuple[float, float]) -> None:
-    """Write down that a wire of ``was`` segments snapped on its way to k segments.
-
-    reached : the depth, mm, and the energy released, N mm. Where there are too many the last place is taken again. A
-    wire that went no further than its base was pushed did not snap: that is what the trapezium rule leaves of its work.
-    """
-    snaps, x = problem.scratch.snaps, problem.state.x
+def way_of_joints(problem: Problem, at: Any, k: int, segment: float) -> float:
+    """Largest way of a joint in this step, mm. Joints are counted from the tip: there they stay with the material."""
+    x, was = problem.state.x, segments_at(at.inserted, segment)[0]
     common = min(k, was)
-    at.seen_calm = 0.0
-    # joints are counted from the tip: there they stay with the material
-    moved = farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)
-    if moved < tol.SNAP_WAYS * abs(reached[0] - at.inserted):
-        return
+    return farthest(x[CURRENT], k - common, x[LAST_GOOD], was - common, common + 1)
+
+
+@merged
+def note_snap(problem: Problem, at: Any, moved: float, reached: tuple[float, float]) -> None:
+    """Write down that a wire snapped.
+
+    reached : the depth, mm, and the energy released, N mm. Where there are too many the last place is taken again.
+    """
+    snaps = problem.scratch.snaps
     snap = snaps[min(at.snaps, snaps.size - 1)]
     at.snaps = min(at.snaps + 1, snaps.size)
     snap.from_mm, snap.to_mm, snap.released_N_mm, snap.moved_mm = at.inserted, reached[0], reached[1], moved
