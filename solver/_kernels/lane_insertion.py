@@ -11,7 +11,7 @@ from solver._kernels import data
 from solver._kernels.bare import bare
 from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
-from solver._kernels.flags import merged, owner, released
+from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lane_block import Block
@@ -76,7 +76,7 @@ def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: An
                 working += take_next(team, raw, lane) - 1
 
 
-@owner
+@kernel
 def next_goal(team: Team, plan: Plan, w: int) -> None:
     """Set the next depth as the goal of a wire, or let it idle where there is none."""
     me, wire = team.lanes[w], team.wires[w]
@@ -88,7 +88,7 @@ def next_goal(team: Team, plan: Plan, w: int) -> None:
         me.outcome, me.iterations, me.phase = data.CONVERGED, 0, READY
 
 
-@owner
+@kernel
 def take_next(team: Team, raw: Block, lane: int) -> int:
     """Give a lane the shortest wire that waits for one; return 0 where none does.
 
@@ -107,7 +107,7 @@ def take_next(team: Team, raw: Block, lane: int) -> int:
     return 1
 
 
-@owner
+@kernel
 def finish(team: Team, plan: Plan, raw: Block, lane: int) -> None:
     """End the relaxation in a lane, and lead its wire to the start of the next one."""
     w = team.seats[lane].wire
@@ -119,7 +119,7 @@ def finish(team: Team, plan: Plan, raw: Block, lane: int) -> None:
     proceed(team, plan, w)
 
 
-@owner
+@kernel
 def proceed(team: Team, plan: Plan, w: int) -> None:
     """Lead a wire on until the next step has to be relaxed or nothing is left to do."""
     me, wire = team.lanes[w], team.wires[w]
@@ -162,7 +162,7 @@ def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> boo
     return finite and not resting
 
 
-@owner
+@kernel
 def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
     """Keep a step or take it back, as in ``minimise.relax_with_friction``, ``insertion.step`` and ``go``."""
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
@@ -174,7 +174,7 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
     me.phase = READY if goes_on else STOPPED
 
 
-@owner
+@kernel
 def write_down(team: Team, plan: Plan, w: int) -> None:
     """Write down a wire at a depth."""
     me, wire = team.lanes[w], team.wires[w]

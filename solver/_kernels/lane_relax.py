@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from solver._kernels import newton_method
 from solver._kernels.crossing import free_fraction
 from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
-from solver._kernels.flags import kernel, merged, owner
+from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.lane_block import (
     ACCEPTED,
@@ -220,7 +220,7 @@ def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     number[FULL, lane] = number[CLEAR, lane] = 0.0
 
 
-@owner
+@kernel
 def go_alone(team: Team, raw: Block, lane: int) -> None:
     """Do one iteration of a lane by itself, or end its relaxation where none is left."""
     w = team.seats[lane].wire
