@@ -26,7 +26,7 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
     """Whether a wire with joints x, of k segments, comes through a wall. margin : its radius, mm."""
     if not passes_crease(field, x, k):
         return False
-    last, known = (0.0, 0.0, 0.0, 0.0), False
+    level, last, known, inside = -margin, (0.0, 0.0, 0.0, 0.0), False, False
     for n in range(1, k + 1):
         a, b = load3(x, n - 1), load3(x, n)
         d = minus(b, a)
@@ -35,13 +35,18 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
             known = False
             continue
         steps = math.ceil(2 * way / field.spacing)
-        for i in range(1 if known else 0, steps + 1):
-            here = foot(field, mix(1.0 - i / steps, a, i / steps, b), -margin)
-            if here[3] == math.inf:
-                continue
-            if known and parted(field, last, here, -margin):
-                return True
-            last, known = here, True
+        i = 1 if known else 0
+        while i <= steps:
+            q = mix(1.0 - i / steps, a, i / steps, b)
+            room = level - distance(field, q)
+            here = (q[0], q[1], q[2], level - room) if room >= 0.0 else foot(field, q, level)
+            if here[3] < math.inf:
+                # a wire that stays in its lumen is its own foot
+                if known and not (inside and room >= 0.0) and parted(field, last, here, level):
+                    return True
+                last, known, inside = here, True, room >= 0.0
+            # as far as the distance's slope lets it, it does so
+            i += 1 + int(max(room, 0.0) * steps / (field.slope * way))
     return False
 
 
