@@ -71,7 +71,6 @@ def _compile(*kernels: Any) -> None:
     work = Workspace(WIRE, None, "tip", Settings().limits)
     work.clamp(np.zeros(3), np.eye(3))
     known = {
-        "problem": work.problem,
         "field": work.field,
         "x": work.problem.state.x[0],
         "table": work.table,
@@ -88,9 +87,10 @@ def _compile(*kernels: Any) -> None:
         **dict.fromkeys(("depth", "roll", "to_depth", "to_roll"), 1.0),
         **dict.fromkeys(("first", "ahead", "tolerance", "margin", "share", "last"), 1.0),
     }
+    types = {"problem": untyped.typeof(work.handle).field_dict["problem"]}
     for kernel in kernels:
         names = inspect.signature(kernel.py_func).parameters
-        kernel.compile(tuple(untyped.typeof(known[name]) for name in names))
+        kernel.compile(tuple(types.get(name) or untyped.typeof(known[name]) for name in names))
 
 
 def _wall() -> VesselWall:

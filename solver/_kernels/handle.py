@@ -7,6 +7,7 @@ from numba.core import cgutils
 from numba.experimental import structref
 
 from solver._kernels.bare import bare
+from solver._kernels.data import Problem
 from solver._kernels.flags import entry_point
 
 extend: Any = extending
@@ -34,6 +35,11 @@ class HandleType(types.StructRef):
     """Numba's type of a handle."""
 
 
+@structref.register
+class ProblemType(types.StructRef):
+    """The type of the problem behind a handle: handed on by value, it would be 370 words for every call."""
+
+
 def reader(name: str) -> Any:
     """What makes the instructions that read a field, without counting who holds the arrays in it: they are bare.
 
@@ -47,27 +53,42 @@ def reader(name: str) -> Any:
         contents = kind.get_data_type()
         stored = context.data_model_manager[contents].get_value_type().as_pointer()
         data = builder.bitcast(builder.load(builder.gep(record, [build.int32_t(3)])), stored)
-        return getattr(build.create_struct_proxy(contents)(context, builder, ref=data), name)
+        value = getattr(build.create_struct_proxy(contents)(context, builder, ref=data), name)
+        if context.enable_nrt and isinstance(kind.field_dict[name], ProblemType):
+            # who counts will take this one back
+            context.nrt.incref(builder, kind.field_dict[name], value)
+        return value
 
     return read
 
 
 for field in Contents._fields:
     extend.lower_getattr(HandleType, field)(reader(field))
+for field in Problem._fields:
+    extend.lower_getattr(ProblemType, field)(reader(field))
 
 
 class Handle(structref.StructRefProxy):
     """The contents as compiled code sees them: their fields are read there alone."""
 
 
+class ProblemHandle(structref.StructRefProxy):
+    """A problem as compiled code sees it."""
+
+
 structref.define_proxy(Handle, HandleType, list(Contents._fields))  # type: ignore[no-untyped-call]
+structref.define_proxy(ProblemHandle, ProblemType, list(Problem._fields))  # type: ignore[no-untyped-call]
 
 
 @entry_point
 def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, report: Any, force: Any) -> Any:
     """The handle of the contents, which must be kept beside it."""
+    p = bare(problem)
+    inner = ProblemHandle(  # type: ignore[no-untyped-call]
+        p.field, p.stiffness, p.friction, p.shaft, p.chain, p.state, p.scratch, p.skips, p.twisting, p.straight
+    )
     return Handle(  # type: ignore[no-untyped-call]
-        bare(problem), bare(table), bare(introducer), limits, bare(place), bare(report), bare(force)
+        inner, bare(table), bare(introducer), limits, bare(place), bare(report), bare(force)
     )
 
 
