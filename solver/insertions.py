@@ -7,7 +7,7 @@ take little longer than one; see ``_kernels.lanes``.
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from functools import partial
 from typing import Any
@@ -77,9 +77,27 @@ class Insertions:
                 stack.callback(job.insertion._release)
             tasks = [task for kind in kinds.values() for task in _tasks(kind, self.threads)]
             with ThreadPoolExecutor(self.threads) as pool:
-                for ended in [pool.submit(task) for task in tasks]:
-                    ended.result()
+                _outlast([pool.submit(task) for task in tasks], kinds.values())
         return [job.found for job in jobs]
+
+
+def _outlast(running: list[Future[None]], waiting: Iterable[deque[Job]]) -> None:
+    """Wait for threads to end, however often Ctrl-C is pressed: a wire given back before moves on under its next user.
+
+    After the first time they take no more jobs; those that they are at go on to their ends.
+    """
+    pressed = None
+    while not all(task.done() for task in running):
+        try:
+            wait(running)
+        except KeyboardInterrupt as interrupt:
+            pressed = interrupt
+            for queue in waiting:
+                queue.clear()
+    for task in running:
+        task.result()
+    if pressed is not None:
+        raise pressed
 
 
 def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:

@@ -71,7 +71,7 @@ def go(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, in
 def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
     """Get ready for a goal; return how many iterations it may take: a cap on the time of a hopeless scene."""
     at, introducer = handle.place[0], handle.introducer
-    at.rubbed, at.dissipated, at.snaps, at.seen_depth = 0.0, 0.0, 0, math.nan
+    at.rubbed, at.dissipated, at.snaps, at.seen_depth, at.resigned = 0.0, 0.0, 0, math.nan, 0.0
     if turns_back(handle, to_depth - at.inserted, to_roll - at.roll):
         at.shrink = min(at.shrink, tol.REFINE * introducer.finest)
     steps = abs(to_depth - at.inserted) / introducer.step + abs(to_roll - at.roll) / introducer.turn
@@ -115,6 +115,9 @@ def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[boo
         at.shrink = min(1.0, 2 * at.shrink)
     elif outcome == data.ROUGH:
         at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
+    elif helps and at.resigned == 0.0 and not math.isnan(at.seen_depth) and outcome != data.THROUGH_WALL:
+        # it is for what long steps lead to that short ones are taken: without them that is all there is
+        at.resigned, at.shrink = 1.0, 1.0
     elif helps:
         at.shrink *= 0.5
     return outcome == data.CONVERGED or outcome == data.ROUGH or helps, outcome
@@ -160,6 +163,8 @@ def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: in
     energy += stored
     if outcome == data.CONVERGED and laid == 0:
         outcome = account(handle, k, (depth, roll, energy), used)
+    elif outcome == data.CONVERGED and handle.report[0].pivot < tol.CRITICAL:
+        at.calm = 0.0
     if laid > 0 or outcome == data.CONVERGED:
         note_change(problem, data.CURRENT, k)
         at.last_step, at.last_turn = depth - at.inserted, roll - at.roll

@@ -71,7 +71,7 @@ one that last led down.     patience : steps to take before it is lowered.     r
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(
-    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise")),
+    *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise", "resigned")),
     *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm")),
     *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
     *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
@@ -80,6 +80,7 @@ PLACE = record(
 """Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
 step, mm and degrees.
 rise : energy of a start that is not foreseen above what the hand's push leads to, N mm, when last asked; it fades.
+resigned : 1 where short steps to where a rough one led failed: then long ones are taken, whatever they do.
 
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
 by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.

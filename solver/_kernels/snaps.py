@@ -52,14 +52,14 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot)
     # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
     told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
-    if doubtful and not told and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
+    if doubtful and not told and at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
         if not pending:
             remember(problem, at, k, reached)
         return ROUGH
     # a wire that went no further than its base was pushed did not snap: the trapezium rule left that of its work
     if doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change:
         note_snap(problem, at, moved, (reached[0], books.missing))
-    trust(handle, k, reached, doubtful and moved > tol.ELSEWHERE_MM)
+    trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
     at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
     return CONVERGED
 
@@ -128,8 +128,8 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
     left = abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) + abs(at.next - at.seen_catheter)
     if left < tol.MATCH_DEPTH_MM:
         same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
-        at.calm = at.seen_calm + ahead if same and report.pivot > tol.LOOSE else 0.0
-        at.seen_depth = math.nan
+        at.calm = at.seen_calm + ahead if same and at.resigned == 0.0 and report.pivot > tol.LOOSE else 0.0
+        at.seen_depth, at.resigned = math.nan, 0.0
 
 
 @merged

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 
+import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Insertions
+from solver import Grid, GuideWire, Insertion, Insertions, VesselWall
 from solver import _tolerances as tol
 
 STIFF = GuideWire(1.0, 0.18, 10.0)
@@ -70,3 +72,20 @@ def test_a_long_way_leads_where_short_ones_do() -> None:
     for a, b in zip(one.to_depths([depth, 2.0]), other.to_depths([depth, 2.0]), strict=True):
         assert (a.joints_mm == b.joints_mm).all()
         assert a.counts == b.counts
+
+
+def test_wires_in_threads_are_held_until_the_threads_end_however_often_ctrl_c_is_pressed() -> None:
+    x, y, _ = np.meshgrid(*(np.arange(-3.0, end, 0.4) for end in (3.0, 3.0, 40.0)), indexing="ij")
+    wall = VesselWall(Grid(np.hypot(x - 0.3, y) - 1.0, [0.4] * 3, [-3.0] * 3), 5.0)
+    wires = [Insertion(GuideWire(0.25, 0.18, 1.0), wall, [0, 0, 0], [0, 0, 1], step_mm=0.01) for _ in range(40)]
+    together = Insertions(wires)
+    together.to_depths([0.5])
+    press = [threading.Timer(t, os.kill, (os.getpid(), signal.SIGINT)) for t in (0.2, 0.4)]
+    for timer in press:
+        timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        together.to_depths(np.arange(1.0, 30.0))
+    depths = [wire.depth_mm for wire in wires]
+    time.sleep(0.2)
+    assert [wire.depth_mm for wire in wires] == depths, "nothing moves when the call has ended"
+    assert all(not wire._lock.locked() for wire in wires)
