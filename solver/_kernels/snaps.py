@@ -96,10 +96,11 @@ def doubt(books: Books, used: int, shrink: float, pivot: float) -> bool:
     missing, large = books.missing, books.large
     # a step that the tip's sight alone keeps short is easier than a long one
     toil = tol.TOIL * max(min(books.share, 1.0), tol.SIGHT_SHARE) if shrink == 1.0 else tol.TOIL
-    if used > toil or abs(missing) > tol.STRANGE * large + books.change:
+    some = abs(missing) > tol.SOFT_SHARE * large
+    if (used > toil and (some or pivot < tol.SOFT)) or abs(missing) > tol.STRANGE * large + books.change:
         return True
     if pivot < tol.SOFT:
-        return used > tol.EASY and abs(missing) > tol.SOFT_SHARE * large
+        return used > tol.EASY and some
     large += tol.CHANGE_SHARE * books.share * books.change
     return (used > tol.EASY and missing > large) or (used > tol.SWIFT and missing < -tol.GAINED * large)
 
