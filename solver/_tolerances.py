@@ -148,7 +148,7 @@ SWIFT = 3
 entry, at which the trapezium rule is wrong; of 16 hops that showed by a gain alone 12 took more."""
 TOIL = 20
 """Iterations of a step that a wire takes without hopping, mostly: by them alone 12 of 139 hops at sharp edges showed,
-and what a soft wire loses in a hop may be nothing."""
+and what a soft wire loses in a hop may be nothing. A stiff one must miss some work besides: it buckles in a sheath."""
 SIGHT_SHARE = 0.5
 """Least share of TOIL for a step that is kept short by what the tip sees: one of 0.25 mm hopped by 14 iterations."""
 WORK_SHARE = 0.01
@@ -168,7 +168,8 @@ GAINED = 2.0
 """What a stiff wire may gain over what it may lose: half of the hops at sharp edges, where the tip is lifted over a
 step that would have stopped it, gained more."""
 SOFT_SHARE = 0.2
-"""Share of what a stiff wire may miss that is too much for a soft one, whichever sign it has."""
+"""Share of what a stiff wire may miss that is too much for a soft one, and for a stiff one beyond TOIL, whichever sign
+it has."""
 CRITICAL = 0.001
 """Pivot below which the wire is about to give way, in whichever direction rounding says."""
 FREE = 0.05

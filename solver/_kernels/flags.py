@@ -1,4 +1,4 @@
-"""How compiled functions are compiled: seven decorators.
+"""How compiled functions are compiled: eight decorators.
 
 Machine code that Python can call is made for entry points alone. Unpacking a kernel's forty arrays is code too: made
 for every kernel, it would take as long again as compiling the kernels themselves.

@@ -1,22 +1,18 @@
-"""Where a step of a wire that goes in lanes starts: as ``start.extrapolate_start`` says, with eight look-ups at a time.
+"""Where a step of a wire that goes in lanes starts: as ``start.chosen`` says, with eight look-ups at a time.
 
 Its points are looked up beside each other, as those of eight wires are in a trial.
 """
 
-import math
 from typing import Any, NamedTuple
 
-from solver import _tolerances as tol
 from solver._kernels import wall_law
 from solver._kernels.algebra import dot, load3, minus, store3
-from solver._kernels.crossing import crossed
-from solver._kernels.data import CURRENT, TRIAL, Problem
+from solver._kernels.data import Problem
 from solver._kernels.energy import bending_energy, energy_of, load_energy, placed
 from solver._kernels.flags import kernel
 from solver._kernels.lane_field import look_first, look_up
 from solver._kernels.lanes import WIDTH
-from solver._kernels.rollout import copy_base, place
-from solver._kernels.start import change_again
+from solver._kernels.start import chosen
 
 
 class Desk(NamedTuple):
@@ -29,31 +25,8 @@ class Desk(NamedTuple):
 
 @kernel
 def chosen_start(problem: Problem, desk: Desk, at: Any, k: int, share: float) -> int:
-    """``start.extrapolate_start`` of the current state."""
-    goal = at.energy + at.push * share * at.last_step
-    change_again(problem, k, share)
-    asked = share != 0.0 and at.rise > 0.0
-    rise = foresee(problem, desk, k) - goal if asked else math.inf
-    if not (rise < tol.SURELY_FORESEEN * at.rise and not crossed(problem, CURRENT, k)):
-        at.rise = total_energy(problem, desk, CURRENT, k) - goal
-        if share == 0.0 or problem.state.energies[CURRENT].wall == 0.0:
-            at.rise = 0.0
-            return CURRENT
-        rise = rise if asked else foresee(problem, desk, k) - goal
-        if not (rise < tol.WORTH_FORESEEING * at.rise and not crossed(problem, CURRENT, k)):
-            return CURRENT
-    else:
-        at.rise *= tol.STILL_RISES
-    problem.scratch.counters[0].starts_foreseen += 1
-    return TRIAL
-
-
-@kernel
-def foresee(problem: Problem, desk: Desk, k: int) -> float:
-    """``start.foresee``."""
-    copy_base(problem.state, CURRENT, TRIAL)
-    place(problem.chain, problem.state, TRIAL, k)
-    return total_energy(problem, desk, TRIAL, k)
+    """``start.chosen`` with eight look-ups at a time."""
+    return chosen(problem, at, k, share, total_energy, desk)
 
 
 @kernel

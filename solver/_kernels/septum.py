@@ -38,8 +38,9 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
         i = 1 if known else 0
         while i <= steps:
             q = mix(1.0 - i / steps, a, i / steps, b)
-            room = level - distance(field, q)
-            here = (q[0], q[1], q[2], level - room) if room >= 0.0 else foot(field, q, level)
+            v = distance(field, q)
+            room = level - v
+            here = (q[0], q[1], q[2], v) if room >= 0.0 else foot(field, q, v, level)
             if here[3] < math.inf:
                 # a wire that stays in its lumen is its own foot
                 if known and not (inside and room >= 0.0) and parted(field, last, here, level):
@@ -91,9 +92,9 @@ def distance(field: Field, q: Three) -> float:
 
 
 @kernel
-def foot(field: Field, q: Three, level: float) -> Foot:
-    """Go down the distance from a place until it is ``level``, mm, or until a lumen too narrow for that is deepest."""
-    c, v = field.coefficients, distance(field, q)
+def foot(field: Field, q: Three, v: float, level: float) -> Foot:
+    """Go down the distance from a place, where it is v, to ``level``, mm, or to where a narrower lumen is deepest."""
+    c = field.coefficients
     for _ in range(tol.FOOT_STEPS):
         if v <= level + tol.FOOT_MM:
             # the last of these steps ends a rounding above the level or below it
@@ -166,5 +167,5 @@ def joined(field: Field, p: Three, q: Three, top: float) -> bool:
 @kernel
 def deeper(field: Field, a: Foot) -> Three:
     """A place up to a voxel further in the lumen than a foot: there a flood cannot slip over a ridge."""
-    b = foot(field, a[:3], a[3] - field.spacing)
+    b = foot(field, a[:3], distance(field, a[:3]), a[3] - field.spacing)
     return b[:3] if b[3] < math.inf else a[:3]

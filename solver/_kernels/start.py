@@ -97,22 +97,39 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
 
 @cached
 def extrapolate_start(problem: Problem, at: Any, k: int, share: float) -> int:
+    """``chosen`` by looking up one point after the other."""
+    return chosen(problem, at, k, share, energy_of_start, problem)
+
+
+@kernel
+def energy_of_start(problem: Problem, _: Problem, slot: int, k: int) -> float:
+    """Energy of a start, N mm."""
+    return total_energy(problem, slot, 0, k)
+
+
+@merged
+def chosen(problem: Problem, at: Any, k: int, share: float, energy: Any, desk: Any) -> int:
     """Return the slot to start from: CURRENT, or TRIAL with a share of the last change where that is clearly lower.
 
     Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
     at : the record ``records.PLACE``. Held against each other is what they lie above the energy that the hand's push
     leads to; where the change leaves a small part of what the slid start had when it was last asked, it is not asked.
+    energy : of a slot, from (problem, desk, slot, k).
     """
     goal = at.energy - at.stored + at.push * share * at.last_step
     change_again(problem, k, share)
-    asked = share != 0.0 and at.rise > 0.0
-    rise = foresee(problem, k) - goal if asked else math.inf
+    rise, asked = math.inf, share != 0.0 and at.rise > 0.0
+    if asked:
+        foresee(problem, k)
+        rise = energy(problem, desk, TRIAL, k) - goal
     if not (rise < tol.SURELY_FORESEEN * at.rise and not crossed(problem, CURRENT, k)):
-        at.rise = total_energy(problem, CURRENT, 0, k) - goal
+        at.rise = energy(problem, desk, CURRENT, k) - goal
         if share == 0.0 or problem.state.energies[CURRENT].wall == 0.0:
             at.rise = 0.0
             return CURRENT
-        rise = rise if asked else foresee(problem, k) - goal
+        if not asked:
+            foresee(problem, k)
+            rise = energy(problem, desk, TRIAL, k) - goal
         if not (rise < tol.WORTH_FORESEEING * at.rise and not crossed(problem, CURRENT, k)):
             return CURRENT
     else:
@@ -132,11 +149,10 @@ def change_again(problem: Problem, k: int, share: float) -> None:
 
 
 @kernel
-def foresee(problem: Problem, k: int) -> float:
-    """Lay the TRIAL state out from its controls; return its energy, N mm."""
+def foresee(problem: Problem, k: int) -> None:
+    """Lay the TRIAL state out from its controls."""
     copy_base(problem.state, CURRENT, TRIAL)
     place(problem.chain, problem.state, TRIAL, k)
-    return total_energy(problem, TRIAL, 0, k)
 
 
 @merged
