@@ -24,9 +24,12 @@ def sheath_distance(points: Array, bore_mm: float) -> Array:
     return np.asarray(np.where(z < MOUTH_MM, tube, bend_distance(points)))
 
 
+TUBE_LUMEN_MM = 0.5
+
+
 def bent_tube(points: Array) -> Array:
-    """The bend without its inlet, and with a lumen of 0.5 mm."""
-    return _axis_distance(points, 0.0, BEND_TURN_MM) - 0.5
+    """The bend without its inlet, and with a narrow lumen."""
+    return _axis_distance(points, 0.0, BEND_TURN_MM) - TUBE_LUMEN_MM
 
 
 def lumen_distance(kind: str, points: Array, radius: float) -> Array:

@@ -6,10 +6,10 @@ import numpy as np
 
 from pipeline.benchmark.claims import Claim
 from pipeline.benchmark.scenes import RADIUS_MM, BenchScene
-from pipeline.benchmark.vessels import BEND_TURN_MM, bent_tube
+from pipeline.benchmark.vessels import BEND_TURN_MM, TUBE_LUMEN_MM, bent_tube
 from solver import GuideWire, Insertion
 
-COEFFICIENT, LUMEN_MM, LENGTH_MM, PULL_N, TWIST_N_MM2 = 0.1, 0.5, 45.0, 0.5, 0.4
+COEFFICIENT, LENGTH_MM, PULL_N, TWIST_N_MM2 = 0.1, 45.0, 0.5, 0.4
 TURNED_DEG = 150.0
 
 
@@ -19,13 +19,13 @@ def whip() -> Claim:
     The tension F presses F/R per mm on the wall that bends the shaft to R, and μ r F/R per mm holds against turning:
     over a length L that is μ r F L²/(2 R GJ). Within (EI/F)^½ = 0.45 mm of its ends it is not pressed so: 2 % of L.
     """
-    inner = BEND_TURN_MM - (LUMEN_MM - RADIUS_MM)
+    inner = BEND_TURN_MM - (TUBE_LUMEN_MM - RADIUS_MM)
     turn = LENGTH_MM / inner
     wire = GuideWire(0.25, RADIUS_MM, 0.1, torsional_stiffness_N_mm2=TWIST_N_MM2)
     box = ((-3.0, -3.0, -3.0), (34.0, 3.0, 34.0))
     tube = BenchScene("tube", LENGTH_MM, wall_stiffness=20.0, friction=COEFFICIENT, distance=bent_tube, box=box)
     load = (PULL_N * math.sin(turn), 0.0, PULL_N * math.cos(turn))
-    entry, axis = (LUMEN_MM - RADIUS_MM, 0.0, 0.0), (1.0, 0.0, 0.0)
+    entry, axis = (TUBE_LUMEN_MM - RADIUS_MM, 0.0, 0.0), (1.0, 0.0, 0.0)
     insertion = Insertion(wire, tube.wall(voxel_mm=0.25), entry, tube.direction, material_axis=axis, tip_load_N=load)
     straight, rolls = np.arange(1.0, LENGTH_MM + 1.0), np.arange(10.0, TURNED_DEG + 1.0, 10.0)
     *_, turned = insertion.to_depths([*straight, *[LENGTH_MM] * len(rolls)], [*(0.0 * straight), *rolls])
