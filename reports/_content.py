@@ -84,15 +84,12 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
     return shown
 
 
-def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The one number over all validation cases, with what it rests on."""
-    label = "mm rms, simulated to traced wire, all validation cases"
-    first = cards([{"column": "rms_mm", "label": label}], pooled)
-    groups = {
-        "value": f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}",
-        "label": "validation cases / groups of them, which the interval resamples",
-    }
-    return [*first, groups] if first else []
+def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[dict[str, str]]:
+    """The numbers over all validation cases, and what their intervals rest on. table : overall.csv, a row or none."""
+    if table.empty:
+        return []
+    row = {str(name): value for name, value in table.iloc[0].items()}
+    return [*cards(entries, row), {"value": number(row["insertions"]), "label": number(row["interval"])}]
 
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:

@@ -137,6 +137,7 @@ def predictor(name: str, label: str, meaning: str) -> Column:
 
 
 SUMMARY = Table("summary.csv")
+OVERALL_FILE = "overall.csv"  # one row over all validation cases, with the columns of summary.csv
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")

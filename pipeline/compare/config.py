@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pipeline.ranges import Count, Positive
+from pipeline.ranges import Positive
 
 
 @dataclass(frozen=True)
@@ -11,5 +11,3 @@ class CompareConfig:
 
     sample_mm: Positive = 0.5
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
-    bootstrap: Count = 2000
-    """Resamples behind the 95 % intervals; 0 leaves them out."""

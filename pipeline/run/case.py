@@ -105,7 +105,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
         outputs.write_view(job.folder / "view", known)
-    summary = outputs.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
+    summary = outputs.summary_row(job.case, known, errors, log)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
     summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}

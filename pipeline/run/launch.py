@@ -6,7 +6,7 @@ agreement that no parameter moves is suspicious.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -220,6 +220,14 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
+        parts.append(_with_interval(totals.pooled))
     if totals.frames:
         parts.append(f"solver {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
     return ".  ".join(parts) + f".  report: {index}"
+
+
+def _with_interval(pooled: Mapping[str, Any]) -> str:
+    """The pooled error with its interval, or why there is none."""
+    ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
+    known = ends if np.isfinite(pooled["rms_low_mm"]) else ""
+    return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"

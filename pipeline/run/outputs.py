@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, is_pooled, pooled, skill_of
+from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of
 from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
@@ -27,21 +27,22 @@ TIMED = STAGES[:-1]
 SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
-def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
-    """The row of a case in summary.csv. errors : its rows of errors.csv; draws : resamples behind the intervals."""
+def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log) -> dict[str, Any]:
+    """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
     good = sum(frame.ok for frame in known.frames)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
     head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
-    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and is_pooled(row, mm)]
+    pairs = zip(errors, points, strict=True)
+    scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
         head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
-    return head | pooled(scored, draws) | times
+    return head | pooled(scored) | times
 
 
 def error_row(frame: Frame, log: Log) -> dict[str, Any]:
