@@ -16,6 +16,8 @@ from pipeline.model import Array, Curve, Lumen, arc_length
 from reports.schema import ERRORS, Column
 from solver import Solution
 
+COVERED_MM = 1.0
+"""A point of the traced curve counts as covered where the simulated wire is no farther away."""
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB
 
 
@@ -143,7 +145,7 @@ METRICS: dict[str, Metric] = {
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
     "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
     "branch_ok": same_branch,
-    "coverage": lambda pair: min(1.0, float(pair.arc_mm[-1]) / pair.curve_length_mm),
+    "coverage": lambda pair: float(np.mean(pair.back_mm <= COVERED_MM)),
 }
 
 

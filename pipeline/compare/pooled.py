@@ -1,6 +1,6 @@
 """Pooled statistics of frames, and their intervals over insertions. Points are pooled, RMSEs never averaged."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +51,18 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
             values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
     return result | _with_intervals(frames, points)
+
+
+WITHIN_MM = 1.0
+"""Largest 95th percentile of a frame that counts for ``within_1mm``."""
+
+
+def within(rows: Iterable[Row], planned: int) -> float:
+    """Share of ``planned`` frames with a result and a 95th percentile of at most 1 mm: a frame that fails adds none."""
+    good = [
+        row for row in rows if row["status"] == FrameStatus.OK.identifier and (row.get("p95_mm") or 0.0) <= WITHIN_MM
+    ]
+    return len(good) / planned if planned else float("nan")
 
 
 def numbers(frames: Sequence[Scored], name: str) -> Array:

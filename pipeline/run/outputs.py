@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of
+from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
 from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
@@ -37,6 +37,8 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log) -> di
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     pairs = zip(errors, points, strict=True)
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
+    if case.frames:
+        head["within_1mm"] = within(errors, len(errors))
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:

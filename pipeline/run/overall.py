@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.compare import intervals
-from pipeline.compare.pooled import Scored, by_insertion, is_pooled, pooled, squares_of
+from pipeline.compare.pooled import Scored, by_insertion, is_pooled, pooled, squares_of, within
 from pipeline.run.results import Result, found_results, lost
 from reports import tables
 from reports.schema import ERRORS, POINTS
@@ -52,8 +52,11 @@ def _scored(folder: Path, insertion: str) -> dict[int, Scored]:
 
 
 def validation(found: Sequence[Found]) -> list[Found]:
-    """The cases that numbers over the whole run are made of: a calibration case says nothing about the model."""
-    return [case for case in found if case.result.role != "calibration"]
+    """The cases that numbers over the whole run are made of.
+
+    A calibration case says nothing about the model, and one without scans has nothing to be compared with.
+    """
+    return [case for case in found if case.result.role != "calibration" and case.result.status != "simulated"]
 
 
 def frames_of(found: Sequence[Found]) -> list[Scored]:
@@ -71,7 +74,8 @@ def overall(found: Sequence[Found]) -> dict[str, Any]:
     counts = {name: sum(row.get(name) or 0 for row in rows) for name in ("frames", "frames_ok", "frames_failed")}
     good = all(case.result.ok for case in used)
     head = {"case": ALL, "role": "validation", "status": "ok" if good else "frames_failed", **counts}
-    return head | pooled(frames) | {"cases": len(used)}
+    share = within([frame.row for frame in frames], counts["frames"])
+    return head | pooled(frames) | {"within_1mm": share, "cases": len(used)}
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def measured_clamp(curves: Sequence[Curve], given: Clamp) -> Clamp:
     return replace(given, entry_mm=point, direction=tangent, note=note)
 
 
-__all__ = ["LEVELS", "guide_wire", "insertion_of", "measured_clamp", "simulate"]
+__all__ = ["LEVELS", "altered", "guide_wire", "insertion_of", "measured_clamp", "simulate"]
 
 
 LEVELS = ("wall_look_ups_done_fraction", "start_energy_N_mm")
@@ -71,6 +71,19 @@ def _scaled(profile: Profile, factor: float) -> float | NDArray[np.float64]:
     if isinstance(profile, (int, float)):
         return profile * factor
     return np.array(profile, dtype=np.float64) * (1.0, factor)
+
+
+def altered(wire: Wire, config: SimulateConfig) -> Wire:
+    """The manifest's wire with another taper and another rest curvature, as a sensitivity run asks for."""
+    stiffness = wire.bending_stiffness_N_mm2
+    if not isinstance(stiffness, (int, float)):
+        stiffness = [(distance * config.taper_scale, value) for distance, value in stiffness]
+    curvature = wire.rest_curvature_per_mm
+    if isinstance(curvature, (int, float)):
+        curvature *= config.rest_curvature_scale
+    else:
+        curvature = [(distance, value * config.rest_curvature_scale) for distance, value in curvature]
+    return replace(wire, bending_stiffness_N_mm2=stiffness, rest_curvature_per_mm=curvature)
 
 
 def guide_wire(wire: Wire, segment_mm: Segment, bending_scale: float = 1.0) -> GuideWire:
@@ -109,9 +122,10 @@ def insertion_of(
 ) -> Insertion:
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
+    friction = wall.friction if config.friction is None else config.friction
     return Insertion(
-        guide_wire(wire, solver.segment_mm, config.bending_scale),
-        VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=wall.friction, hull=solver.hull),
+        guide_wire(altered(wire, config), solver.segment_mm, config.bending_scale),
+        VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=friction, hull=solver.hull),
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,

@@ -115,9 +115,15 @@ def test_the_segment_length_cannot_flatter() -> None:
 def test_a_wire_too_short_is_seen_by_coverage_tip_and_the_way_back() -> None:
     result = compare(simulated(line(10.0)), traced(line(20.0)), open_space())
     assert result["rms_mm"] == pytest.approx(0.0, abs=1e-12)
-    assert result["coverage"] == pytest.approx(0.5)
+    assert result["coverage"] == pytest.approx(23 / 41), "10 mm, and the 1 mm beyond that is near enough"
     assert result["tip_mm"] == pytest.approx(10.0)
     assert result["hausdorff_mm"] == pytest.approx(10.0)
+
+
+def test_coverage_is_what_the_simulated_wire_comes_near_to() -> None:
+    """A wire of the right length in the wrong place covers nothing; by its length alone it covered all."""
+    assert compare(simulated(line(20.0, 1.5)), traced(line(20.0)), open_space())["coverage"] == 0.0
+    assert compare(simulated(line(20.0, 0.9)), traced(line(20.0)), open_space())["coverage"] == 1.0
 
 
 def test_tips_with_a_wall_between_them_are_in_different_branches() -> None:

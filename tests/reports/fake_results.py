@@ -305,6 +305,7 @@ def _sweep(cases: tuple[FakeCase, ...]) -> Iterator[dict[str, Any]]:
                     yield {
                         "parameter": parameter,
                         "value": f"{value:g}",
+                        "unchanged": "0" if "roll" in parameter else "1",
                         "case": case.name,
                         "rms_mm": rms,
                         "tip_median_mm": 2 * rms,

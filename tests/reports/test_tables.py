@@ -29,7 +29,7 @@ POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_
 SUMMARY_HEADER = (
     "case,group,role,status,frames,frames_ok,frames_failed,insertions,interval,effective_frames,rms_mm,rms_low_mm,rms_high_mm,mean_mm,p95_mm,"
     "max_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,"
-    "null_min_bending_rms_mm,null_previous_rms_mm,skill,skill_low,skill_high,branch_ok_fraction,coverage,"
+    "null_min_bending_rms_mm,null_previous_rms_mm,skill,skill_low,skill_high,branch_ok_fraction,coverage,within_1mm,"
     "trace_mean_median_mm,trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,num_mm,load_s,"
     "segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 )

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.model import Clamp
 from pipeline.run.log import Log
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
+from pipeline.simulate import LEVELS, altered, insertion_of, measured_clamp, simulate
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from solver import Snap, Solution
@@ -42,7 +42,8 @@ def simulate_frames(run: Context, known: Known) -> Known:
         return list(_noted(log, replay, found, len(frames)))
 
     try:
-        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire.rest_curvature_per_mm))
+        curvature = altered(case.wire, config.simulate).rest_curvature_per_mm
+        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, curvature))
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
