@@ -70,7 +70,8 @@ def size(n_bytes: int) -> str:
 def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -> list[dict[str, str]]:
     """The numbers at the head of a page; those that do not apply are left out.
 
-    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total.
+    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total, ``name`` that
+    of a word that follows the label.
     """
     shown = []
     for entry in entries:
@@ -80,7 +81,8 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            shown.append({"value": value, "label": f"{total}{entry['label']}{interval_95}"})
+            named = f" {statistics.get(entry['name'], '')}" if entry.get("name") else ""
+            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
 
 

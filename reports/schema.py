@@ -25,7 +25,7 @@ POOLED = {
 PLACES = (
     *("frames", "work"),  # case page: the table of frames, first how far, then forces and effort
     "cases",  # index page: the table of cases
-    "predictors",  # every figure with lines of trivial predictors
+    *("predictors", "rivals"),  # every figure with lines of trivial predictors; beside them where they are pooled
     *("error_by_depth", "tip_by_depth", "tip_angle_by_depth", "skill_by_depth"),  # panels against depth
     *("trace_by_depth", "truth_by_depth", "force_by_depth", "overlap_by_depth"),
 )

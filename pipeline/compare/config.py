@@ -11,3 +11,5 @@ class CompareConfig:
 
     sample_mm: Positive = 0.5
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
+    simulated_nulls: bool = True
+    """Whether simulators without the roll and without the tip's curve are among the predictors: 13 more insertions."""

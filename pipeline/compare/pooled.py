@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.compare import intervals
 from pipeline.compare.metrics import OF_POINTS
+from pipeline.compare.nulls import ANOTHER, rivals
 from pipeline.model import Array
 from pipeline.status import FrameStatus
 from reports.schema import ERRORS
@@ -100,6 +101,7 @@ def _with_intervals(frames: Sequence[Scored], points: Array) -> dict[str, Any]:
         "tip_low_mm": tips.low,
         "tip_high_mm": tips.high,
         **skill(frames, squares, nulls),
+        **strongest(frames, squares, points),
     }
 
 
@@ -117,6 +119,32 @@ def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "s
     value = 1.0 - float(squares[known].sum() / nulls[known].sum())
     # less error is more skill: the ends change places
     return {name: value, f"{name}_low": 1.0 - float(np.exp(ends.high)), f"{name}_high": 1.0 - float(np.exp(ends.low))}
+
+
+LEAST_SHARE = 0.5
+"""Of the points that a predictor must have a guess of to be the strongest: the first frame has no previous one."""
+
+
+def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[str, Any]:
+    """Skill against the predictor that leaves the least, of those that are told nothing of the frame; its name."""
+    depths = [
+        numbers([f for f in frames if f.insertion == one], "insertion_mm") for one in {f.insertion for f in frames}
+    ]
+    steps = np.abs(np.concatenate([np.diff(own) for own in depths]))
+    result: dict[str, Any] = {"frame_spacing_mm": float(np.median(steps)) if len(steps) else float("nan")}
+    best = {"skill_strongest": float("inf")}
+    for name in rivals():
+        nulls = points * numbers(frames, f"null_{name}_rms_mm") ** 2
+        known = np.isfinite(nulls)
+        if name == ANOTHER and known.any():
+            result["null_another_rms_mm"] = float(np.sqrt(nulls[known].sum() / points[known].sum()))
+        if points[known].sum() < LEAST_SHARE * points.sum():
+            continue
+        found = skill(frames, squares, nulls, "skill_strongest")
+        if found and found["skill_strongest"] < best["skill_strongest"]:
+            best = found
+            result["strongest_null"] = name
+    return result | (best if "strongest_null" in result else {})
 
 
 def _over_frames(rule: Callable[[Array, Array], float], values: Array, points: Array) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.run.another import with_another
 from pipeline.run.overall import found_cases, frames_of, overall, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
@@ -44,7 +45,7 @@ class Totals:
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases = found_cases(out)
-    found, whole = [case.result for case in cases], overall(cases)
+    found, whole = [case.result for case in cases], overall(with_another(out, cases))
     rows = [result.summary for result in found]
     failures = [row for result in found for row in result.failures]
     for file, table, given in (

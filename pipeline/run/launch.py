@@ -115,7 +115,7 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
     run_cases(plan, jobs)
     for point in plan.points:
-        here = replace(plan.template, settings=point.settings, out=out / point.folder, pictures=False, quiet=True)
+        here = replace(plan.template, settings=point.cheap, out=out / point.folder, pictures=False, quiet=True)
         run_cases(plan, [replace(here, case=case) for case in plan.cases])
     if plan.points:
         write_sweep(out, plan.template.settings, plan.cases, plan.points)

@@ -72,6 +72,16 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
     return row
 
 
+def with_strongest(errors: Sequence[dict[str, Any]], summary: Row) -> list[dict[str, Any]]:
+    """The rows of errors.csv with their skill against the case's strongest predictor."""
+    name = summary.get("strongest_null")
+    if not name:
+        return list(errors)
+    nulls = [row.get(f"null_{name}_rms_mm", float("nan")) for row in errors]
+    skills = [skill_of(row.get("rms_mm", float("nan")), null) for row, null in zip(errors, nulls, strict=True)]
+    return [row | {"skill_strongest": skill, "strongest_null": name} for row, skill in zip(errors, skills, strict=True)]
+
+
 def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
     """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
 

@@ -5,7 +5,7 @@ simulation and comparison only. An agreement that no parameter moves is suspicio
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,12 @@ class SweepPoint:
     parameter: str
     value: str
     settings: Resolved
+
+    @property
+    def cheap(self) -> Resolved:
+        """The settings without the predictors that are simulations: those of the plain run stand for all points."""
+        config = self.settings.config
+        return replace(self.settings, config=replace(config, compare=replace(config.compare, simulated_nulls=False)))
 
     @property
     def folder(self) -> Path:

@@ -105,3 +105,19 @@ def test_frames_that_resemble_their_neighbours_count_less(
 def test_nothing_to_tell_is_not_a_number() -> None:
     assert np.isnan(intervals.effective_frames([np.ones(2), np.ones(3)]))
     assert np.isnan(intervals.effective_frames([np.ones(9)]))
+
+
+def test_the_strongest_predictor_is_named_and_never_one_that_is_told() -> None:
+    """The previous frame leaves less than the centreline; what saw the frame's tip, or the next frame, still less."""
+    frames = []
+    for frame in scored(np.random.default_rng(5), 4):
+        row = {**frame.row, "insertion_mm": 10.0 + 2.0 * (len(frames) % 5), "null_previous_rms_mm": 1.5}
+        row |= {"null_pinned_rms_mm": 0.1, "null_neighbours_rms_mm": 0.1}
+        frames.append(frame._replace(row=row if len(frames) % 5 else {**row, "null_previous_rms_mm": None}))
+    result = pooled(frames)
+    assert result["strongest_null"] == "previous"
+    assert result["skill_strongest"] < result["skill"]
+    assert result["skill_strongest_low"] < result["skill_strongest"] < result["skill_strongest_high"]
+    assert result["frame_spacing_mm"] == 2.0
+    known = np.concatenate([frame.error_mm for i, frame in enumerate(frames) if i % 5])
+    assert result["skill_strongest"] == pytest.approx(1 - np.mean(known**2) / 1.5**2), "on the frames that it has"

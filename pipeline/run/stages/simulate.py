@@ -51,7 +51,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         log.warnings += [_told(frame.index, snap) for snap in wire.snaps]
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
-    return replace(known, frames=tuple(frames), clamp=clamp)
+    return replace(known, frames=tuple(frames), clamp=clamp, segment_mm=resolved.segment_mm)
 
 
 def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
