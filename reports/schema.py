@@ -17,6 +17,7 @@ POOLED = {
     "points": "from all points of the frames that are ok",
     "rms": "root of the mean square over frames, weighted by their number of points",
     "mean": "mean over frames",
+    "weighted": "mean over frames, weighted by their number of points",
     "median": "median over frames",
     "max": "largest over frames",
     "share": "fraction of frames in which it is true",
@@ -43,6 +44,8 @@ class Column:
     """One line for the reader."""
     kind: str = "float"
     """float, integer, boolean or text."""
+    formula: str = ""
+    """How it is computed: w are points of the simulated wire, c of the traced curve, at arc length s from the entry."""
     better: str = ""
     """low or high where a comparison of two runs has a direction, else empty."""
     pooled: str = ""

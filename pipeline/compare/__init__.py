@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays.polyline import resample
+from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, Pair, measured, pair_of, point_to_curve, rms
+from pipeline.compare.metrics import METRICS, Pair, Way, measured, pair_of, point_to_curve, rms
 from pipeline.model import Array, Curve, Lumen
 from solver import Solution
 
@@ -29,9 +30,15 @@ class Comparison(Pair):
         return self.values[name]
 
 
-def compare(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()) -> Comparison:
-    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
-    pair = pair_of(simulated, traced, lumen, config)
+def compare(
+    simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig(), way: Way | None = None
+) -> Comparison:
+    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
+
+    way : the vessel's axis and branches, which all frames share; without it there are the lumen's branches and no axis.
+    """
+    start = traced.points_mm[:1] if len(traced.points_mm) else np.zeros((1, 3))
+    pair = pair_of(simulated, traced, lumen, config, way or Way(None, branches_of(lumen.distance, start[0])))
     values = {name: measured(name, metric, pair) for name, metric in METRICS.items()}
     return Comparison(**vars(pair), values=values)
 

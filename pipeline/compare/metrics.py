@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.arrays.polyline import angle_deg, at_arc, resample, samples, tip_tangent
+from pipeline.compare.branches import Branches
 from pipeline.compare.config import CompareConfig
 from pipeline.model import Array, Curve, Lumen, arc_length
 from reports.schema import ERRORS, Column
@@ -18,6 +19,10 @@ from solver import Solution
 
 COVERED_MM = 1.0
 """A point of the traced curve counts as covered where the simulated wire is no farther away."""
+TANGENT_MM = 1.0
+"""The vessel's direction at the tip is that of its axis from so much before the tip's foot to so much behind it."""
+OFF_AXIS_MM = 0.1
+"""Nearer to the vessel's axis nobody knows on which side of it a wire lies: a third of a voxel."""
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB
 
 
@@ -61,6 +66,14 @@ def point_to_curve(points: ArrayLike, curve: ArrayLike) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
+class Way:
+    """What is known of the vessel beside its wall: its axis (k, 3) to the deepest tip, or None, and its branches."""
+
+    axis_mm: Array | None
+    branches: Branches
+
+
+@dataclass(frozen=True, eq=False)
 class Pair:
     """A simulated wire and the traced curve of the same frame.
 
@@ -68,7 +81,7 @@ class Pair:
     sample_mm (n, 3), arc_mm (n,) : equal steps along the wire, so that neither the segment length nor the density of
     the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve, and where along it that is.
     back_mm : distances the other way, from equal steps along the curve to the wire.     by_arc_mm : distances between
-    points of equal arc length.     lumen : the vessel.     max_penetration_mm : the wire's, of the soft wall.
+    points of equal arc length.     lumen : the vessel.     way : the vessel's axis and branches.
     """
 
     wire_mm: Array
@@ -81,13 +94,13 @@ class Pair:
     back_mm: Array
     by_arc_mm: Array
     lumen: Lumen
-    max_penetration_mm: float
+    way: Way
 
 
 Metric = Callable[[Pair], float | bool]
 
 
-def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig) -> Pair:
+def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
     """Sample both curves and measure their distances; ValueError where one of them is empty."""
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
@@ -107,7 +120,7 @@ def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareCon
         back_mm=point_to_curve(resample(curve, config.sample_mm), wire)[0],
         by_arc_mm=np.linalg.norm(at_arc(wire, common) - at_arc(curve, common), axis=1),
         lumen=lumen,
-        max_penetration_mm=simulated.max_penetration_mm,
+        way=way,
     )
 
 
@@ -118,15 +131,46 @@ def rms(values: ArrayLike) -> float:
 
 
 def same_branch(pair: Pair) -> bool:
-    """Whether the straight line between the tips stays in the lumen to half a voxel and what the wall gave way.
+    """Whether both tips lie in one branch of the lumen's graph; where branches meet, all of them are one."""
+    first, second = (pair.way.branches.at(curve[-1]) for curve in (pair.wire_mm, pair.curve_mm))
+    return bool(first & second)
 
-    Two wires in one vessel see each other; between two branches there is a wall.
-    """
-    grid, start, end = pair.lumen.distance, pair.wire_mm[-1], pair.curve_mm[-1]
-    chord = start + np.linspace(0.0, 1.0, 33)[:, None] * (end - start)
-    index = np.clip(np.rint(grid.to_index(chord)).astype(int), 0, np.array(grid.shape) - 1)
-    slack = 0.5 * float(grid.spacing_mm.max()) + pair.max_penetration_mm
-    return bool(np.max(grid.values[tuple(index.T)]) <= slack)
+
+def tip_offset(pair: Pair) -> tuple[float, float]:
+    """The simulated tip from the traced one, mm: along the vessel (positive: deeper), across it; NaN without axis."""
+    axis = pair.way.axis_mm
+    if axis is None or len(axis) < 2:
+        return float("nan"), float("nan")
+    offset, place = pair.wire_mm[-1] - pair.curve_mm[-1], point_to_curve(pair.curve_mm[-1], axis)[1]
+    last = float(arc_length(axis)[-1])
+    ends = at_arc(axis, np.clip([place[0] - TANGENT_MM, place[0] + TANGENT_MM], 0.0, last))
+    tangent = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    along = float(offset @ tangent)
+    return along, float(np.linalg.norm(offset - along * tangent))
+
+
+def depth_offset(pair: Pair) -> float:
+    """How much deeper the simulated wire lies along itself, mm: mean of the part along the trace at equal arc."""
+    arc = pair.arc_mm[: len(pair.by_arc_mm)]
+    if len(arc) < 2:
+        return float("nan")
+    wire, curve = at_arc(pair.wire_mm, arc), at_arc(pair.curve_mm, arc)
+    tangent = np.gradient(curve, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
+    return float(np.mean(np.sum((wire - curve) * tangent, axis=1)))
+
+
+def side_agrees(pair: Pair) -> float:
+    """Share of the points, of those where both wires lie 0.1 mm or more off the axis, at which they lie on one side."""
+    axis = pair.way.axis_mm
+    if axis is None or len(axis) < 2:
+        return float("nan")
+    arc = pair.arc_mm[: len(pair.by_arc_mm)]
+    curves = [at_arc(curve, arc) for curve in (pair.wire_mm, pair.curve_mm)]
+    feet = [at_arc(axis, point_to_curve(points, axis)[1]) for points in curves]
+    first, second = (points - foot for points, foot in zip(curves, feet, strict=True))
+    known = np.minimum(np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)) >= OFF_AXIS_MM
+    return float(np.mean(np.sum(first * second, axis=1)[known] > 0)) if known.any() else float("nan")
 
 
 OF_POINTS: dict[str, Callable[[Array], float]] = {
@@ -145,6 +189,10 @@ METRICS: dict[str, Metric] = {
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
     "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
     "branch_ok": same_branch,
+    "tip_along_mm": lambda pair: tip_offset(pair)[0],
+    "tip_across_mm": lambda pair: tip_offset(pair)[1],
+    "depth_offset_mm": depth_offset,
+    "side_ok": side_agrees,
     "coverage": lambda pair: float(np.mean(pair.back_mm <= COVERED_MM)),
 }
 

@@ -13,7 +13,8 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
-from pipeline.compare.metrics import point_to_curve, rms
+from pipeline.compare.branches import branches_of
+from pipeline.compare.metrics import Way, point_to_curve, rms
 from pipeline.compare.pinned import pinned
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
@@ -64,6 +65,11 @@ class Clues:
         costs = np.where(open_to, cost(clearance), np.inf)
         path = voxel_path(self.room, costs, self.clamp.entry_mm, self.deepest_mm[-1])
         return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
+
+    @cached_property
+    def way(self) -> Way:
+        """The vessel's axis and its branches around the traced wires."""
+        return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
     @cached_property
     def straight_wire(self) -> GuideWire:

@@ -51,6 +51,9 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
         elif column.pooled in POOLING:
             values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
+    # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
+    left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
+    result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
     return result | _with_intervals(frames, points)
 
 
@@ -157,6 +160,7 @@ POOLING: dict[str, Callable[[Array, Array], float]] = {
     # a frame's mean square times its number of points is a sum of squares
     "rms": lambda values, points: float(np.sqrt(np.sum(points * values**2) / points.sum())),
     "mean": lambda values, _: float(np.mean(values)),
+    "weighted": lambda values, points: float(np.sum(points * values) / points.sum()),
     "share": lambda values, _: float(np.mean(values)),
     "median": lambda values, _: float(np.median(values)),
     "max": lambda values, _: float(np.max(values)),

@@ -21,6 +21,7 @@ from pipeline.run.case import Job
 from pipeline.study.manifest import read_manifest
 from pipeline.study.settings import resolve
 from reports.schema import ERRORS, SUMMARY, Column
+from tests.studies import metrics_page
 
 MANIFEST = """
 schema = 1
@@ -56,6 +57,12 @@ def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path)
         keys.add(job_key(tmp_path))
     assert len(keys) == 2
     assert job_key(tmp_path) in keys
+
+
+def test_every_metric_is_defined_in_one_place() -> None:
+    """Name, unit, formula and pooling stand in columns.toml; the page is made of them."""
+    assert not [name for name in metrics.METRICS if not ERRORS[name].formula]
+    assert metrics_page.PAGE.read_text(encoding="utf-8") == metrics_page.text(), "python -m tests.studies.metrics_page"
 
 
 class Scaled:

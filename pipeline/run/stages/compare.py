@@ -58,7 +58,7 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, see
         return frame
     assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
-    errors = compare(frame.simulated, curve, known.lumen, settings)
+    errors = compare(frame.simulated, curve, known.lumen, settings, None if clues is None else clues.way)
     if clues is None:
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings.sample_mm)
