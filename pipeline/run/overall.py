@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.compare import intervals
-from pipeline.compare.pooled import Scored, by_insertion, is_pooled, pooled, squares_of, within
+from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
 from pipeline.run.results import Result, found_results, lost
 from reports import tables
 from reports.schema import ERRORS, POINTS
@@ -95,18 +95,23 @@ class Ratio:
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
 
-def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
-    """How many times the error of ``before`` that of ``after`` is; None where they have no frame in common."""
+def pairs(before: Sequence[Found], after: Sequence[Found]) -> list[tuple[Scored, Scored]]:
+    """The frames that count in both runs, of validation cases."""
     old = {case.result.case: case.frames for case in validation(before)}
-    pairs = [
+    return [
         (old[case.result.case][number], frame)
         for case in validation(after)
         for number, frame in case.frames.items()
         if number in old.get(case.result.case, {})
     ]
-    if not pairs:
+
+
+def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
+    """How many times the error of ``before`` that of ``after`` is; None where they have no frame in common."""
+    both = pairs(before, after)
+    if not both:
         return None
-    first, second = [a for a, _ in pairs], [b for _, b in pairs]
+    first, second = [a for a, _ in both], [b for _, b in both]
     points = np.array([float(len(frame.error_mm)) for frame in second])
     # a wire of another length has other points: the squares are per point, times the points of one of the runs
     each = [squares_of(frames) / [len(f.error_mm) for f in frames] * points for frames in (first, second)]
@@ -114,4 +119,13 @@ def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
     low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(over, under, weights)))
     total = np.maximum([over.sum(), under.sum()], intervals.SMALLEST_MM2)
     value = float(np.sqrt(total[0] / total[1]))
-    return Ratio(value, float(low), float(high), len(pairs), intervals.note(len(weights)))
+    return Ratio(value, float(low), float(high), len(both), intervals.note(len(weights)))
+
+
+def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:
+    """Skill of ``after``, with its interval, against what a predictor left in ``before``: one rival for all points."""
+    both = pairs(before, after)
+    second = [frame for _, frame in both]
+    points = np.array([float(len(frame.error_mm)) for frame in second])
+    nulls = points * numbers([frame for frame, _ in both], f"null_{null}_rms_mm") ** 2
+    return skill(second, squares_of(second), nulls, "skill_strongest")

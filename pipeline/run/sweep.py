@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.run.overall import Found, found_cases, overall, ratio
+from pipeline.run.another import with_another
+from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
@@ -54,7 +55,7 @@ def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]
 
 def write_sweep(out: Path, plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint]) -> None:
     """sweep.csv: the plain result first, then every point, each of them case by case and over all of them."""
-    before = found_cases(out)
+    before = with_another(out, found_cases(out))
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))
     for point in points:
         head = {"parameter": point.parameter, "value": point.value}
@@ -89,4 +90,5 @@ def _row(
     found = None if head["parameter"] == PLAIN else ratio(before, after)
     if found is not None:
         row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
-    return row
+    null = overall(before).get("strongest_null")
+    return row | (skill_beside(before, after, null) if null and found is not None else {})
