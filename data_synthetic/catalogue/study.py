@@ -18,8 +18,8 @@ ENTRY_ERROR_VOXELS = 0.5
 """How far the manifest's entry is from the true one: what pointing at a scan achieves."""
 DIRECTION_ERROR_DEG = 2.0
 """How far the manifest's entry direction is from the true one."""
-ANEW_DEG, ANEW_MM = 180.0, 0.5
-"""How far roll and depths of a further insertion may be from those of the first, either way."""
+ANEW_DEG, ANEW_MM = 45.0, 0.5
+"""How far roll and depths of a further insertion are from those of the first, either way: its aim is the same."""
 DEPTH_NOISE_MM = 0.2
 """sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
 

@@ -6,6 +6,7 @@ Slices that follow each other one by one are a branch; where a slice has two aft
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ SLICE_VOXELS = 2.0
 """Thickness of a slice: two, so that neighbours of neighbours are never in the same one."""
 BUMP_RADII = 2.0
 """A dead end that is shorter than so many radii of the vessel that it leaves is no branch."""
-Labels = NDArray[np.int64]
+Labels = NDArray[np.integer[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +51,8 @@ def branches_of(distance: Grid, entry_mm: Array) -> Branches:
     first = inside[np.argmin(np.sum((inside - distance.to_index(entry_mm)) ** 2, axis=1))]
     way, _ = MCP_Geometric(np.where(depth > 0, 1.0, np.inf), sampling=tuple(distance.spacing_mm)).find_costs([first])
     reached = np.isfinite(way)
-    band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int64)
-    slices = np.asarray(label(band, connectivity=3), dtype=np.int64)
-    at = tuple(inside.T)
+    band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int32)
+    slices, at = np.asarray(label(band, connectivity=3), dtype=np.int32), tuple(inside.T)
     # what cannot be reached from the entry is no branch of this vessel: 0
     nodes, middle = slices[at], distance.to_mm(inside.astype(float))
     graph = _Graph(slices, band, depth, thick)
@@ -67,14 +67,15 @@ class _Graph:
     def __init__(self, slices: Labels, band: Labels, depth: Array, thick_mm: float) -> None:
         count = int(slices.max()) + 1
         self.thick_mm, self.band, self.radius = thick_mm, np.zeros(count, dtype=np.int64), np.zeros(count)
-        np.maximum.at(self.band, slices.ravel(), band.ravel())
-        np.maximum.at(self.radius, slices.ravel(), depth.ravel())
-        pairs = [
-            np.stack([np.moveaxis(slices, axis, 0)[:-1].ravel(), np.moveaxis(slices, axis, 0)[1:].ravel()], axis=1)
-            for axis in range(3)
-        ]
-        edges = np.concatenate(pairs)
-        edges = np.unique(edges[(edges > 0).all(axis=1) & (edges[:, 0] != edges[:, 1])], axis=0)
+        kept = slices > 0
+        self.band[slices[kept]] = band[kept]  # all voxels of a slice are of one
+        np.maximum.at(self.radius, slices[kept], depth[kept])
+        found = []
+        for axis in range(3):
+            low, high = (np.moveaxis(slices, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+            touch = (low != high) & (low > 0) & (high > 0)
+            found.append(np.stack([low[touch], high[touch]], axis=1))
+        edges = np.unique(np.concatenate(found), axis=0)
         self.after: dict[int, set[int]] = {node: set() for node in range(1, count)}
         self.before: dict[int, set[int]] = {node: set() for node in range(1, count)}
         for a, b in edges.tolist():

@@ -78,8 +78,8 @@ class Clues:
 
     @cached_property
     def hard_wall(self) -> VesselWall:
-        """The lumen's wall for a wire that only wants to be straight."""
-        return VesselWall(self.lumen.distance, stiffness_N_mm2=HARD_WALL_N_MM2)
+        """The wall around the traced wires, for a wire that only wants to be straight."""
+        return VesselWall(self.room, stiffness_N_mm2=HARD_WALL_N_MM2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ boundary condition, not a fit of the model: nothing beyond ``REACH_MM`` enters, 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, Lumen, OverWire, Wall, Wire
 from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
-from solver import Catheter, GuideWire, Insertion, Solution, VesselWall
+from solver import Catheter, Grid, GuideWire, Insertion, Solution, VesselWall
 
 REACH_MM = 8.0
 """Length of wire behind the entry that is used: long against the trace's error, short against a vessel's bend."""
@@ -111,6 +112,12 @@ def simulate(
     return insertion.to_depths(list(depths_mm), list(roll_deg), 0.0 if catheter_mm is None else list(catheter_mm))
 
 
+@lru_cache(maxsize=1)
+def _wall_of(distance: Grid, hull: str) -> VesselWall:
+    """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second."""
+    return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
+
+
 def insertion_of(
     wire: Wire,
     wall: Wall,
@@ -125,7 +132,7 @@ def insertion_of(
     friction = wall.friction if config.friction is None else config.friction
     return Insertion(
         guide_wire(altered(wire, config), solver.segment_mm, config.bending_scale),
-        VesselWall(lumen.distance, stiffness_N_mm2=stiffness, friction=friction, hull=solver.hull),
+        _wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction),
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,
