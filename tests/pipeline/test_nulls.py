@@ -95,7 +95,12 @@ def test_the_least_bent_curve_is_led_to_the_tip_that_it_is_told(quarter_torus: t
     guess = nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=aside))
     assert guess is not None
     assert np.linalg.norm(guess[-1] - aside) <= 0.1
-    assert arc_length(guess)[-1] == pytest.approx(depth, abs=1e-6)
+    assert arc_length(guess)[-1] == pytest.approx(depth, abs=0.5)
+    # a real wire takes a longer way: its tip lies before that of the least bent one of its length
+    before = free[-1] - 1.5 * (free[-1] - free[-2]) / np.linalg.norm(free[-1] - free[-2])
+    shorter = nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=before))
+    assert shorter is not None
+    assert np.linalg.norm(shorter[-1] - before) <= 0.1
     assert bending(guess) > bending(free)
     assert nulls.NULLS["pinned"](clues, depth, nulls.Seen()) is None
     assert nulls.NULLS["pinned"](clues, depth, nulls.Seen(tip_mm=free[-1] + 30.0)) is None, "out of reach"
