@@ -70,7 +70,7 @@ def skill_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure = new_figure(3.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-    left.axhline(0.0, color=VERMILION, linewidth=1.0, linestyle="--", label="no better than the predictor")
+    left.axhline(0.0, color=VERMILION, linewidth=1.0, linestyle="--", label="no better")
     shown = _lines(left, good, "skill_by_depth")
     left.set_ylim(min(-0.1, float(good["skill"].clip(lower=-1.0).min()) - 0.05), 1.02)
     _finish({left: "skill (1 is perfect)"})

@@ -61,14 +61,14 @@ def _panel(axes: Axes, rows: pd.DataFrame) -> None:
     axes.plot(
         unchanged["place"], unchanged["rms_mm"], "o", color=BLUE, fillstyle="none", markersize=10, label="unchanged"
     )
+    shown = [whole["rms_mm"], whole["truth_rms_mm"]]
     if len(unchanged) and has(whole, "rms_ratio_low"):
         base = float(unchanged["rms_mm"].iloc[0])
         axes.vlines(
             whole["place"], base * whole["rms_ratio_low"], base * whole["rms_ratio_high"], color=BLUE, linewidth=1.5
         )
     # the whole range from zero: a slope must not be drawn steeper than it is
-    shown = [whole["rms_mm"], whole["truth_rms_mm"]]
-    axes.set_ylim(bottom=0.0, top=1.25 * max(float(np.nan_to_num(values.max())) for values in shown))
+    axes.set_ylim(bottom=0.0, top=1.1 * max(float(np.nan_to_num(values.max())) for values in shown))
     axes.set_ylabel("pooled rms distance, mm")
     plain(axes)
 
