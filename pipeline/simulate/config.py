@@ -48,7 +48,7 @@ class SimulateConfig:
     depth: Literal["traced", "manifest"] = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
     entry: Literal["traced", "manifest"] = "traced"
-    """traced (the clamp is measured in the first 8 mm of the traced wires) or manifest (taken as written)."""
+    """traced (the clamp is fitted to the first 10 mm of the traces, the manifest's as prior) or manifest (as written)."""
     bending_scale: Positive = 1.0
     """Factor on the wire's bending stiffness, for sensitivity runs; the same for the whole wire, it scales forces."""
     taper_scale: Positive = 1.0

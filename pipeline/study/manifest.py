@@ -25,7 +25,7 @@ from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
 from pipeline.model import OverWire, Wall, Wire
-from pipeline.ranges import Axis, Direction, Finite, Positive, Vector
+from pipeline.ranges import Axis, Direction, Finite, NonNegative, Positive, Vector
 from pipeline.status import InputError, did_you_mean
 
 WHOLE_CASE = "whole_case"
@@ -106,6 +106,8 @@ class Case(Strict):
     frames: Sources = ()
     entry_mm: Vector
     entry_direction: Direction
+    entry_sigma_mm: NonNegative | None = None
+    entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
     insertion_mm: tuple[Positive, ...] | None = None
