@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.polyline import angle_deg, at_arc, resample, samples, tip_tangent
+from pipeline.arrays.polyline import angle_deg, at_arc, samples, tip_tangent
 from pipeline.compare.branches import Branches
 from pipeline.compare.config import CompareConfig
 from pipeline.model import Array, Curve, Lumen, arc_length
@@ -78,10 +78,11 @@ class Pair:
     """A simulated wire and the traced curve of the same frame.
 
     wire_mm (k, 3), curve_mm (m, 3) : joints and points, entry to tip.     curve_length_mm : of the traced curve.
-    sample_mm (n, 3), arc_mm (n,) : equal steps along the wire, so that neither the segment length nor the density of
-    the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve, and where along it that is.
-    back_mm : distances the other way, from equal steps along the curve to the wire.     by_arc_mm : distances between
-    points of equal arc length.     lumen : the vessel.     way : the vessel's axis and branches.
+    sample_mm (n, 3), arc_mm (n,) : equal steps along the wire behind the clamp's reach, so that neither the segment
+    length nor the density of the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve,
+    and where along it that is.     back_mm : distances the other way, from equal steps along the curve, behind the
+    reach, to the wire.     by_arc_mm : distances between points of equal arc length.     lumen : the vessel.
+    way : the vessel's axis and branches.
     """
 
     wire_mm: Array
@@ -98,6 +99,16 @@ class Pair:
 
 
 Metric = Callable[[Pair], float | bool]
+SHORT_MM = 2.0
+
+
+def scored(arc_mm: Array, skip_mm: float) -> Array:
+    """The arc lengths that count of a wire's (n,): those behind the clamp's reach, where the clamp was fitted.
+
+    Of a wire that is hardly longer than that, the last 2 mm; of one shorter than 4 mm, the last half.
+    """
+    length = float(arc_mm[-1])
+    return np.asarray(arc_mm[arc_mm >= min(skip_mm, max(length - SHORT_MM, 0.5 * length)) - 1e-9])
 
 
 def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
@@ -105,7 +116,8 @@ def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareCon
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
         raise ValueError(f"compare: got {len(wire)} simulated joints and {len(curve)} traced points, need 2 of each")
-    arc = samples(float(arc_length(wire)[-1]), config.sample_mm)
+    arc = scored(samples(float(arc_length(wire)[-1]), config.sample_mm), config.skip_mm)
+    back = at_arc(curve, scored(samples(traced.length_mm, config.sample_mm), config.skip_mm))
     points = at_arc(wire, arc)
     error, foot = point_to_curve(points, curve)
     common = arc[arc <= traced.length_mm + 1e-9]
@@ -117,7 +129,7 @@ def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareCon
         arc,
         error,
         foot,
-        back_mm=point_to_curve(resample(curve, config.sample_mm), wire)[0],
+        back_mm=point_to_curve(back, wire)[0],
         by_arc_mm=np.linalg.norm(at_arc(wire, common) - at_arc(curve, common), axis=1),
         lumen=lumen,
         way=way,
@@ -128,6 +140,11 @@ def rms(values: ArrayLike) -> float:
     """Root mean square; NaN for no values."""
     array = np.asarray(values, dtype=np.float64)
     return float(np.sqrt(np.mean(array**2))) if array.size else float("nan")
+
+
+def distal(pair: Pair, length_mm: float) -> float:
+    """Root mean square of the point errors of the wire's last ``length_mm``, as far as they count; mm."""
+    return rms(pair.error_mm[pair.arc_mm >= pair.arc_mm[-1] - length_mm - 1e-9])
 
 
 def same_branch(pair: Pair) -> bool:
@@ -182,10 +199,12 @@ OF_POINTS: dict[str, Callable[[Array], float]] = {
 """Statistics of point errors: of one frame's points, and pooled over all points of a case alike."""
 METRICS: dict[str, Metric] = {
     **{name: lambda pair, of=of: of(pair.error_mm) for name, of in OF_POINTS.items()},  # type: ignore[misc]
+    "distal10_rms_mm": lambda pair: distal(pair, 10.0),
+    "distal20_rms_mm": lambda pair: distal(pair, 20.0),
     "back_rms_mm": lambda pair: rms(pair.back_mm),
     "hausdorff_mm": lambda pair: float(max(pair.error_mm.max(), pair.back_mm.max())),
     "arc_rms_mm": lambda pair: rms(pair.by_arc_mm),
-    "arc_max_mm": lambda pair: float(pair.by_arc_mm.max()),
+    "arc_max_mm": lambda pair: float(pair.by_arc_mm.max(initial=0.0)) if len(pair.by_arc_mm) else float("nan"),
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
     "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
     "branch_ok": same_branch,

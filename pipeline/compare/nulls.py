@@ -14,7 +14,8 @@ from skimage.graph import MCP_Geometric
 
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
-from pipeline.compare.metrics import Way, point_to_curve, rms
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import Way, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
@@ -169,16 +170,15 @@ def register(name: str, label: str, meaning: str, guess: Guess, told: str = "") 
     TOLD.update({name: told} if told else {})
 
 
-def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, step_mm: float) -> dict[str, float]:
+def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, config: CompareConfig) -> dict[str, float]:
     """Root mean square distance (mm) of every predictor's wire from the traced curve, by the predictor's name.
 
-    Wires are sampled every ``step_mm``; a predictor that has no guess has no entry.
+    Wires are sampled where the simulated one is; a predictor that has no guess has no entry.
     """
+    arc = scored(samples(depth_mm, config.sample_mm), config.skip_mm)
     guesses = {name: guess(clues, depth_mm, seen) for name, guess in NULLS.items()}
     return {
-        name: rms(point_to_curve(to_length(wire, depth_mm, step_mm), curve_mm)[0])
-        for name, wire in guesses.items()
-        if wire is not None
+        name: rms(point_to_curve(at_arc(wire, arc), curve_mm)[0]) for name, wire in guesses.items() if wire is not None
     }
 
 

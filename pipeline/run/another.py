@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.arrays.polyline import to_length
+from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.metrics import point_to_curve
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
@@ -19,8 +19,8 @@ from reports.frames_file import read_frame
 SAME_ENTRY_MM = 2.0
 """Insertions whose traces begin farther apart count their depths from different places."""
 STEP_MM = 0.5
-Traces = Mapping[int, tuple[float, Array]]
-"""By frame, the depth in mm and the traced wire (n, 3)."""
+Traces = Mapping[int, tuple[float, Array, float]]
+"""By frame, the depth in mm, the traced wire (n, 3) and the arc length in mm from which on it counts."""
 
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
@@ -34,9 +34,10 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 def _traces(out: Path, case: Found) -> Traces:
     path, found = out / "cases" / case.result.case / "frames.h5", {}
     for number, frame in case.frames.items():
-        curve = read_frame(path, number).traced_mm if path.exists() else None
-        if curve is not None and len(curve) > 1:
-            found[number] = (float(frame.row["insertion_mm"]), curve)
+        arrays = read_frame(path, number) if path.exists() else None
+        if arrays is not None and arrays.traced_mm is not None and len(arrays.traced_mm) > 1:
+            start = 0.0 if arrays.arc_mm is None or not len(arrays.arc_mm) else float(arrays.arc_mm[0])
+            found[number] = (float(frame.row["insertion_mm"]), arrays.traced_mm, start)
     return found
 
 
@@ -44,8 +45,8 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     """The case; each frame's guess is the mean over other insertions of what theirs at the nearest depth leaves."""
     kin = [c for c in shared if c.result.phantom == case.result.phantom and c.result.group != case.result.group]
     frames = dict(case.frames)
-    for number, (depth, curve) in traces[case.result.case].items():
-        near = [_nearest(traces[other.result.case], depth, curve) for other in kin]
+    for number, (depth, curve, start) in traces[case.result.case].items():
+        near = [_nearest(traces[other.result.case], depth, curve, start) for other in kin]
         squares = [float(np.mean(point_to_curve(wire, curve)[0] ** 2)) for wire in near if wire is not None]
         if squares:
             row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(np.mean(squares)))}
@@ -53,9 +54,10 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     return replace(case, frames=frames)
 
 
-def _nearest(traces: Traces, depth_mm: float, curve: Array) -> Array | None:
-    """The trace of the nearest depth, cut or continued; None where there is none, or its entry lies elsewhere."""
+def _nearest(traces: Traces, depth_mm: float, curve: Array, start_mm: float) -> Array | None:
+    """The trace of the nearest depth from ``start_mm`` on; None where there is none, or its entry lies elsewhere."""
     if not traces:
         return None
-    _, wire = min(traces.values(), key=lambda item: abs(item[0] - depth_mm))
-    return to_length(wire, depth_mm, STEP_MM) if np.linalg.norm(wire[0] - curve[0]) < SAME_ENTRY_MM else None
+    _, wire, _ = min(traces.values(), key=lambda item: abs(item[0] - depth_mm))
+    arc = samples(depth_mm, STEP_MM)
+    return at_arc(wire, arc[arc >= start_mm - 1e-9]) if np.linalg.norm(wire[0] - curve[0]) < SAME_ENTRY_MM else None

@@ -89,8 +89,11 @@ def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
     """
     assert frame.simulated is not None
     arc = arc_length(frame.simulated.joints_mm)
+    # what lies before the first of them, in the clamp's reach, is none of theirs
+    there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
     force = np.zeros((len(arc_mm), 3))
-    np.add.at(force, np.abs(arc_mm[None, :] - arc[:, None]).argmin(axis=1), frame.simulated.contact_force_N)
+    nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
+    np.add.at(force, nearest, frame.simulated.contact_force_N[there])
     return np.asarray(np.linalg.norm(force, axis=1))
 
 
@@ -188,7 +191,10 @@ def _write_wires(folder: Path, frame: Frame) -> None:
     arrays: dict[str, Any] = {"contact_force_N": frame.simulated.contact_force_N}
     if frame.comparison is not None:
         errors = frame.comparison
-        points = errors.sample_mm
-        arrays = {"error_mm": errors.error_mm, "arc_mm": errors.arc_mm}
-        arrays["contact_force_N"] = contact_at(frame, errors.arc_mm)
+        along = arc_length(joints)
+        reach = along[along < errors.arc_mm[0] - 1e-9]
+        arc = np.concatenate([reach, errors.arc_mm])
+        points = np.concatenate([joints[: len(reach)], errors.sample_mm])
+        arrays = {"error_mm": np.concatenate([np.full(len(reach), np.nan), errors.error_mm]), "arc_mm": arc}
+        arrays["contact_force_N"] = contact_at(frame, arc)
     export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)

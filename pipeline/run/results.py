@@ -126,6 +126,8 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     clamp: dict[str, Any] = {"entry_mm": case.entry_mm, "entry_direction": case.entry_direction}
     if known.clamp is not None:
         clamp |= {"used_mm": known.clamp.entry_mm, "used_direction": known.clamp.direction}
+        clamp |= {"sigma_mm": known.clamp.sigma_mm, "sigma_deg": known.clamp.sigma_deg}
+        clamp["covariance"] = known.clamp.covariance
     return {
         "seconds": log.seconds,
         "assumptions": log.assumptions,

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent, to_length
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
 from pipeline.compare.branches import branches_of
-from pipeline.compare.metrics import Way
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import Way, scored
 from pipeline.model import Curve, Lumen, arc_length
 from solver import Solution, Status
 from solver.grid import Grid
@@ -117,7 +118,7 @@ def test_the_segment_length_cannot_flatter() -> None:
 def test_a_wire_too_short_is_seen_by_coverage_tip_and_the_way_back() -> None:
     result = compare(simulated(line(10.0)), traced(line(20.0)), open_space())
     assert result["rms_mm"] == pytest.approx(0.0, abs=1e-12)
-    assert result["coverage"] == pytest.approx(23 / 41), "10 mm, and the 1 mm beyond that is near enough"
+    assert result["coverage"] == pytest.approx(3 / 21), "of 10 to 20 mm the 1 mm that is near enough"
     assert result["tip_mm"] == pytest.approx(10.0)
     assert result["hausdorff_mm"] == pytest.approx(10.0)
 
@@ -210,3 +211,26 @@ def test_rms_of_nothing_is_not_zero() -> None:
 def test_an_empty_curve_is_refused() -> None:
     with pytest.raises(ValueError, match="need 2 of each"):
         compare(simulated(line(5.0)), Curve(np.zeros((0, 3)), np.zeros(0)), open_space())
+
+
+def test_the_clamps_reach_counts_in_no_score() -> None:
+    """A wire that is wrong in its first 10 mm alone is right; one that is wrong beyond is not made better by them."""
+    arc = np.linspace(0.0, 30.0, 61)
+    bent = np.column_stack([arc, np.where(arc < 9.0, 1.0, 0.0), 0 * arc])
+    result = compare(simulated(line(30.0)), traced(bent), open_space())
+    assert result["rms_mm"] == pytest.approx(0.0, abs=1e-12)
+    assert result.arc_mm[0] == pytest.approx(10.0)
+    whole = compare(simulated(line(30.0)), traced(bent), open_space(), CompareConfig(skip_mm=0.0))
+    assert whole["rms_mm"] > 0.4  # 9 of 30 mm are 1 mm off
+
+
+def test_of_a_wire_hardly_longer_than_the_reach_its_end_counts() -> None:
+    for length, first in ((11.0, 9.0), (3.0, 1.5), (12.0, 10.0), (40.0, 10.0)):
+        assert scored(samples(length, 0.5), 10.0)[0] == pytest.approx(first)
+
+
+def test_the_distal_errors_are_of_the_last_millimetres() -> None:
+    arc = np.linspace(0.0, 40.0, 81)
+    curve = np.column_stack([arc, np.where(arc > 35.0, 1.0, 0.0), 0 * arc])
+    result = compare(simulated(line(40.0)), traced(curve), open_space())
+    assert result["distal10_rms_mm"] > result["distal20_rms_mm"] > result["rms_mm"] > 0.0

@@ -528,3 +528,20 @@ def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("wireval ")
     assert main([]) == 2
+
+
+def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, study: Path, tmp_path: Path) -> None:
+    """The same scans twice, the second with a clamp that is stated wrong and borrowed from the first: it is as good."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('"frames/', f'"{study}/frames/')
+    text = text.replace('"reference', f'"{study}/reference').replace('"truth', f'"{study}/truth')
+    head, case = text.split("[[case]]")
+    second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
+    manifest = tmp_path / "manifest.toml"
+    manifest.write_text(f"{head}[[case]]{case}\n[[case]]{second}", encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", "--until", "compare"]) == 0
+    own, borrowed = (
+        json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
+    )
+    assert any("blind to this case's scans" in line for line in borrowed["assumptions"])
+    np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])

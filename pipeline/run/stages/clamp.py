@@ -6,11 +6,16 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.model import Clamp, Curve
+from pipeline.run.log import Log
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.load import open_case
+from pipeline.run.stages.segment import segment_vessel
+from pipeline.run.stages.trace import trace_frames
 from pipeline.simulate import altered, insertion_of, together
 from pipeline.simulate.clamp import Prior, Seen, estimated_clamp
 from pipeline.simulate.resolution import lengths_mm
 from pipeline.status import FrameStatus
+from pipeline.study.manifest import Case
 from solver import Solution
 
 ENTRY_SIGMA_VOXELS = 0.5
@@ -22,6 +27,8 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     given, prior, voxel_mm = manifest_clamp(run, known)
     if run.config.simulate.entry == "manifest":
         return given
+    if run.case.entry_case is not None:
+        return _of_another(run, run.case.entry_case, given)
     seen = [
         Seen(frame.index, curve, frame.roll_deg, frame.catheter_mm)
         for frame in known.frames
@@ -32,6 +39,18 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     run.log.assumptions += [clamp.note] * bool(clamp.note)
     run.log.warnings += [clamp.warning] * bool(clamp.warning)
     return clamp
+
+
+def _of_another(run: Context, other: Case, given: Clamp) -> Clamp:
+    """The clamp that another insertion of the same fixation shows: nothing of this case's own scans is in it."""
+    silent = Context(other, run.config, run.store, Log(lambda *_: None))
+    known = trace_frames(silent, segment_vessel(silent, open_case(silent, Known())))
+    clamp = clamp_of(silent, known)
+    run.log.assumptions.append(
+        f"the clamp is blind to this case's scans, it is that of case {other.id!r}: {clamp.note}"
+    )
+    run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
+    return replace(clamp, material_axis=given.material_axis, down=given.down)
 
 
 def _faint(frame: Frame) -> Curve | None:

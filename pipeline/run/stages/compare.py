@@ -61,5 +61,5 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, see
     errors = compare(frame.simulated, curve, known.lumen, settings, None if clues is None else clues.way)
     if clues is None:
         return replace(frame, comparison=errors)
-    nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings.sample_mm)
+    nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings)
     return replace(frame, comparison=errors, nulls_rms_mm=nulls)
