@@ -332,8 +332,8 @@ def test_a_wire_that_cannot_enter_is_a_failed_frame(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No point of it is there to be compared with or drawn; the case must not end as crashed."""
-    clamp = simulate._clamp
-    monkeypatch.setattr(simulate, "_clamp", lambda run, frames: aside(clamp(run, frames)))
+    clamp = simulate.clamp_of
+    monkeypatch.setattr(simulate, "clamp_of", lambda run, known: aside(clamp(run, known)))
     assert run(study, tmp_path) == 1
     assert set(errors_of(tmp_path)["status"]) == {"entry_outside"}
     assert (tmp_path / "cases" / "bifurcation" / "report.html").exists()
@@ -531,12 +531,10 @@ def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, study: Path, tmp_path: Path) -> None:
-    """The same scans twice, the second with a clamp that is stated wrong and borrowed from the first: it is as good."""
-    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('"frames/', f'"{study}/frames/')
-    text = text.replace('"reference', f'"{study}/reference').replace('"truth', f'"{study}/truth')
-    head, case = text.split("[[case]]")
+    """The same scans twice, the second with the clamp of the first: it is the first's to the last bit."""
+    head, case = (study / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
     second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
-    manifest = tmp_path / "manifest.toml"
+    manifest = study / "borrowed.toml"
     manifest.write_text(f"{head}[[case]]{case}\n[[case]]{second}", encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", "--until", "compare"]) == 0
     own, borrowed = (
