@@ -18,9 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 if all cases are ok, 1 if some failed, 2 if there are none."""
     from pipeline.run.aggregate import aggregate
+    from pipeline.run.case import draw
     from pipeline.run.launch import last_line
+    from pipeline.run.log import CaseProgress
+    from pipeline.run.occupied import held
     from pipeline.run.results import found_results
-    from reports.html import render_case, render_index
+    from reports.atomic import WriteError
+    from reports.html import render_index
 
     found = found_results(args.out)
     if not found:
@@ -31,9 +35,13 @@ def main(args: argparse.Namespace) -> int:
     for result in found:
         try:
             if result.frames:
-                render_case(args.out / "cases" / result.case, embed=args.embed)
+                folder = args.out / "cases" / result.case
+                with held(folder, CaseProgress(result.case, folder / "log.txt").warn):
+                    draw(folder, "embedded" if args.embed else "linked")
             elif result.status == "damaged":
                 sys.stderr.write(f"{result.case}: {result.failures[0]['message']}\n")
+        except WriteError:
+            raise
         except (OSError, EOFError, ValueError, KeyError) as error:
             sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
             drawn = False

@@ -156,12 +156,7 @@ def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -
     table = pd.read_csv(out / "sweep.csv")
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
-    turned = json.loads(
-        (out / "sweep" / "simulate.roll_offset_deg=60" / "cases" / "bifurcation" / "result.json").read_text(
-            encoding="utf-8"
-        )
-    )
-    assert turned["counters"]["trace"]["reused"] == FRAMES
+    assert reused_traces(out / "sweep" / "simulate.roll_offset_deg=60") == FRAMES
     assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
@@ -178,8 +173,8 @@ def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) 
 
 
 def reused_traces(out: Path) -> float:
-    text = (out / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8")
-    return float(json.loads(text)["counters"]["trace"].get("reused", 0))
+    text = (out / "cases" / "bifurcation" / "provenance.json").read_text(encoding="utf-8")
+    return float(json.loads(text)["reused"].get("trace", 0))
 
 
 def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path: Path) -> None:
@@ -460,6 +455,7 @@ def test_points_cut_short_hide_no_other_case(
     result.write_text(result.read_text().replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
     points.write_bytes(points.read_bytes()[:-200])
+    (out / "cases" / "other" / "ledger.json").unlink()
     assert main(["report", str(out)]) == 1
     assert "other: its page cannot be drawn" in capsys.readouterr().err
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
