@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt clean
+.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -91,6 +91,10 @@ peers: setup
 # 60 runs that are ended by signals and resumed, against one that was not
 interrupt: setup
 	$(BIN)/python -m tests.studies.interrupt --seed $(SEED)
+
+# many small cases with a sweep on two workers and one, beside a busy loop
+scale: setup
+	$(BIN)/python -m tests.studies.scale
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

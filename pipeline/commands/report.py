@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.commands import complain, say
@@ -23,6 +24,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.log import CaseProgress
     from pipeline.run.occupied import held
     from pipeline.run.results import found_results
+    from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.atomic import WriteError
     from reports.html import render_index
 
@@ -30,7 +32,9 @@ def main(args: argparse.Namespace) -> int:
     if not found:
         problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
         return complain([problem], "OUT")
-    totals = aggregate(args.out)
+    heads = found_heads(args.out)
+    write_sweep(args.out, heads)
+    totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))
     drawn = True
     for result in found:
         try:

@@ -82,6 +82,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
 
+    if args.executor:  # workers elsewhere know nothing of this process's working folder
+        args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
     manifest, assumptions = _manifest(args)
     settings = resolved_settings(args)
     if args.until not in STAGES:

@@ -23,9 +23,9 @@ from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
 from pipeline.run.provenance import code_state, this_run
-from pipeline.run.results import LOST, Result, found_results, lost, write_json
+from pipeline.run.results import found_results, lost, write_json
 from pipeline.run.store import file_hash
-from pipeline.run.sweep import SweepPoint, write_sweep
+from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
 from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
@@ -38,11 +38,6 @@ class UsageError(InputError):
     """A command line that cannot be carried out."""
 
     place = "the command line"
-
-
-def _lost_points(plan: "Plan") -> list[tuple[SweepPoint, Result]]:
-    """Cases of which a sweep has no result, and at which point."""
-    return [(p, r) for p in plan.points for r in found_results(plan.out / p.folder) if r.status in LOST]
 
 
 @dataclass(frozen=True)
@@ -131,6 +126,8 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     """
     out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
+    heads = heads_of(settings, plan.cases, plan.points)
+    info["sweep"] = heads
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     try:
         write_json(out / name, info | {"cases": []})
@@ -140,11 +137,11 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
-    if plan.points:
-        write_sweep(out, settings, plan.cases, plan.points)
+    if heads:
+        write_sweep(out, found_heads(out))  # what other shards have done so far is among them
     info |= {"provenance": code_state(), "assumptions": plan.assumptions, "config": settings.as_dict()}
     Store(plan.template.cache).trim()
-    totals = replace(aggregate(out, info, name), sweep_lost=len(_lost_points(plan)))
+    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     if junit:
         write_junit(junit, found_results(out))
     return totals, render_index(out, embed=plan.template.embed)
@@ -195,8 +192,8 @@ def failure_lines(plan: Plan) -> list[str]:
             frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
             lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
     return lines + [
-        f"{point.folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
-        for point, result in _lost_points(plan)
+        f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
+        for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
 
 
