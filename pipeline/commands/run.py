@@ -66,7 +66,7 @@ def main(args: argparse.Namespace) -> int:
     try:
         totals, index = launch(plan, junit=args.junit)
     except InputError as error:
-        return complain(error.problems, error.place)
+        return complain(error.problems, error.place or "the command line")
     for line in failure_lines(plan):
         sys.stderr.write(f"{line}\n")
     say(last_line(totals, index))

@@ -4,6 +4,7 @@ Every executor gives the same outcomes. A job that took its worker with it is ru
 a second death names it.
 """
 
+import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import closing, contextmanager
@@ -11,6 +12,7 @@ from typing import TypeVar
 
 from pipeline.run.outcome import LOST, Outcome, guarded
 from pipeline.run.workers import NO_LIMITS, Limits, in_processes
+from pipeline.status import InputError
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -62,8 +64,16 @@ def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    """The executor of the dask scheduler at an address."""
-    from distributed import Client
+    """The executor of the dask scheduler at an address; raises InputError where there is none."""
+    try:
+        from distributed import Client
 
-    with Client(address) as client:
+        client = Client(address)
+    except ImportError:
+        raise InputError([f"--executor {address}: needs dask; pip install wireval[cluster]"]) from None
+    except (OSError, ValueError) as error:
+        raise InputError([f"--executor {address}: no dask scheduler answers there ({error})"]) from None
+    with client:
+        if not client.scheduler_info()["workers"]:
+            sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")
         yield client.get_executor()

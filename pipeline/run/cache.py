@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import os
+import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -26,6 +27,8 @@ DEFAULT_LIMIT = 20 * 2**30
 """Bytes: the lumens of about a thousand scans of 256^3 voxels."""
 ABANDONED_S = 86400.0
 """Age from which a temporary file is nobody's any more."""
+OURS = re.compile(r"[0-9a-f]{64}\.(result|npz)|\.tmp-.*\.result")
+"""Names of files of the store; .npz is how it wrote them before they had a hash."""
 NOT_A_RESULT = (ValueError, KeyError, TypeError, EOFError, BadZipFile)
 
 
@@ -78,9 +81,14 @@ class Store:
         return root / stage / key[:2] / f"{key}.result"
 
     def entries(self) -> list[tuple[Path, int, float]]:
-        """Every file of the store with its bytes and the time of its last use."""
+        """Every result with its bytes and the time of its last use, and what was left half written; nothing else.
+
+        Whoever names a folder that holds other things as well loses none of them.
+        """
         found = []
         for path in sorted(self.root.glob("*/??/*")) if self.root else ():
+            if not OURS.fullmatch(path.name):
+                continue
             try:
                 known = path.stat()
             except OSError:  # another run has just removed it
@@ -118,7 +126,7 @@ class Store:
         """Read every result; returns how many are whole, and which are not: they are removed."""
         whole, damaged = 0, []
         for path, _, _ in self.entries():
-            if path.name.startswith("."):
+            if path.name.startswith(".") or path.suffix != ".result":
                 continue
             try:
                 decoded(path.parent.parent.name, path.stem, path.read_bytes())

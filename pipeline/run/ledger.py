@@ -45,10 +45,15 @@ class Ledger:
         """A sentence on the first of the named files that is not as it was written; empty where all are."""
         for name in names:
             path, known = folder / name, self.files.get(name)
-            if known and not path.is_file():
+            if known is None:
+                continue
+            try:
+                if path.stat().st_size != known.bytes or entry_of(path) != known:
+                    return f"{name} is not as it was written"
+            except FileNotFoundError:
                 return f"{name} is missing"
-            if known and (path.stat().st_size != known.bytes or entry_of(path) != known):
-                return f"{name} is not as it was written"
+            except OSError as error:
+                return f"{name} cannot be read ({error.strerror})"
         return ""
 
     @property

@@ -57,7 +57,7 @@ class Worker(Generic[J, R]):
     def __init__(self, work: Callable[[J], R]) -> None:
         context = multiprocessing.get_context("forkserver")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+        self.process = context.Process(target=_serve, args=(theirs, work))
         self.process.start()
         theirs.close()
         self._job: list[J] = []

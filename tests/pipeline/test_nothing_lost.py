@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,9 +17,10 @@ import pytest
 
 from pipeline.cli import main
 from pipeline.model import Curve
-from pipeline.run import ledger
+from pipeline.run import launch, ledger
 from pipeline.run.cache import Store
 from pipeline.run.occupied import held, owner_of
+from pipeline.run.outcome import Outcome
 from reports import atomic
 from tests.studies.trees import differences
 
@@ -197,7 +199,9 @@ def test_the_cache_has_a_limit_and_a_check(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path))
-    mine = Store(tmp_path)
+    mine, foreign = Store(tmp_path), tmp_path / "letters" / "de" / "brief.result"
+    foreign.parent.mkdir(parents=True)
+    foreign.write_text("of somebody who named this folder as the store")
     for age, letter in enumerate("abcd"):
         mine.put("trace", letter * 64, Curve(np.eye(3), np.ones(3)))
         os.utime(mine.entries()[-1][0], (1e9 - age, 1e9 - age))  # d is the oldest
@@ -215,6 +219,7 @@ def test_the_cache_has_a_limit_and_a_check(
     assert main(["cache", "--limit", "lots"]) == 2
     assert main(["cache", "--prune"]) == 0
     assert mine.entries() == []
+    assert foreign.exists()
 
 
 def test_the_second_run_says_who_is_at_work(study: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -232,6 +237,24 @@ def test_the_second_run_says_who_is_at_work(study: Path, out: Path, capsys: pyte
     assert f"[bifurcation] process {os.getpid()} on " in capsys.readouterr().err
     assert owner_of(case_of(out)) == ""
     assert not (case_of(out) / ".at-work").exists()
+
+
+def test_a_case_that_another_run_works_on_is_left_to_it(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its files are not cleared away for the sake of a message that this run's worker was lost."""
+    job = SimpleNamespace(folder=case_of(out), case=SimpleNamespace(id="bifurcation"))
+    with held(case_of(out), print):
+        launch._write_lost(Outcome(job, None, "over", "over", "over_limit"))  # type: ignore[arg-type]
+    assert "bifurcation: over; left to process" in capsys.readouterr().err
+    assert (case_of(out) / "result.json").exists()
+
+
+def test_an_executor_that_is_not_there_is_refused(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(study, tmp_path / "out", "--executor", "nonsense://") == 2
+    assert "--executor nonsense://: " in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -124,3 +125,15 @@ def test_leaving_early_ends_the_workers(tmp_path: Path) -> None:
     clock = time.monotonic()
     outcomes.close()
     assert time.monotonic() - clock < LONG_S / 2
+
+
+def with_a_child(_: int) -> int | None:
+    """The stress study's scenes run in forks of their worker."""
+    child = multiprocessing.get_context("fork").Process(target=os._exit, args=(7,))
+    child.start()
+    child.join()
+    return child.exitcode
+
+
+def test_a_job_may_have_processes_of_its_own() -> None:
+    assert [outcome.result for outcome in in_processes([0], with_a_child, 1)] == [7]
