@@ -8,8 +8,6 @@ time until a worker answers.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import os
 import shutil
 import statistics
@@ -40,9 +38,10 @@ def said(words: list[str]) -> float:
     clock = time.perf_counter()
     process = os.fork()
     if not process:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            code = wireval(words)
-        os._exit(code)
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 1)
+        os.dup2(null, 2)
+        os._exit(wireval(words))
     if os.waitpid(process, 0)[1]:
         raise SystemExit(f"{words} failed")
     return time.perf_counter() - clock
