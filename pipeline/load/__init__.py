@@ -33,6 +33,7 @@ __all__ = [
     "load",
     "read_header",
     "read_headers",
+    "require_one",
     "require_same_geometry",
 ]
 
@@ -155,11 +156,20 @@ def each_volume(header: Header) -> Iterator[Header]:
         yield replace(header, source=source, item_count=1)
 
 
+def require_one(header: Header) -> None:
+    """LoadError where a file that should hold one volume is a sequence."""
+    if header.item_count > 1:
+        what = f"holds {header.item_count} volumes; allowed: one for the reference"
+        raise unusable(header.source, f"{what}. Name a file or dataset of the scan without wire alone.")
+
+
 def read_headers(
     reference: Source | None, frames: Sequence[Source], config: LoadConfig, spacing_mm: ArrayLike | None = None
 ) -> Scans:
     """Headers of a case's scans; raises LoadError where one is unusable or its geometry differs from the first's."""
     empty = read_header(reference, config, spacing_mm) if reference else None
+    if empty is not None:
+        require_one(empty)
     headers = [read_header(source, config, spacing_mm) for source in frames]
     scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
     for header in scans.frames:

@@ -143,7 +143,8 @@ def _require_uniform(path: Path, planes: list[Plane]) -> None:
     ):
         kinds, counts = np.unique(values.round(5), axis=0, return_counts=True)
         if np.ptp(values, axis=0).max() > abs(tolerance):
-            found = "; ".join(f"{count} slices with {kind.tolist()}" for kind, count in zip(kinds[:4], counts, strict=False))
+            several = zip(kinds[:4], counts, strict=False)
+            found = "; ".join(f"{count} slices with {kind.tolist()}" for kind, count in several)
             why = f"slices of different {name}: {found}. Mixed series: keep one stack a folder."
             raise unusable(path, why)
 
@@ -168,10 +169,8 @@ def irregularities(stack: Stack) -> list[str]:
     if np.abs(stack.drift_px[far]).max() > TILT_PIXELS:
         reach = max(float(stack.heights[far] - stack.heights[0]), 1e-9)
         angle = np.degrees(np.arctan2(np.linalg.norm(stack.drift_px[far] * stack.pixel_mm), reach))
-        pixels = float(np.abs(stack.drift_px[far]).max())
-        problems.append(
-            f"gantry tilt: the stack leans {angle:.1f} degrees from the slice normal, {pixels:.1f} pixels over its height"
-        )
+        pixels = f"{np.abs(stack.drift_px[far]).max():.1f} pixels over its height"
+        problems.append(f"gantry tilt: the stack leans {angle:.1f} degrees from the slice normal, {pixels}")
     return problems
 
 
@@ -275,5 +274,3 @@ def _resampled(header: Header, stack: Stack) -> NDArray[np.float32]:
         weight = (z - heights[upper - 1]) / (heights[upper] - heights[upper - 1])
         out[:, :, k] = (1 - weight) * straightened(upper - 1) + weight * straightened(upper)
     return out
-
-

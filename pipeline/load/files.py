@@ -1,5 +1,6 @@
-"""Single-file volumes: MetaImage, NRRD and NIfTI by readers of this package, anything else by ITK in a child process."""
+"""Single-file volumes: MetaImage, NRRD and NIfTI are read here, anything else by ITK in a child process."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.load import foreign, metaimage, nifti, nrrd
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source, unusable
+from pipeline.load.geometry import Box, Header, Source, unusable
 from pipeline.load.voxels import Head, read_box, require_data
 
 OWN = {
@@ -36,19 +37,26 @@ def recognises(_path: Path) -> bool:
 def parts(path: Path) -> tuple[Path, ...]:
     """Other files that hold the voxels of a header: those that it names, and the other half of a pair.
 
-    Asked of every path that goes into a key: a change of theirs is a change of the scan.
+    Asked of every path that goes into a key, whether or not the header can be used: a change of theirs is a change of
+    the scan.
     """
-    read = next((own for suffix, own in OWN.items() if path.name.lower().endswith(suffix)), None)
-    if read is None:
+    other = nifti.other_half(path)
+    if other != path:
+        return (other,) if other.is_file() else ()
+    if path.suffix.lower() not in {".mhd", ".mha", ".nhdr", ".nrrd"}:
         return ()
-    try:
-        head = read(path)
-    except LoadError:
-        head = None
-    others = {part for part, _ in head.parts} if head else set()
-    if nifti.other_half(path).is_file():
-        others.add(nifti.other_half(path))
-    return tuple(sorted(others - {path}))
+    with path.open("rb") as file:
+        text = file.read(65536 if path.suffix.lower() in {".mhd", ".mha"} else nrrd.LONGEST_HEADER).decode("latin-1")
+    found = re.search(r"^(?:ElementDataFile\s*=|data ?file:)[ \t]*(.*)$", text, re.IGNORECASE | re.MULTILINE)
+    if found is None or found[1].strip().upper() == "LOCAL":
+        return ()
+    name = found.group(1).strip()
+    # a list stands below; a pattern as slice_%03d.raw takes numbers
+    names = text[found.end() :].split() if name.upper().split()[:1] == ["LIST"] else [name]
+    pattern = re.sub(r"%\d*d.*", "*", name)
+    matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()
+    near = [path.parent / n for n in names if len(n) < 256 and "\0" not in n]
+    return tuple(sorted({p for p in (*near, *matches) if p.is_file() and p != path}))
 
 
 def read_header(source: Source, config: LoadConfig) -> Header:

@@ -47,6 +47,14 @@ class Source:
         return name if self.item is None else f"{name}[{self.item}]"
 
 
+@dataclass(frozen=True)
+class Mask(Source):
+    """An own lumen.     label : of several in a label map, by number or by name.     level : of a probability, 0..1."""
+
+    label: int | str | None = None
+    level: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Header:
     """Geometry and type of a scan, read without its voxels.
@@ -101,8 +109,9 @@ def judged(header: Header) -> Header:
         why = f"origin {origin.tolist()} mm, {list(header.shape)} voxels of {spacing.tolist()} mm"
         raise unusable(header.source, f"{why}; allowed: all of it within {FARTHEST_MM:g} mm; correct the header")
     if not np.all(np.isfinite(direction)) or np.abs(direction.T @ direction - np.eye(3)).max() > ORTHONORMAL:
-        why = f"the axes are sheared or scaled, direction {direction.round(5).tolist()}; allowed: an orthonormal matrix"
-        raise unusable(header.source, f"{why} (a tilted gantry gives this). Resample the scan onto a regular grid first.")
+        found = f"the axes are sheared or scaled, direction {direction.round(5).tolist()}"
+        why = f"{found}; allowed: an orthonormal matrix (a tilted gantry gives this)"
+        raise unusable(header.source, f"{why}. Resample the scan onto a regular grid first.")
     if min(header.shape) < 2:
         why = f"{list(header.shape)} voxels: one slice is no volume; allowed: 2 voxels or more along every axis"
         raise unusable(header.source, why)

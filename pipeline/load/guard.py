@@ -5,6 +5,7 @@ A FIFO blocks, a device never ends, a bomb of 3 MB unpacks to 10 GB: each is ref
 
 import bz2
 import io
+import json
 import os
 import stat
 import struct
@@ -12,7 +13,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,7 +67,7 @@ def size_of(path: Path, most: float = float("inf")) -> int:
     if kind:
         raise unusable(path, f"this is {kind}; allowed: a regular file; name the file itself")
     if found.st_size == 0:
-        raise unusable(path, "the file is empty (0 bytes); copy it again")
+        raise unusable(path, "the file is empty (0 bytes); expected content; copy it again")
     if found.st_size > most:
         size, limit = found.st_size / 2**20, most / 2**20
         raise unusable(path, f"{size:.0f} MiB; allowed: {limit:.0f} MiB for a file of this kind; make it smaller")
@@ -96,6 +97,14 @@ def read_text(path: Path, most: int = TEXT_BYTES) -> str:
     except UnicodeDecodeError as error:
         why = f"not UTF-8 text (byte {error.start}); allowed: a text file in UTF-8; save it again"
         raise unusable(path, why) from None
+
+
+def read_json(path: Path, what: str) -> Any:
+    """The content of a JSON file; what : it should be, in words."""
+    try:
+        return json.loads(read_text(path))
+    except (ValueError, RecursionError):
+        raise unusable(path, f"no JSON; expected {what}; write it again") from None
 
 
 class Deflated(io.RawIOBase):

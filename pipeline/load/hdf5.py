@@ -106,7 +106,8 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
         raise unusable(source, f"{data.name}: {stored} of {total} bytes were ever written; write it again")
     if data.chunks is not None:
         require_room(source, total, stored, "deflate", config.most_gib)
-    lacks = [f"{name}: {value}" for name, value in (("origin_mm", "0, 0, 0"), ("direction", "along x, y, z")) if name not in data.attrs]
+    defaults = {"origin_mm": "0, 0, 0", "direction": "along x, y, z"}
+    missing = [f"{name}: {value}" for name, value in defaults.items() if name not in data.attrs]
     return Header(
         source,
         (a, b, c) if _is_xyz(data, source) else (c, b, a),
@@ -114,7 +115,7 @@ def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
         _numbers(source, data, "origin_mm", np.zeros(3)),
         _numbers(source, data, "direction", np.eye(3)),
         str(data.dtype.newbyteorder("=")),
-        assumed=tuple(f"{source.path.name}: {data.name} lacks {text} assumed" for text in lacks),
+        assumed=tuple(f"{source.path.name}: {data.name} lacks {text} assumed" for text in missing),
     )
 
 

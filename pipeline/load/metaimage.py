@@ -1,15 +1,13 @@
 """Headers of MetaImage (.mha, .mhd), read here: ITK's own reader dies of some and takes what others lack as given."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
 from pipeline.load.outside import beside, millimetres, numbered, numbers
-from pipeline.load.voxels import Head, axes_of
+from pipeline.load.voxels import Head, Placed, axes_of
 
 LONGEST_HEADER = 65536
 TYPES = {
@@ -78,7 +76,7 @@ def _files(path: Path, text: str, below: bytes, planes: int) -> list[Path]:
     return [beside(path, text)]
 
 
-def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[tuple[NDArray[Any], ...], tuple[str, ...]]:
+def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[Placed, tuple[str, ...]]:
     """Spacing, origin and direction, and what of it the header lacks."""
     factor = millimetres(path, tags.get("DistanceUnits", "mm"))
     given = next((name for name in ("ElementSpacing", "ElementSize") if name in tags), "")
@@ -86,11 +84,7 @@ def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[tuple[NDArr
     turn = next((name for name in TURNS if name in tags), "")
     lacks = [
         text
-        for name, text in (
-            (given, "spacing: 1 mm"),
-            (place, "origin: 0, 0, 0 mm"),
-            (turn, "direction: along x, y, z"),
-        )
+        for name, text in ((given, "spacing: 1 mm"), (place, "origin: 0, 0, 0 mm"), (turn, "direction: along x, y, z"))
         if not name
     ]
     spacing = numbers(path, tags, given, count, missing="1 " * count)[:3] * factor

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, unpacked
-from pipeline.load.voxels import Head, axes_of
+from pipeline.load.voxels import Head, Placed, axes_of
 
 TYPES = {2: "u1", 4: "i2", 8: "i4", 16: "f4", 64: "f8", 256: "i1", 512: "u2", 768: "u4", 1024: "i8", 1280: "u8"}
 UNITS_MM = {0: 1.0, 1: 1e3, 2: 1.0, 3: 1e-3}
@@ -104,7 +104,7 @@ def _ordered(kind: str, order: str) -> Any:
     return (single, int(count)) if count else single
 
 
-def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[tuple[NDArray[Any], ...], tuple[str, ...]]:
+def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[Placed, tuple[str, ...]]:
     """Spacing, origin and direction in LPS mm, and what was assumed or disagrees."""
     pixdim = np.array(fields["pixdim"], float)
     unit = int(fields["units"]) & 7
@@ -126,7 +126,8 @@ def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[tuple[NDArr
     size = np.linalg.norm(matrix[:, :3], axis=0)
     wide = np.abs(pixdim[1:4] * UNITS_MM[unit] - size)
     if not np.all(wide <= 0.01 * size) and np.all(np.isfinite(wide)):
-        notes.append(f"{path.name}: pixdim {pixdim[1:4].tolist()} and the matrix's spacing {size.tolist()} differ: matrix used")
+        differ = f"pixdim {pixdim[1:4].tolist()} and the matrix's spacing {size.tolist()} differ"
+        notes.append(f"{path.name}: {differ}: the matrix is used")
     with np.errstate(invalid="ignore", divide="ignore"):
         return (size, matrix[:, 3], matrix[:, :3] / size), tuple(notes)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import opened, size_of
 from pipeline.load.outside import beside, millimetres, numbered, numbers
-from pipeline.load.voxels import Head, axes_of
+from pipeline.load.voxels import Head, Placed, axes_of
 
 LONGEST_HEADER = 4 * 2**20
 _NAMES = {
@@ -133,9 +133,7 @@ def _vectors(path: Path, fields: dict[str, str], count: int) -> list[NDArray[Any
     return [None if w in ("none", "nan") else numbers(path, tags, w, len(tags[w].split())) for w in words]
 
 
-def _geometry(
-    path: Path, fields: dict[str, str], vectors: list[Any], leading: int
-) -> tuple[tuple[NDArray[Any], ...], tuple[str, ...]]:
+def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: int) -> tuple[Placed, tuple[str, ...]]:
     """Spacing, origin and direction in LPS mm, and what of it the header lacks."""
     space = fields.get("space", "").lower().removesuffix("-time")
     lacks = [] if space in TO_LPS else ["space: left-posterior-superior"]
@@ -174,7 +172,7 @@ def _segments(fields: dict[str, str]) -> dict[str, tuple[int, int]]:
     for key, name in fields.items():
         match = re.fullmatch(r"(Segment\d+_)Name", key)
         if match:
-            layer, value = (fields.get(match[1] + part, default) for part, default in (("Layer", "0"), ("LabelValue", "1")))
+            layer, value = (fields.get(match[1] + part, one) for part, one in (("Layer", "0"), ("LabelValue", "1")))
             if layer.isdecimal() and value.isdecimal():
                 found[name] = (int(layer), int(value))
     return found

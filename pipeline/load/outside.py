@@ -11,8 +11,8 @@ from pipeline.load.geometry import unusable
 
 UNITS_MM = {
     "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
-    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "m": 1e3, "meter": 1e3, "metre": 1e3, "meters": 1e3,
-    "nm": 1e-6,
+    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "m": 1e3, "meter": 1e3, "metre": 1e3,
+    "meters": 1e3, "nm": 1e-6,
 }  # fmt: skip
 MOST_PARTS = 100_000
 NUMBER = re.compile(r"%0?\d{0,2}d")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.load.geometry import unusable
+from pipeline.load.geometry import LoadError, unusable
 from pipeline.load.guard import opened, size_of, told
 
 SUFFIXES = {".dcm", ".ima"}
@@ -70,6 +70,14 @@ def is_dicom(path: Path) -> bool:
         return file.read(132)[128:] == b"DICM" or path.suffix.lower() in SUFFIXES
 
 
+def is_multiframe(path: Path) -> bool:
+    """Whether a DICOM file is an enhanced one, with frames that have positions."""
+    try:
+        return "PerFrameFunctionalGroupsSequence" in dataset(path)
+    except LoadError:
+        return False
+
+
 def dataset(path: Path) -> Any:
     """The elements of a file, its pixels passed over; LoadError for what is no DICOM."""
     import pydicom  # a third of a second, for those who have DICOM
@@ -106,8 +114,9 @@ def planes_of(path: Path, data: Any) -> list[Plane]:
         common = list(data.get("SharedFunctionalGroupsSequence") or ())
         if groups is None and count > 1:
             kind = f"{count} frames without positions ({data.get('Modality', '?')})"
-            why = f"{kind}: a run of projections or a film, no volume; allowed: slices, or an enhanced file whose frames"
-            raise unusable(path, f"{why} have positions. Name the reconstruction, not the run.")
+            why = f"{kind}: a run of projections or a film, no volume"
+            allowed = "slices, or an enhanced file whose frames have positions"
+            raise unusable(path, f"{why}; allowed: {allowed}. Name the reconstruction, not the run.")
         if groups is not None and len(groups) != count:
             found = f"the file holds {count} frames and positions of {len(groups)}"
             raise unusable(path, f"{found}; allowed: one for each. Export the series again.")
@@ -179,12 +188,12 @@ def _pixels(path: Path, data: Any, frames: int) -> Pixels:
     inverted = meaning == "MONOCHROME1" and str(data.get("Modality", "")) not in PHYSICAL
     packed = element.length == 0xFFFFFFFF
     offset = -1 if packed else int(getattr(element, "value_tell", 0) or element.file_tell)
-    found = Pixels(rows, columns, offset, kind, stored, high, inverted)
+    pixels = Pixels(rows, columns, offset, kind, stored, high, inverted)
     there = min(int(element.length), size_of(path) - offset)
-    if not packed and there < frames * found.frame_bytes:
-        why = f"is cut short: {there} bytes of pixels, {frames * found.frame_bytes} are stated"
+    if not packed and there < frames * pixels.frame_bytes:
+        why = f"is cut short: {there} bytes of pixels, {frames * pixels.frame_bytes} are stated"
         raise unusable(path, f"cannot read it: the file {why}. Check that the file is complete: copy it again.")
-    return found
+    return pixels
 
 
 def grey(plane: Plane, stored: NDArray[Any]) -> NDArray[Any]:
@@ -202,5 +211,3 @@ def grey(plane: Plane, stored: NDArray[Any]) -> NDArray[Any]:
         top = -1 if stored.dtype.kind == "i" else (1 << p.bits) - 1
         stored = (top - stored.astype(np.int64)).astype(stored.dtype)
     return stored
-
-

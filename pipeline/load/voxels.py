@@ -19,6 +19,10 @@ AXES, LONGEST_AXIS = (3, 4), 65535
 """Axes of a scan (the fourth counts volumes), and voxels along one at most."""
 
 
+Placed = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+"""Spacing (3,), origin (3,) and direction (3, 3) in LPS mm."""
+
+
 @dataclass(frozen=True, eq=False)
 class Head:
     """What a header says, in LPS mm.
@@ -90,7 +94,8 @@ def read_box(head: Head, item: int, box: Box, channel: int = 0) -> NDArray[Any]:
         stored = _text(head, item, box) if head.packing == "ascii" else _stored(head, item, box, channel)
     except (EOFError, zlib.error, OSError, ValueError) as error:
         what = "they end too early" if isinstance(error, EOFError) else "the packed data are damaged"
-        raise unusable(head.path, f"the voxels cannot be read: {what}. The file may be cut short; copy it again.") from None
+        why = f"the voxels cannot be read: {what}. The file may be cut short; copy it again."
+        raise unusable(head.path, why) from None
     return scaled(stored, head.slope, head.intercept)
 
 
@@ -151,10 +156,10 @@ def scaled(stored: NDArray[Any], slope: float, intercept: float) -> NDArray[Any]
         raise LoadError(f"slope {slope:g} and intercept {intercept:g} of the grey values; allowed: finite, slope not 0")
     whole = stored.dtype.kind in "iu" and stored.dtype.itemsize <= 2
     if not (whole and slope == int(slope) and intercept == int(intercept) and abs(slope) < 2**15 > abs(intercept)):
-        grey = stored.astype(np.float32 if stored.dtype.itemsize <= 4 else np.float64, order="K")
-        return grey * grey.dtype.type(slope) + grey.dtype.type(intercept)
+        kind = np.dtype(np.float32 if stored.dtype.itemsize <= 4 else np.float64)
+        return np.asarray(stored.astype(kind, order="K") * kind.type(slope) + kind.type(intercept), kind)
     grey = stored.astype(np.int32, order="K") * np.int32(slope) + np.int32(intercept)
-    return grey.astype(np.int16) if -(2**15) <= grey.min() and grey.max() < 2**15 else grey
+    return grey.astype(np.int16) if grey.min() >= -(2**15) and grey.max() < 2**15 else grey
 
 
 def plain(values: NDArray[Any], what: object) -> NDArray[Any]:
@@ -170,7 +175,7 @@ def plain(values: NDArray[Any], what: object) -> NDArray[Any]:
         wide = np.dtype("=f4")
     if kind in "iu" and (size == 8 or (kind, size) == ("u", 4)):
         low, high = int(values.min(initial=0)), int(values.max(initial=0))
-        wide = np.dtype("=i4" if -(2**31) <= low and high < 2**31 else "=f8")
+        wide = np.dtype("=i4" if low >= -(2**31) and high < 2**31 else "=f8")
     if (kind, size) == ("u", 2) and int(values.max(initial=0)) >= 2**15:
         wide = np.dtype("=i4")
     return values if values.dtype == wide else values.astype(wide, order="K")

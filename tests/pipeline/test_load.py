@@ -189,8 +189,7 @@ def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("damage", "found"),
-    [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "3 numbers")],
+    ("damage", "found"), [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "3 numbers")]
 )
 def test_a_damaged_hdf5_file_is_said(tmp_path: Path, damage: object, found: str) -> None:
     path = tmp_path / "study.h5"
