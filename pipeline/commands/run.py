@@ -51,7 +51,7 @@ def main(args: argparse.Namespace) -> int:
         return complain(error.problems, error.place or str(args.manifest))
     except LoadError as error:
         return complain([str(error)], "the command line")
-    problems = check(plan.cases, plan.template.settings.config)
+    problems = check(plan.cases, plan.template.settings.config, whole=False)
     if problems:
         return complain(problems, str(args.manifest))
     if args.dry_run:

@@ -35,6 +35,7 @@ __all__ = [
     "read_headers",
     "require_one",
     "require_same_geometry",
+    "require_whole",
 ]
 
 
@@ -154,6 +155,12 @@ def each_volume(header: Header) -> Iterator[Header]:
     for item in range(header.item_count):
         source = header.source if header.item_count == 1 else replace(header.source, item=item)
         yield replace(header, source=source, item_count=1)
+
+
+def require_whole(header: Header, config: LoadConfig) -> None:
+    """LoadError where the file of a header is cut short, as far as its length shows that."""
+    if _format_of(header.source.path) is files:
+        files.head_of(header.source.path, config.most_gib)
 
 
 def require_one(header: Header) -> None:

@@ -18,12 +18,12 @@ OWN = {
 }  # fmt: skip
 
 
-def head_of(path: Path, most_gib: float = LoadConfig.most_gib) -> Head:
+def head_of(path: Path, most_gib: float = LoadConfig.most_gib, *, whole: bool = True) -> Head:
     """What a file's header says, held against the files' lengths; LoadError where it cannot be a scan."""
     read = next((own for suffix, own in OWN.items() if path.name.lower().endswith(suffix)), None)
     head = read(path) if read else None
     if head is not None:
-        return require_data(head, most_gib)
+        return require_data(head, most_gib, whole=whole)
     head = foreign.head_of(path)
     require_data(replace(head, packing="foreign", parts=((path, 0),)), most_gib)
     return head
@@ -61,7 +61,7 @@ def parts(path: Path) -> tuple[Path, ...]:
 
 def read_header(source: Source, config: LoadConfig) -> Header:
     """Geometry of one file; a 4-D file is a sequence of volumes along its last axis."""
-    head = head_of(source.path, config.most_gib)
+    head = head_of(source.path, config.most_gib, whole=False)
     if head.channels != 1:
         why = f"{head.channels} values per voxel; allowed: a 3-D grey-value volume, or a 4-D file that is a sequence"
         raise unusable(source.path, f"got {why} of them (its last axis counts them).")

@@ -69,8 +69,12 @@ def axes_of(path: Path, sizes: list[int]) -> tuple[tuple[int, int, int], int]:
     return (sizes[0], sizes[1], sizes[2]), sizes[3] if len(sizes) == 4 else 1
 
 
-def require_data(head: Head, most_gib: float) -> Head:
-    """The head itself; LoadError where its files cannot hold the voxels that it speaks of."""
+def require_data(head: Head, most_gib: float, *, whole: bool = True) -> Head:
+    """The head itself; LoadError where its files cannot hold the voxels that it speaks of.
+
+    whole : also where unpacked data are cut short. Where a header alone is asked for they may be: one damaged frame
+    costs that frame when it is read, not the study.
+    """
     count = len(head.parts)
     if count == 0 or head.planes % count:
         raise unusable(head.path, f"{head.planes} planes in {count} data files; allowed: the same number in each file")
@@ -81,7 +85,7 @@ def require_data(head: Head, most_gib: float) -> Head:
         require_room(path, need, there, head.packing, most_gib)
         if head.packing in ("deflate", "bzip2") and there < 8:
             raise unusable(path, "no voxels after the header; the file is cut short: copy it again")
-        if head.packing == "" and there != need:
+        if head.packing == "" and (there > need or (whole and there < need)):
             kind = "is cut short" if there < need else "holds more than its header says"
             why = f"the file {kind}: {there} bytes of voxels, the header asks for {need}"
             raise unusable(path, f"{why} ({list(head.shape)} voxels of {head.kind}). Copy the file again.")

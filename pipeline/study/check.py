@@ -5,7 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import Header, LoadError, Scans, Source, each_volume, read_header, require_one, require_same_geometry
+from pipeline.load import (
+    Header,
+    LoadError,
+    Scans,
+    Source,
+    each_volume,
+    read_header,
+    require_one,
+    require_same_geometry,
+    require_whole,
+)
 from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import status_of
 from pipeline.load.lumens import read_lumen
@@ -18,12 +28,16 @@ NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
 
 
-def check(cases: Sequence[Case], config: Config) -> list[str]:
-    """Problems of all cases, a line each, with its case's id."""
-    return [f"case {case.id!r}: {' '.join(text.split())}" for case in cases for text in check_case(case, config)]
+def check(cases: Sequence[Case], config: Config, *, whole: bool = True) -> list[str]:
+    """Problems of all cases, a line each, with its case's id.
+
+    whole : also frames that are cut short. A run does not ask: such a frame is lost, and said, and the others are not.
+    """
+    found = [(case.id, text) for case in cases for text in check_case(case, config, whole=whole)]
+    return [f"case {name!r}: {' '.join(text.split())}" for name, text in found]
 
 
-def check_case(case: Case, config: Config) -> list[str]:
+def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
     """What would stop or spoil this case; empty when nothing is found."""
     problems: list[str] = []
 
@@ -40,6 +54,9 @@ def check_case(case: Case, config: Config) -> list[str]:
     headers: list[Header] = []
     for source in ((case.reference,) if case.reference else ()) + case.frames:
         found(lambda source=source: headers.append(read_header(source, config.load, case.spacing_mm)))  # type: ignore[misc]
+    for header in headers:
+        if whole or (header.source == case.reference):
+            found(lambda header=header: require_whole(header, config.load))  # type: ignore[misc]
     if not problems:
         found(lambda: None if case.reference is None else require_one(headers[0]))
     if not problems:
