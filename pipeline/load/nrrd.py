@@ -129,8 +129,9 @@ def _vectors(path: Path, fields: dict[str, str], count: int) -> list[NDArray[Any
         return [np.eye(max(count, 3))[i] for i in range(count)]
     if len(words) != count:
         raise unusable(path, f"space directions: {text[:80]!r}; allowed: one vector (x,y,z), or none, for each axis")
-    tags = {word: word.strip("()").replace(",", " ") for word in words}
-    return [None if w in ("none", "nan") else numbers(path, tags, w, len(tags[w].split())) for w in words]
+    vectors = [None if w in ("none", "nan") else w.strip("()").replace(",", " ") for w in words]
+    name = "space directions"
+    return [None if v is None else numbers(path, {name: v}, name, len(v.split())) for v in vectors]
 
 
 def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: int) -> tuple[Placed, tuple[str, ...]]:
