@@ -123,16 +123,18 @@ def dicom_variants(enhanced: Callable, numbered: np.ndarray, spacing: np.ndarray
     yield "dicom, enhanced", whole, "right", {}
     yield "dicom, enhanced, no suffix", lambda f: whole(f).rename(f / "e"), "right", {}
 
+    even = np.pad(numbered, ((0, 3), (0, 1), (0, 0)))  # GDCM refuses planes of an odd number of bytes
+
     def packed(folder: Path) -> Path:
         for k in range(9):
-            data = one(numbered[:, :, k], origin + [0, 0, 0.7 * k], ExplicitVRLittleEndian)
+            data = one(even[:, :, k], origin + [0, 0, 0.7 * k], ExplicitVRLittleEndian)
             from pydicom.uid import RLELossless
 
             data.compress(RLELossless)
             data.save_as(folder / f"{k}.dcm")
         return folder
 
-    yield "dicom, RLE", packed, "right", {}
+    yield "dicom, RLE", packed, "right", {"values": even}
 
     def beside(folder: Path) -> Path:
         series()(folder)
