@@ -34,7 +34,7 @@ MANIFEST_BYTES = 16 * 2**20
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
-    if value not in wires:
+    if not isinstance(value, str) or value not in wires:
         problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
         raise saying(*[problem] * bool(wires))

@@ -14,7 +14,7 @@ from pipeline.load.order import natural_key
 
 WHOLE_CASE = "whole_case"
 """Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
-MOST_MATCHES, LONGEST_PATTERN = 20_000, 4096
+MOST_MATCHES, LONGEST_PATTERN, LONGEST_NAME = 20_000, 4000, 255
 
 
 def saying(*problems: str) -> PydanticCustomError:
@@ -35,8 +35,10 @@ def _require_name(name: str, info: ValidationInfo) -> None:
     """An error for what is no path, or leads out of the study without being absolute."""
     if not name.strip() or "\0" in name:
         raise saying(f"{info.field_name} = {name!r}: an empty name; name a file, or leave the key out")
-    if len(name) > LONGEST_PATTERN:
-        raise saying(f"{info.field_name}: a name of {len(name)} characters; allowed: {LONGEST_PATTERN}")
+    longest = max(len(part.encode()) for part in name.split("/"))
+    if len(name) > LONGEST_PATTERN or longest > LONGEST_NAME:
+        allowed = f"allowed: {LONGEST_NAME}, and {LONGEST_PATTERN} for a whole path"
+        raise saying(f"{info.field_name}: a name of {longest} bytes in a path of {len(name)}; {allowed}")
     if not Path(name).is_absolute() and Path(os.path.normpath(name)).parts[:1] == ("..",):
         where = "leads out of the manifest's folder; give such a path as an absolute one"
         raise saying(f"{info.field_name} = {name!r} {where}")

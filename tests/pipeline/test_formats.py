@@ -31,6 +31,6 @@ def test_files_of_others_are_read_or_refused_in_a_sentence(path: Path) -> None:
     try:
         volume = load(read_header(path))
     except LoadError as error:
-        assert path.name in str(error)
+        assert path.name in str(error)  # noqa: PT017
     else:
         assert min(volume.shape) >= 2

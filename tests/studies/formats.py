@@ -263,13 +263,19 @@ def nrrd_variants() -> Iterator[Variant]:
     for text in ("hex", "lzma"):
         yield Variant(f"nrrd, encoding {text}", changed(plain, ("encoding:", text)), "!encoding")
     yield Variant("nrrd, no endian", without(plain, "endian"), "!endian")
-    yield Variant("nrrd, a vector of nan", changed(plain, ("space directions:", "(0,nan,0) (-0.5,0,0) (0,0,0.7)")), "!space directions")
+    yield Variant(
+        "nrrd, a vector of nan",
+        changed(plain, ("space directions:", "(0,nan,0) (-0.5,0,0) (0,0,0.7)")),
+        "!space directions",
+    )
     yield Variant("nrrd, packed and cut short", cut("a.nrrd", 20, compress=True), "!end too early")
     yield Variant("nrrd, written out", ascii_nrrd)
     yield Variant("nrrd, bzip2", packed_nrrd)
     for name in ("%s.raw", "../x.raw", "/etc/passwd"):
         yield Variant(f"nhdr, data in {name}", changed(by_itk("a.nhdr"), ("a.raw", name)), "!")
-    yield Variant("nrrd, 4-D, second volume", sequence("a.nrrd"), "space", values=numbered() + 1, direction=np.eye(3), item=1)
+    yield Variant(
+        "nrrd, 4-D, second volume", sequence("a.nrrd"), "space", values=numbered() + 1, direction=np.eye(3), item=1
+    )
     yield Variant("mha, 4-D, second volume", sequence("a.mha"), values=numbered() + 1, direction=np.eye(3), item=1)
     yield Variant(
         "nii.gz, 4-D, second volume", sequence("a.nii.gz"), values=numbered() + 1, direction=np.eye(3), item=1
