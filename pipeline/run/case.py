@@ -64,7 +64,7 @@ def clear(folder: Path) -> None:
 def finished(job: Job, key: str) -> bool:
     """Whether the result on disk is complete, ok and made from the same."""
     path = job.folder / "result.json"
-    if job.fresh or not key or not path.exists():
+    if job.fresh or not path.exists():
         return False
     try:
         result = results.read_result(path)
@@ -75,8 +75,7 @@ def finished(job: Job, key: str) -> bool:
 
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs)."""
-    # hashing a study costs 0.6 s per GB, and who says --no-cache wants nothing kept
-    key = job.key if job.cache else ""
+    key = job.key
     progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
     if finished(job, key):
         progress("compare", 1, 1, "unchanged since the last run, kept")

@@ -89,20 +89,6 @@ def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
     assert values.max() == numbered().astype(int).max() * 70
 
 
-def test_without_a_store_nothing_is_hashed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    sitk.WriteImage(image_of(numbered()), str(tmp_path / "a.mha"))
-    text = GOOD.replace("frames/*.mha", "a.mha").replace("[1.0, 2.0, 3.0]", "[12.0, -30.0, 5.0]")
-    (tmp_path / "m.toml").write_text(text)
-
-    hashed: list[str] = []
-    monkeypatch.setattr("pipeline.run.store._content_hash", lambda path, *_stamp: hashed.append(path.suffix) or "0")
-    run = ["run", str(tmp_path / "m.toml"), "-o", str(tmp_path / "out"), "--until", "load"]
-    assert main([*run, "--no-cache"]) < 2
-    assert ".mha" not in hashed
-    assert main(run) < 2
-    assert ".mha" in hashed
-
-
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
