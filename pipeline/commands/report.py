@@ -21,11 +21,14 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from reports.html import render_case, render_index
+    from reports.inside import links_out
 
     found = found_results(args.out)
     if not found:
         problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
         return complain([problem], "OUT")
+    if links_out(args.out):
+        return complain(links_out(args.out), "OUT")
     totals = aggregate(args.out)
     drawn = True
     for result in found:
