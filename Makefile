@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study bars baseline anatomies bench stress peers aneurism conebeam formats fuzz audit truth clean
+.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam formats fuzz audit truth clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,9 +9,17 @@ SEED ?= 101
 export OMP_NUM_THREADS := 1
 
 validate: setup
-	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --frames 30 --size 256 --seed $(SEED)
-	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume \
-	  --sweep simulate.bending_scale=0.8,1.2 --sweep simulate.wall_scale=0.333,3 --sweep simulate.roll_offset_deg=-15,15
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume -j 2 \
+	  --sweep simulate.roll_offset_deg=-15,15 --sweep simulate.taper_scale=0.5,2 \
+	  --sweep simulate.rest_curvature_scale=0.8,1.2 --sweep simulate.friction=0.2
+
+# errors planted into the simulator of the same study: sweep.csv has the skill that is left to each
+planted: setup
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/planted --resume -j 2 --until compare \
+	  --sweep simulate.roll_offset_deg=-60,60 --sweep simulate.rest_curvature_scale=0 \
+	  --sweep simulate.taper_scale=2 --sweep simulate.friction=0.2
 
 test: setup lint
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile

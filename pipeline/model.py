@@ -61,6 +61,7 @@ class Clamp:
 
     material_axis : (3,) where material axis 1 points at roll 0; None: the world axis least aligned with direction.
     down : (3,) where the wire's weight pulls; None: it has none.
+    covariance : (6, 6) of entry_mm, mm, and of the change of the direction; None: not known.
     """
 
     entry_mm: Array
@@ -69,12 +70,28 @@ class Clamp:
     down: Array | None = None
     note: str = ""
     warning: str = ""
+    covariance: Array | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("entry_mm", "direction", "material_axis", "down"):
+        for name in ("entry_mm", "direction", "material_axis", "down", "covariance"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def sigma_mm(self) -> float:
+        """Standard deviation of the entry along an axis across the wire, mm; NaN where it is not known."""
+        if self.covariance is None:
+            return float("nan")
+        across = np.eye(3) - np.outer(self.direction, self.direction)
+        return float(np.sqrt(0.5 * np.trace(across @ self.covariance[:3, :3])))
+
+    @property
+    def sigma_deg(self) -> float:
+        """Standard deviation of a tilt of the direction about an axis, degrees; NaN where it is not known."""
+        if self.covariance is None:
+            return float("nan")
+        return float(np.degrees(np.sqrt(0.5 * np.trace(self.covariance[3:, 3:]))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,8 @@ def size(n_bytes: int) -> str:
 def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -> list[dict[str, str]]:
     """The numbers at the head of a page; those that do not apply are left out.
 
-    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total.
+    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total, ``name`` that
+    of a word that follows the label.
     """
     shown = []
     for entry in entries:
@@ -80,19 +81,17 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            shown.append({"value": value, "label": f"{total}{entry['label']}{interval_95}"})
+            named = f" {statistics.get(entry['name'], '')}" if entry.get("name") else ""
+            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
 
 
-def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The one number over all validation cases, with what it rests on."""
-    label = "mm rms, simulated to traced wire, all validation cases"
-    first = cards([{"column": "rms_mm", "label": label}], pooled)
-    groups = {
-        "value": f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}",
-        "label": "validation cases / groups of them, which the interval resamples",
-    }
-    return [*first, groups] if first else []
+def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[dict[str, str]]:
+    """The numbers over all validation cases, and what their intervals rest on. table : overall.csv, a row or none."""
+    if table.empty:
+        return []
+    row = {str(name): value for name, value in table.iloc[0].items()}
+    return [*cards(entries, row), {"value": number(row["insertions"]), "label": number(row["interval"])}]
 
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:

@@ -15,7 +15,7 @@ from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.scene3d import write_scene
-from reports.schema import ERRORS, FAILURES, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP
 from reports.tables import read_if_there
 
 
@@ -105,6 +105,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = _read_cases(out_dir)
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
+    whole = read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
@@ -115,7 +116,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         **_headline(cases, bool(failures)),
         "failures": failures,
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
-        "cards": _content.overall(next((run["overall"] for run in infos if run.get("overall")), {})),
+        "cards": _content.overall(declared("overall"), whole),
         "sections": draw_sections("run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,

@@ -20,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression, 2 on wrong input."""
     import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
+    from pipeline.run.overall import found_cases, ratio
     from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
 
     try:
@@ -34,5 +35,8 @@ def main(args: argparse.Namespace) -> int:
     bad = difference.regressions
     if len(bad):
         say(bad.to_string(index=False, float_format="{:.4g}".format, max_rows=30))
+    paired = ratio(found_cases(args.first), found_cases(args.second))
+    if paired is not None:
+        say(paired.sentence)
     say(difference.sentence)
     return 1 if len(bad) else 0

@@ -69,9 +69,10 @@ def main(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, points_of
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
     from pipeline.run.store import default_root
+    from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
 
     manifest, assumptions = _manifest(args)

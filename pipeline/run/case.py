@@ -98,14 +98,14 @@ def run_case(job: Job) -> None:
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     """Every file of the case; result.json last, since it says that the case is complete."""
     errors = [outputs.error_row(frame, log) for frame in known.frames]
-    tables.write(job.folder / ERRORS.file, ERRORS, errors)
+    summary = outputs.summary_row(job.case, known, errors, log)
+    tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
     points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
     outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
         outputs.write_view(job.folder / "view", known)
-    summary = outputs.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
     summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}

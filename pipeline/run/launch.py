@@ -6,7 +6,7 @@ agreement that no parameter moves is suspicious.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,12 @@ from pipeline.run.case import Job, clear, finished, run_case
 from pipeline.run.provenance import collect
 from pipeline.run.results import LOST, Result, found_results, lost, write_json
 from pipeline.run.store import file_hash
+from pipeline.run.sweep import SweepPoint, write_sweep
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve, to_toml
-from reports import tables
+from pipeline.study.settings import to_toml
 from reports.atomic import write_text
 from reports.html import render_index
-from reports.schema import SWEEP
 
 
 class UsageError(InputError):
@@ -34,49 +33,9 @@ class UsageError(InputError):
     place = "the command line"
 
 
-@dataclass(frozen=True)
-class SweepPoint:
-    """One changed setting and the settings that result."""
-
-    parameter: str
-    value: str
-    settings: Resolved
-
-    @property
-    def folder(self) -> Path:
-        """Its sub-folder of the output."""
-        return Path("sweep", f"{self.parameter}={self.value}".replace("/", "_"))
-
-
-def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
-    """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
-    points = []
-    for text in texts:
-        name, equals, values = text.partition("=")
-        if not equals or not values.strip():
-            raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
-        for value in values.split(","):
-            setting = parse_assignment(f"{name}={value}", "sweep")
-            points.append(SweepPoint(name.strip(), value.strip(), resolve([*base, setting])))
-    return points
-
-
 def _lost_points(plan: "Plan") -> list[tuple[SweepPoint, Result]]:
     """Cases of which a sweep has no result, and at which point."""
     return [(p, r) for p in plan.points for r in found_results(plan.out / p.folder) if r.status in LOST]
-
-
-def write_sweep(out: Path, points: Sequence[SweepPoint]) -> None:
-    """sweep.csv: the plain result first, then every point."""
-    rows = [_row("(plain)", "", result) for result in found_results(out)]
-    for point in points:
-        rows += [_row(point.parameter, point.value, r) for r in found_results(out / point.folder)]
-    tables.write(out / "sweep.csv", SWEEP, rows)
-
-
-def _row(parameter: str, value: str, result: Result) -> dict[str, Any]:
-    own = {"parameter": parameter, "value": value, "case": result.case}
-    return {name: result.summary.get(name) for name in SWEEP.names} | own
 
 
 @dataclass(frozen=True)
@@ -156,10 +115,10 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
     run_cases(plan, jobs)
     for point in plan.points:
-        here = replace(plan.template, settings=point.settings, out=out / point.folder, pictures=False, quiet=True)
+        here = replace(plan.template, settings=point.cheap, out=out / point.folder, pictures=False, quiet=True)
         run_cases(plan, [replace(here, case=case) for case in plan.cases])
     if plan.points:
-        write_sweep(out, plan.points)
+        write_sweep(out, plan.template.settings, plan.cases, plan.points)
     totals = replace(aggregate(out, info, name), sweep_lost=len(_lost_points(plan)))
     if junit:
         write_junit(junit, found_results(out))
@@ -220,6 +179,14 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
+        parts.append(_with_interval(totals.pooled))
     if totals.frames:
         parts.append(f"solver {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
     return ".  ".join(parts) + f".  report: {index}"
+
+
+def _with_interval(pooled: Mapping[str, Any]) -> str:
+    """The pooled error with its interval, or why there is none."""
+    ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
+    known = ends if np.isfinite(pooled["rms_low_mm"]) else ""
+    return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, is_pooled, pooled, skill_of
+from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
 from pipeline.model import Array, Lumen, Volume, arc_length
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
@@ -27,21 +27,24 @@ TIMED = STAGES[:-1]
 SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
-def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
-    """The row of a case in summary.csv. errors : its rows of errors.csv; draws : resamples behind the intervals."""
+def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log) -> dict[str, Any]:
+    """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
     good = sum(frame.ok for frame in known.frames)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
     head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
-    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and is_pooled(row, mm)]
+    pairs = zip(errors, points, strict=True)
+    scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
+    if case.frames:
+        head["within_1mm"] = within(errors, len(errors))
     times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
         head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
-    return head | pooled(scored, draws) | times
+    return head | pooled(scored) | times
 
 
 def error_row(frame: Frame, log: Log) -> dict[str, Any]:
@@ -69,6 +72,16 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
     return row
 
 
+def with_strongest(errors: Sequence[dict[str, Any]], summary: Row) -> list[dict[str, Any]]:
+    """The rows of errors.csv with their skill against the case's strongest predictor."""
+    name = summary.get("strongest_null")
+    if not name:
+        return list(errors)
+    nulls = [row.get(f"null_{name}_rms_mm", float("nan")) for row in errors]
+    skills = [skill_of(row.get("rms_mm", float("nan")), null) for row, null in zip(errors, nulls, strict=True)]
+    return [row | {"skill_strongest": skill, "strongest_null": name} for row, skill in zip(errors, skills, strict=True)]
+
+
 def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
     """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
 
@@ -76,8 +89,11 @@ def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
     """
     assert frame.simulated is not None
     arc = arc_length(frame.simulated.joints_mm)
+    # what lies before the first of them, in the clamp's reach, is none of theirs
+    there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
     force = np.zeros((len(arc_mm), 3))
-    np.add.at(force, np.abs(arc_mm[None, :] - arc[:, None]).argmin(axis=1), frame.simulated.contact_force_N)
+    nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
+    np.add.at(force, nearest, frame.simulated.contact_force_N[there])
     return np.asarray(np.linalg.norm(force, axis=1))
 
 
@@ -175,7 +191,10 @@ def _write_wires(folder: Path, frame: Frame) -> None:
     arrays: dict[str, Any] = {"contact_force_N": frame.simulated.contact_force_N}
     if frame.comparison is not None:
         errors = frame.comparison
-        points = errors.sample_mm
-        arrays = {"error_mm": errors.error_mm, "arc_mm": errors.arc_mm}
-        arrays["contact_force_N"] = contact_at(frame, errors.arc_mm)
+        along = arc_length(joints)
+        reach = along[along < errors.arc_mm[0] - 1e-9]
+        arc = np.concatenate([reach, errors.arc_mm])
+        points = np.concatenate([joints[: len(reach)], errors.sample_mm])
+        arrays = {"error_mm": np.concatenate([np.full(len(reach), np.nan), errors.error_mm]), "arc_mm": arc}
+        arrays["contact_force_N"] = contact_at(frame, arc)
     export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)

@@ -16,7 +16,7 @@ from pipeline.run.log import Log
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.run.store import file_hash
+from pipeline.run.store import digest, file_hash
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
 
@@ -47,8 +47,9 @@ class Result:
     """A case as result.json holds it.
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
-    key : of everything that the result depends on; empty where it is to be computed again.     details : settings,
-    inputs, counters, assumptions and what else the pages show.
+    key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
+    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     details :
+    settings, inputs, counters, assumptions and what else the pages show.
     """
 
     case: str
@@ -60,6 +61,7 @@ class Result:
     failures: list[Annotated[Row, has("case", "status", "sentence", "message")]]
     summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
+    phantom: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -105,7 +107,9 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, details)
+    source = case.lumen or case.reference
+    phantom = "" if source is None else digest(source)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, details)
 
 
 def lost(name: str, status: str, reason: str, *, role: str = "", group: str = "", frames: int = 0) -> Result:
@@ -122,6 +126,8 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     clamp: dict[str, Any] = {"entry_mm": case.entry_mm, "entry_direction": case.entry_direction}
     if known.clamp is not None:
         clamp |= {"used_mm": known.clamp.entry_mm, "used_direction": known.clamp.direction}
+        clamp |= {"sigma_mm": known.clamp.sigma_mm, "sigma_deg": known.clamp.sigma_deg}
+        clamp["covariance"] = known.clamp.covariance
     return {
         "seconds": log.seconds,
         "assumptions": log.assumptions,

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from pipeline.ranges import Factor, Finite, Number, PositiveCount, Step
+from pipeline.ranges import Factor, Finite, NonNegative, Number, PositiveCount, Step
 from solver._kernels.minimise import METHODS
 
 Segment = Step | Literal["auto"]
@@ -48,9 +48,15 @@ class SimulateConfig:
     depth: Literal["traced", "manifest"] = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
     entry: Literal["traced", "manifest"] = "traced"
-    """traced (the clamp is measured in the first 8 mm of the traced wires) or manifest (taken as written)."""
+    """traced (fitted to the first 10 mm of the traces, with the manifest as prior) or manifest (taken as written)."""
     bending_scale: Factor = 1.0
-    """Factor on the wire's bending stiffness, for sensitivity runs."""
+    """Factor on the wire's bending stiffness, for sensitivity runs; the same for the whole wire, it scales forces."""
+    taper_scale: Factor = 1.0
+    """Factor on the lengths over which the wire's bending stiffness changes, for sensitivity runs."""
+    rest_curvature_scale: NonNegative = 1.0
+    """Factor on the wire's rest curvature, for sensitivity runs; 0 takes the curve off its tip."""
+    friction: NonNegative | None = None
+    """Coulomb's coefficient instead of the manifest's, for sensitivity runs."""
     wall_scale: Factor = 1.0
     """Factor on the wall stiffness, for sensitivity runs."""
     roll_offset_deg: Finite = 0.0

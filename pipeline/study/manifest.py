@@ -24,8 +24,9 @@ from pydantic import (
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_text, status_of
 from pipeline.model import OverWire, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, Point, Positive
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
+from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, saying
 
 MANIFEST_BYTES = 16 * 2**20
@@ -43,13 +44,16 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
 
 def _not_yet(value: Any, info: ValidationInfo) -> Any:
     """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
-    problem = {
-        "parameters": "parameters cannot be read in this version; write the values into [wires] and [case.wall]",
-        "roll_deg": 'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame',
-    }[info.field_name or ""]
-    if value == "fit" or info.field_name == "parameters":
-        raise saying(problem)
+    if info.field_name == "parameters":
+        raise saying("parameters cannot be read in this version; write the values into [wires] and [case.wall]")
+    if value == "fit":
+        raise saying('roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame')
     return value
+
+
+def _not_written(value: Any, info: ValidationInfo) -> None:
+    """A key that is filled in here, never by the user."""
+    raise ValueError(f'unknown key {info.field_name!r}; write entry = "case:ID"')
 
 
 class Strict(BaseModel):
@@ -68,6 +72,10 @@ class Case(Strict):
     frames: Sources = ()
     entry_mm: Point
     entry_direction: Direction
+    entry: Annotated[str, Field(pattern=r"^(case:.+)?$")] = ""
+    entry_case: Annotated["Case | None", BeforeValidator(_not_written)] = None
+    entry_sigma_mm: NonNegative | None = None
+    entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
     insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
@@ -171,9 +179,14 @@ class ManifestTables(Strict):
         return value
 
     @model_validator(mode="after")
+    def _entries_known(self) -> "ManifestTables":
+        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames)) for c in self.case}):
+            raise saying(*problems)
+        return self
+
+    @model_validator(mode="after")
     def _unique(self) -> "ManifestTables":
-        counts = Counter(case.id for case in self.case)
-        repeats = [name for name, count in counts.items() if count > 1]
+        repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
         if repeats:
             what = "this id is used more than once; ids name output folders"
             raise saying(*(f"case {name!r}: {what}" for name in repeats))
@@ -207,7 +220,8 @@ def read_manifest(path: Path) -> Manifest:
     except ValidationError as error:
         problems = [text for item in error.errors() for text in _sentences(data, dict(item))]
         raise ManifestError([f"{path}: {text}".replace(": : ", ": ") for text in problems]) from None
-    return Manifest(path, tuple(tables.case))
+    held = {f"case:{case.id}": case for case in tables.case}
+    return Manifest(path, tuple(case.model_copy(update={"entry_case": held.get(case.entry)}) for case in tables.case))
 
 
 def _sentences(data: dict[str, Any], error: dict[str, Any]) -> Iterator[str]:

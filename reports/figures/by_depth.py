@@ -70,7 +70,7 @@ def skill_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure = new_figure(3.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-    left.axhline(0.0, color=VERMILION, linewidth=1.0, linestyle="--", label="no better than the centreline")
+    left.axhline(0.0, color=VERMILION, linewidth=1.0, linestyle="--", label="no better")
     shown = _lines(left, good, "skill_by_depth")
     left.set_ylim(min(-0.1, float(good["skill"].clip(lower=-1.0).min()) - 0.05), 1.02)
     _finish({left: "skill (1 is perfect)"})
@@ -143,7 +143,9 @@ def _pooled(statistics: Mapping[str, Any]) -> pd.DataFrame:
     """Pooled error of the simulation, with its interval, and of every predictor that has one."""
     numbers = ["rms_mm", "rms_low_mm", "rms_high_mm"]
     rows = [("simulated", *(statistics.get(name) for name in numbers))]
-    rows += [(label, statistics.get(column), None, None) for column, label, *_ in predictors()]
+    for column in ERRORS.shown("predictors", "rivals"):
+        label = column.shown.get("predictors") or column.shown.get("rivals")
+        rows.append((label, statistics.get(column.name), None, None))
     table = pd.DataFrame(rows, columns=["predictor", *numbers])
     table[numbers] = table[numbers].apply(pd.to_numeric)
     return table[table["rms_mm"].notna()].reset_index(drop=True)

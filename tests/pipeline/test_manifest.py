@@ -122,3 +122,21 @@ def test_broken_toml_and_no_file(tmp_path: Path) -> None:
     assert "not valid TOML" in problems(tmp_path, "schema = = 1")
     with pytest.raises(ManifestError, match="no such manifest"):
         read_manifest(tmp_path / "nothing.toml")
+
+
+SECOND = GOOD.split("[[case]]")[1].replace("run1", "run2")
+
+
+def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:
+    first, second = read_manifest(written(tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run1"\n')).cases
+    assert second.entry_case is not None
+    assert second.entry_case.id == "run1"
+    assert first.entry_case is None
+
+
+def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) -> None:
+    assert "no such case; did you mean 'run1'?" in problems(
+        tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run3"\n'
+    )
+    assert "shows no clamp" in problems(tmp_path, f'{GOOD}\nentry = "case:run1"\n')
+    assert "unknown key" in problems(tmp_path, f"{GOOD}\nentry_case = {{}}\n")

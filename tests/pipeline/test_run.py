@@ -332,8 +332,8 @@ def test_a_wire_that_cannot_enter_is_a_failed_frame(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No point of it is there to be compared with or drawn; the case must not end as crashed."""
-    clamp = simulate._clamp
-    monkeypatch.setattr(simulate, "_clamp", lambda run, frames: aside(clamp(run, frames)))
+    clamp = simulate.clamp_of
+    monkeypatch.setattr(simulate, "clamp_of", lambda run, known: aside(clamp(run, known)))
     assert run(study, tmp_path) == 1
     assert set(errors_of(tmp_path)["status"]) == {"entry_outside"}
     assert (tmp_path / "cases" / "bifurcation" / "report.html").exists()
@@ -528,3 +528,18 @@ def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("wireval ")
     assert main([]) == 2
+
+
+def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, study: Path, tmp_path: Path) -> None:
+    """The same scans twice, the second with the clamp of the first: it is the first's to the last bit."""
+    head, case = (study / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
+    second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
+    manifest = study / "borrowed.toml"
+    manifest.write_text(f"{head}[[case]]{case}\n[[case]]{second}", encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", "--until", "compare"]) == 0
+    own, borrowed = (
+        json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
+    )
+    assert any("blind to this case's scans" in line for line in borrowed["assumptions"])
+    np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])

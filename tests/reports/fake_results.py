@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 
 from reports import export, frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
-from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP
 
 SPACING = np.full(3, 0.4)
 ORIGIN = np.array([-20.0, -14.0, -6.0])
@@ -66,10 +66,16 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
     tables.write(out / "failures.csv", FAILURES, failures)
     if sweep:
         tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
-    overall = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31, "cases": 2, "groups": 1}
-    run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance(), "overall": overall}
+    tables.write(out / OVERALL_FILE, SUMMARY, [_overall(summaries)])
+    run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance()}
     (out / "run.json").write_text(json.dumps(run, indent=1))
     return out
+
+
+def _overall(summaries: list[dict[str, Any]]) -> dict[str, Any]:
+    counts = {name: sum(row[name] for row in summaries) for name in ("frames", "frames_ok", "frames_failed")}
+    ends = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31}
+    return {"case": "(all)", **counts, **ends, "insertions": 4, "interval": "wide: 4 insertions"}
 
 
 def _depths(case: FakeCase) -> np.ndarray:
@@ -302,6 +308,7 @@ def _sweep(cases: tuple[FakeCase, ...]) -> Iterator[dict[str, Any]]:
                     yield {
                         "parameter": parameter,
                         "value": f"{value:g}",
+                        "unchanged": "0" if "roll" in parameter else "1",
                         "case": case.name,
                         "rms_mm": rms,
                         "tip_median_mm": 2 * rms,

@@ -77,6 +77,22 @@ def _heat_case(tmp_path: Path) -> CaseFiles:
     return _empty_case(tmp_path, points=tables.read(tmp_path / "points.csv.gz", POINTS))
 
 
+def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
+    """Two changed values that are equally bad were a flat line: what lies between them was not drawn."""
+    rows = [{"parameter": "(plain)", "value": "", "case": c, "rms_mm": 0.1} for c in ("a", "b", "(all)")]
+    for value in ("-15", "15"):
+        changed = {"parameter": "simulate.roll_offset_deg", "value": value, "unchanged": "0"}
+        rows += [{**changed, "case": c, "rms_mm": 0.25} for c in ("a", "b")]
+        rows.append({**changed, "case": "(all)", "rms_mm": 0.25, "rms_ratio_low": 2.0, "rms_ratio_high": 3.0})
+    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
+    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
+    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
+    assert drawing is not None
+    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    assert lines["to the traced wire"].get_xydata().tolist() == [[-15.0, 0.25], [0.0, 0.1], [15.0, 0.25]]
+    assert lines["unchanged"].get_xydata().tolist() == [[0.0, 0.1]]
+
+
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
     assert drawing is not None

@@ -124,6 +124,8 @@ def test_every_pooled_column_has_its_place_in_the_summary() -> None:
     changed = {name: pooled for name, pooled in names.items() if name != pooled}
     assert changed == {
         "tip_mm": "tip_median_mm",
+        "tip_along_mm": "tip_along_median_mm",
+        "tip_across_mm": "tip_across_median_mm",
         "branch_ok": "branch_ok_fraction",
         "trace_mean_mm": "trace_mean_median_mm",
         "trace_tip_mm": "trace_tip_median_mm",

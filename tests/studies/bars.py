@@ -21,13 +21,14 @@ def row(out: Path) -> str:
         f"   {table['trace_mean_mm'].median() / voxel:6.3f} {table['trace_mean_mm'].max() / voxel:6.3f}"
         f"   {table['trace_tip_mm'].median() / voxel:6.3f} {table['trace_tip_mm'].max() / voxel:6.3f}"
         f"   {numbers['truth_rms_mm']:6.3f} {numbers['rms_mm']:6.3f} {numbers['tip_median_mm']:6.3f}"
-        f"   {numbers['skill']:6.3f}  {numbers['peak_memory_MiB']:6.0f}"
+        f"   {numbers['skill']:6.3f} {numbers['skill_strongest']:6.3f}  {numbers['peak_memory_MiB']:6.0f}"
+        f"   against {numbers['strongest_null']}"
     )
 
 
 def main() -> None:
     """Print the table."""
-    print("             frames  trace mean (voxel) trace tip (voxel)  truth   rms    tip     skill  memory")
+    print("             frames  trace mean (voxel) trace tip (voxel)  truth   rms    tip     skill  strongest  memory")
     print("                 ok  median    max   median    max        rms mm     mm    mm            MiB")
     for name in sys.argv[1:]:
         print(row(Path(name)))

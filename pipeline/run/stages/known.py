@@ -84,11 +84,15 @@ Result = TypeVar("Result", Lumen, Curve)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of a case so far. clamp : the one that was simulated; failure : why the case went no further."""
+    """What is known of a case so far.
+
+    clamp, segment_mm : what was simulated with.     failure : why the case went no further.
+    """
 
     scans: Scans | None = None
     lumen: Lumen | None = None
     clamp: Clamp | None = None
+    segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""
