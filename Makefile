@@ -66,9 +66,9 @@ fuzz: setup
 
 # known weaknesses of the locked packages (needs the network)
 audit:
-	test -x $(OUT)/audit/bin/pip-audit || { $(PYTHON) -m venv $(OUT)/audit && \
-	  $(OUT)/audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
-	$(OUT)/audit/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+	test -x .audit/bin/pip-audit || { $(PYTHON) -m venv .audit && \
+	  .audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
+	.audit/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
 
 # the truth against itself, every scene replayed on nodes half as far apart
 truth: setup
