@@ -75,6 +75,8 @@ def _centreline(shapes: Shapes, path: Path) -> Branches:
     return Branches(shapes.points_mm[start], shapes.points_mm[end], radius[start], radius[end])
 
 
+SHORTEST_MM = 2.0
+"""No vessel that a wire is pushed through is shorter: a file of this size is in metres."""
 COARSEST_MM, LATTICE_VOXELS, MOST_FEET, MOST_WORK = 1.5, 60e6, 2e7, 5e9
 """Coarsest lattice that a lumen may be put on (it holds LATTICE_VOXELS at most), points on its wall, voxels visited."""
 
@@ -82,6 +84,9 @@ COARSEST_MM, LATTICE_VOXELS, MOST_FEET, MOST_WORK = 1.5, 60e6, 2e7, 5e9
 def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
     """What was read; LoadError where it is so large, or covers itself so often, that no lattice resolves it."""
     ends = found.points_mm if isinstance(found, Shapes) else np.concatenate([found.start_mm, found.end_mm])
+    if float(np.ptp(ends, axis=0).max()) < SHORTEST_MM:
+        got = f"a lumen of {np.ptp(ends, axis=0).max():.3g} mm"
+        raise refused(path, got, f"{SHORTEST_MM:g} mm or more", "is it in metres? Convert it to mm")
     size = np.ptp(ends, axis=0) + 10.0
     voxel = max(0.3, float(np.cbrt(np.prod(size) / LATTICE_VOXELS)))
     if voxel > COARSEST_MM:

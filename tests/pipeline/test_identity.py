@@ -16,9 +16,11 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Mask
 from pipeline.load.order import natural_key
 from pipeline.run.store import digest
+from pipeline.study.infer import _scans_in
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
+from tests.studies.formats import variants
 
 
 def test_voxels_of_a_detached_file_belong_to_the_key_of_a_crop(tmp_path: Path) -> None:
@@ -139,3 +141,19 @@ def test_everything_that_is_wrong_with_the_files_of_a_case_is_said_at_once(tmp_p
         for part, line in zip(("f_0.mha", "f_2.mha", "l.stl", "3 problems"), said, strict=True):
             assert part in line
         assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["dicom, no suffixes", "dicom, enhanced", "dicom, enhanced, no suffix"])
+def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
+    """A folder of slices is one frame; folders of slices and enhanced files in it are frames."""
+    write = next(variant.write for variant in variants() if variant.name == name)
+    whole = tmp_path / "study"
+    whole.mkdir()
+    made = write(whole)
+    assert _scans_in(whole) == (None, [made])
+    below = tmp_path / "below"
+    for k in (10, 2):
+        (below / "frames" / f"f{k}").mkdir(parents=True)
+        write(below / "frames" / f"f{k}")
+    (below / "frames" / "notes").mkdir()
+    assert [path.name for path in _scans_in(below)[1]] == ["f2", "f10"]

@@ -17,7 +17,7 @@ from pipeline.load.lumens import read_lumen
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
-from tests.fuzz.inputs import markups, vtp
+from tests.fuzz.inputs import markups, stl, tetrahedra, vtp
 
 RADIUS, LENGTH = 1.5, 12.0
 START = np.array([3.0, -2.0, 1.0])
@@ -189,6 +189,24 @@ def test_a_curve_says_its_unit(tmp_path):
     points = np.array([[0.0, 0, 0], [0, 0, 0.01], [0, 0, 0.03]])
     (tmp_path / "a.mrk.json").write_bytes(markups(points, coordinateUnits="m"))
     np.testing.assert_allclose(read_curve(tmp_path / "a.mrk.json").points_mm, 1000 * points)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(0.001, "is it in metres"), (1000.0, "another unit than mm"), (1e9, "another unit than mm")]
+)
+def test_a_surface_in_another_unit_is_refused(tmp_path, factor, said):
+    points, faces = tetrahedra(1, 9.0)
+    (tmp_path / "a.stl").write_bytes(stl(points * factor, faces))
+    with pytest.raises(LoadError, match=said):
+        lumen_in(tmp_path / "a.stl")
+
+
+def test_a_surface_of_thousands_of_shells_is_refused(tmp_path):
+    """It was a hang."""
+    points, faces = tetrahedra(5000, 20.0, 0.001)
+    (tmp_path / "a.stl").write_bytes(stl(points, faces))
+    with pytest.raises(LoadError, match="remove what covers itself"):
+        lumen_in(tmp_path / "a.stl")
 
 
 def test_curves_come_back_as_they_were_written(tmp_path):
