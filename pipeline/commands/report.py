@@ -27,11 +27,14 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.atomic import WriteError
     from reports.html import render_index
+    from reports.inside import links_out
 
     found = found_results(args.out)
     if not found:
         problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
         return complain([problem], "OUT")
+    if links_out(args.out):
+        return complain(links_out(args.out), "OUT")
     heads = found_heads(args.out)
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))

@@ -49,6 +49,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import failure_lines, intention, last_line, launch
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from reports.inside import links_out
 
     try:
         plan = _plan(args)
@@ -56,7 +57,7 @@ def main(args: argparse.Namespace) -> int:
         return complain(error.problems, error.place or str(args.manifest))
     except LoadError as error:
         return complain([str(error)], "the command line")
-    problems = check(plan.cases, plan.template.settings.config)
+    problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
     if problems:
         return complain(problems, str(args.manifest))
     if args.dry_run:

@@ -46,9 +46,9 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
         ("solver.segment_mm=wide", "valid number"),
         ("segment_mm=1", "no setting; write table.key=value"),
         ("simulate.entry=foo", "'traced' or 'manifest'"),
-        ("solver.segment_mm=-3", "greater than 0"),
-        ("compare.sample_mm=0", "greater than 0"),
-        ("segment.outer_mm=nan", "finite"),
+        ("solver.segment_mm=-3", "greater than"),
+        ("compare.sample_mm=0", "greater than"),
+        ("segment.outer_mm=nan", "greater than or equal to 0.1"),
         ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
 )
