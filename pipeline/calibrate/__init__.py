@@ -1,1 +1,1 @@
-"""calibrate: which parameters make the solver's wire lie where the traced ones do, and which of them the traces show?"""
+"""calibrate: which parameters lay the solver's wire where the traced ones are, and which of them do the traces show?"""

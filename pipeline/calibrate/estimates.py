@@ -111,7 +111,8 @@ def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:
         for offset in OFFSETS:
             value = linear.x[k] + offset * unknown.enough
             if unknown.low <= value <= unknown.high:
-                asked.append((k, linear.x + covariance[:, k] / covariance[k, k] * (value - linear.x[k])))
+                along = covariance[:, k] / covariance[k, k] * (value - linear.x[k])
+                asked.append((k, problem.clipped(linear.x + along)))
     first = problem.residuals([x for _, x in asked], linear.weights, linear.scale)
     second = [_followed(problem, linear, k, x, r) for (k, x), r in zip(asked, first, strict=True)]
     again = problem.residuals(second, linear.weights, linear.scale)

@@ -22,7 +22,7 @@ DAMPINGS = (1.0, 10.0)
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The problem about a vector x (p,): whitened residuals and derivatives of every insertion, weights, and their scale.
+    """The problem about a vector x (p,): whitened derivatives of every insertion, weights, and their scale.
 
     normal : (p, p) with the priors.     right : (p,), minus half the gradient.     value : of the objective.
     """

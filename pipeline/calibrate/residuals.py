@@ -37,7 +37,7 @@ many times that of the median frame is weighed down to it: a release must not de
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Residuals of an insertion: across (points, 3) mm and force (frames,) N, NaN unknown, and which frames are at rest."""
+    """Residuals: across (points, 3) mm, force (frames,) N, NaN where unknown, and which frames are at rest."""
 
     across_mm: Array
     force_N: Array
@@ -149,7 +149,7 @@ class Evidence:
         return np.array(squares)
 
     def whitened(self, values: Array, force: Array, weights: Array, scale: float) -> Array:
-        """Residuals or derivatives as numbers of variance 1: (3 points + frames, ...) from (points, 3, ...), (frames, ...)."""
+        """Numbers of variance 1 (3 points + frames, ...) from values (points, 3, ...) and forces (frames, ...)."""
         heavy = np.repeat(np.sqrt(weights), self.counts)
         flat = heavy[:, None] * values.reshape(len(values), -1)
         across = solve_triangular(self.root(scale), flat, lower=True)
@@ -177,7 +177,7 @@ def along(wire: Solution, arc_mm: Array) -> tuple[Array, Array]:
 
 
 def weights_of(surprises: Sequence[Array], *, stated: bool) -> tuple[list[Array], float]:
-    """Weights of the frames of each insertion, and the factor on the covariance: of what traces say it is at least 1."""
+    """Weights of the frames of each insertion, and the factor on the traces' covariance: at least 1 where stated."""
     middle = float(np.median(np.concatenate(surprises)))
     scale = max(middle, 1.0 if stated else 0.01)
     return [np.minimum(1.0, OUTLYING * scale / np.maximum(own, 1e-12)) for own in surprises], scale

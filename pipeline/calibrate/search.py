@@ -83,7 +83,7 @@ def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
     """The roll at which a wire lies as it was traced; all else but the clamp is as stated."""
     problem = Problem((), {FRICTION: friction}, (one,), solver)
     still = Problem((), {FRICTION: 0.0}, (one,), solver)
-    means, sigmas = problem.prior
+    means, _ = problem.prior
     xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
     even = [np.ones(len(one.trial.seen))]
     found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, even, 1.0)])

@@ -37,8 +37,8 @@ def as_calibrated(
             continue
         if changed.own_parameters and not own and case.role == "validation":
             problems.append(
-                f"case {case.id!r}: {changed.own_parameters}; take it out of the validation cases, or say --score-used: "
-                "it is then marked and left out of every figure over cases"
+                f"case {case.id!r}: {changed.own_parameters}; take it out of the validation cases, or say "
+                "--score-used: it is then marked and left out of every figure over cases"
             )
         elif changed.own_parameters and not own:
             notes.append(f"case {case.id!r} was calibrated with and is not scored (--score-used scores it, marked)")

@@ -30,7 +30,7 @@ def with_fitted_roll(run: Context, known: Known) -> Known:
         others = ", ".join(f"{roll:.0f}" for roll in found.rivals_deg)
         log.warnings.append(
             f"frame {first.index} hardly tells the roll ({found.roll_deg:.0f} degrees, standard deviation "
-            f"{found.sd_deg:.0f}{'; as good: ' + others if others else ''}): state roll_deg, or begin with a deeper frame"
+            f"{found.sd_deg:.0f}{'; as good: ' + others if others else ''}): state roll_deg, or begin deeper"
         )
     status = FrameStatus.ROLL_FITTED
     frames = [replace(frame, roll_deg=frame.roll_deg + found.roll_deg) for frame in known.frames]
