@@ -14,7 +14,7 @@ from pipeline.calibrate.unknowns import ROLL, WALL, Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
-ROUNDS, SETTLED = 15, 0.05
+ROUNDS, SETTLED = 12, 0.15
 """Most rounds; it ends where a step is smaller than this part of the standard deviations."""
 DAMPINGS = (1.0, 10.0)
 """Tried side by side, in units of the present damping."""

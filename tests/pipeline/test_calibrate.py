@@ -16,12 +16,20 @@ from pipeline.calibrate.search import own_roll
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, unknowns
 from pipeline.cli import main
-from pipeline.model import Clamp, Curve, Wall, Wire
-from pipeline.run.calibrated import as_calibrated
+from pipeline.compare.pooled import is_pooled
+from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
+from pipeline.run.calibrated import as_calibrated, data_of
+from pipeline.run.log import Log
+from pipeline.run.stages import Context, Known
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.run.store import Store
 from pipeline.simulate.clamp import Prior
 from pipeline.simulate.config import SolverConfig
+from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
+from pipeline.study.settings import Config
 from solver import Grid, VesselWall
 
 WIRE = Wire("w", 0.18, [(0.0, 0.5), (10.0, 0.5), (30.0, 2.0)], [(0.0, 0.1), (8.0, 0.1), (8.0, 0.0)])
@@ -188,8 +196,6 @@ def study(tmp_path):
         lines = "\n".join(f"0.{n},0,{z}" for z in np.linspace(0, 8 + n, 9))
         (tmp_path / f"{n}.csv").write_text(f"x,y,z\n{lines}\n")
     (first, _) = read_manifest(tmp_path / "manifest.toml").cases
-    from pipeline.run.calibrated import data_of
-
     data = json.dumps(list(data_of(first))[:1])
     (tmp_path / "p.toml").write_text(PARAMETERS.replace("data = []", f"data = {data}"))
     return tmp_path
@@ -260,3 +266,27 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     page = (study / "out" / "calibration.html").read_text()
     assert "not seen" in page
     assert (study / "out" / "figures" / "profiles.png").exists()
+
+
+def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
+    manifest = study / "manifest.toml"
+    manifest.write_text(manifest.read_text().replace("roll_deg = 5.0", 'roll_deg = "fit"'))
+    case, other = read_manifest(manifest).cases
+    assert case.stated_roll_deg == 0.0
+    run = Context(case.model_copy(update={"wire": bent(WIRE, TRUE)}), Config(), Store(None), Log(lambda *_: None))
+    made = trial(values=TRUE | {ROLL: -75.0}, depths=(12.0, 16.0))
+    lumen = Lumen(VESSEL.distance)
+    curves = [None, *(frame.curve for frame in made.seen)]
+    frames = tuple(Frame(n, curve=curve) for n, curve in enumerate(curves))
+    frames = (frames[0].failed("trace", FrameStatus.NO_WIRE), *frames[1:])
+    known = with_fitted_roll(run, Known(lumen=lumen, frames=frames))
+    assert [frame.status for frame in known.frames] == ["no_wire", "roll_fitted", "ok"]
+    assert [frame.roll_deg for frame in known.frames] == pytest.approx([-45.0] * 3, abs=3.0)
+    assert known.frames[1].ok
+    assert not is_pooled({"status": known.frames[1].status}, np.ones(3))
+    assert "the roll was fitted on frame 1, which is not scored" in run.log.assumptions[0]
+    nothing = Known(lumen=lumen, frames=frames[:1])
+    with pytest.raises(StageError, match="no frame has a trace to fit it on"):
+        with_fitted_roll(run, nothing)
+    untouched = replace(run, case=other)
+    assert with_fitted_roll(untouched, known) is known
