@@ -18,7 +18,7 @@ COLUMNS = (
     Column("seen", "-", "known well enough to be taken", "text"),
     Column("prior", "-", "mean and standard deviation; of a factor the latter is of its logarithm", "text"),
     Column("bounds", "-", "values outside are not tried", "text"),
-    Column("meaning", "-", "what it is, why it is not seen, and what would show it", "text"),
+    Column("meaning", "-", "what it is", "text"),
 )
 
 
@@ -26,7 +26,7 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
     """Draw the figures and write calibration.html into a folder that holds calibration.json; returns its path."""
     record = read_json(out / "calibration.json")
     rows = record["estimates"]
-    unseen = [row["name"] for row in rows if not row["seen"]]
+    unseen = [row for row in rows if not row["seen"]]
     table = pd.DataFrame([_row(row) for row in rows])
     page = {
         "title": "wireval calibration",
@@ -45,7 +45,6 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
 def _row(row: dict[str, Any]) -> dict[str, Any]:
     spread = f"{100 * row['sd']:.2g} %" if row["logarithmic"] else number(row["sd"], 2)
     bounds = " to ".join(number(float(v)) for v in row["bounds"])
-    meaning = ". ".join(text for text in (row["what"], row["why"], row["advice"]) if text)
     return {
         "parameter": row["name"],
         "value": number(float(row["value"])),
@@ -54,5 +53,5 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
         "seen": "yes" if row["seen"] else "NO",
         "prior": f"{number(float(row['prior']))} ± {number(float(row['prior_sd']), 2)}",
         "bounds": bounds,
-        "meaning": meaning,
+        "meaning": row["what"],
     }

@@ -17,8 +17,8 @@ from pipeline.calibrate.unknowns import Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
-OFFSETS = (-2.0, -1.0, 1.0, 2.0)
-"""Where profiles are looked at, in units of the standard deviation at which a parameter counts as seen."""
+OFFSETS = (-2.0, 2.0)
+"""Where profiles are looked at in standard deviations, beside those at which a parameter counts as seen."""
 RISE = 1.0
 """Rise of the objective (minus twice the log-posterior) at one standard deviation."""
 
@@ -108,8 +108,9 @@ def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:
     linear, problem, covariance = fit.linear, fit.problem, fit.linear.covariance
     asked: list[tuple[int, Array]] = []
     for k, unknown in enumerate(problem.free):
-        for offset in OFFSETS:
-            value = linear.x[k] + offset * unknown.enough
+        spread = float(np.sqrt(covariance[k, k]))
+        for offset in (-unknown.enough, *(n * spread for n in OFFSETS), unknown.enough):
+            value = linear.x[k] + offset
             if unknown.low <= value <= unknown.high:
                 along = covariance[:, k] / covariance[k, k] * (value - linear.x[k])
                 asked.append((k, problem.clipped(linear.x + along)))

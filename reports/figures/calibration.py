@@ -27,13 +27,23 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
         axes.plot(curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9), color=BLUE, marker=".", markersize=4)
         axes.plot([row["value"]], [0.0], color=BLUE, marker="o")
         axes.axhline(1.0, color=GREY, linestyle="--", linewidth=0.8)
-        axes.axvline(row["prior"], color=ORANGE, linestyle=":", linewidth=1.2)
+        low, high = _span(row)
+        if low < row["prior"] < high:
+            axes.axvline(row["prior"], color=ORANGE, linestyle=":", linewidth=1.2)
+        axes.set_xlim(low, high)
         axes.set_ylim(-0.4, HIGHEST)
         verdict = "" if row["seen"] else ": not seen"
         axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else VERMILION))
         plain(axes)
         table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
     return Drawing(figure, pd.DataFrame(table))
+
+
+def _span(row: Mapping[str, Any]) -> tuple[float, float]:
+    """Values three standard deviations to both sides."""
+    if row["logarithmic"]:
+        return row["value"] * np.exp(-3.0 * row["sd"]), row["value"] * np.exp(3.0 * row["sd"])
+    return row["value"] - 3.0 * row["sd"], row["value"] + 3.0 * row["sd"]
 
 
 def correlations(record: Mapping[str, Any]) -> Drawing | None:

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -148,9 +148,10 @@ def main(words: list[str]) -> None:
         folder = args.out / f"{seed}{'-forces' if args.forces else ''}"
         physics = write_study(seed, folder / "study", forces=args.forces)
         print(f"seed {seed}: {physics}", flush=True)
-        clock = perf_counter()
+        clock, work = perf_counter(), process_time()
         code = wireval(["calibrate", str(folder / "study" / "manifest.toml"), "-o", str(folder)])
-        print(f"  calibrated in {perf_counter() - clock:.0f} s, exit code {code}", flush=True)
+        spent = f"{perf_counter() - clock:.0f} s, {process_time() - work:.0f} s of processor time"
+        print(f"  calibrated in {spent}, exit code {code}", flush=True)
         good &= judged(read_parameters(folder / "parameters.toml"), physics)
         if not args.no_blind:
             good &= blind(folder / "study" / "manifest.toml", folder / "parameters.toml", physics)
