@@ -48,7 +48,7 @@ def main(args: argparse.Namespace) -> int:
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Fit, write, and say what was found."""
     from pipeline.run.calibration import calibrate, file_in, gathered
-    from pipeline.run.calibration_files import estimates_of, write_parameters, write_record
+    from pipeline.run.calibration_files import estimates_of, misfit, write_parameters, write_record
     from reports.calibration import render_calibration
 
     found = gathered(cases, config, store, say)
@@ -59,6 +59,8 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         sd = f"{100 * row['sd']:.2g} %" if row["logarithmic"] else f"{row['sd']:.2g}"
         verdict = "" if row["seen"] else f"  UNIDENTIFIABLE, stays at {row['used']:.4g}: {row['why']}"
         say(f"{row['name']:20s} {row['value']:10.4g}  +- {sd:8s}{verdict}")
+    for warning in misfit(fit):
+        say(f"warning: {warning}")
     left_out = [case.id for case in cases if case.id not in {used.id for used in found.cases}]
     for name in left_out:
         say(next(note for note in found.notes if note.startswith(f"{name}: left out")))

@@ -17,6 +17,7 @@ from reports.atomic import write_text
 
 DEPTH = "depth_offset_mm"
 DEPTH_ENOUGH_MM = 0.25
+MISFIT = 2.0
 ADVICE = {
     ROLL: "a tip with a curve, seen free of the wall; a frame whose tip does not touch tells the roll best",
     REST: "frames in which the tip lies free; a tip that is pressed straight shows little of its curve",
@@ -84,6 +85,18 @@ def _text(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+def misfit(fit: Calibration) -> list[str]:
+    """A warning where the wires lie farther from the traces than these are off: then something else is wrong."""
+    times = float(np.sqrt(fit.scale))
+    if times < MISFIT:
+        return []
+    return [
+        f"the calibrated wires lie {times:.1f} times as far from the traces as these are taken to be off: lumen, "
+        "stated rolls, the wire's profile or a trace is wrong; standard deviations are widened, values may be off "
+        "beyond them"
+    ]
+
+
 def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
     """Write calibration.json: all that the page shows."""
     rows = estimates_of(found, fit)
@@ -106,7 +119,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "starts": fit.fit.starts,
         "scale": fit.scale,
         "used": used_by(found),
-        "notes": found.notes,
+        "notes": [*misfit(fit), *found.notes],
         "provenance": collect(),
     }
     write_json(path, {"schema": 1, **record})

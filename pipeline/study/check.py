@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
 from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
 
 
@@ -28,6 +29,11 @@ def check_case(case: Case, config: Config) -> list[str]:
     count = len(scans.frames) or case.frame_count
     problems += _entry_problems(case, scans)
     problems += not_one_per_frame(case.lists, count)
+    if case.parameters:
+        try:
+            read_parameters(case.parameters)
+        except ParametersError as error:
+            problems += error.problems
     if case.truth:
         try:
             read_truth(case.truth, count)

@@ -141,6 +141,8 @@ def _told(case: "Case", found: Parameters, *, known_wall: bool) -> str:
     parts = [f"wire, wall, friction, roll and depth offset are calibrated with {', '.join(u.case for u in found.used)}"]
     if found.unseen:
         parts.append(f"not seen there, as stated: {', '.join(found.unseen)}")
+    if any(case.group == used.group for used in found.used):
+        parts.append(f"a case of the same group, {case.group!r}, was among them")
     if not known_wall:
         parts.append(f"no wall stated at {case.wall.stiffness_N_mm2:g} N/mm2 was calibrated: as stated")
     if not found.absolute_stiffness:

@@ -19,6 +19,7 @@ from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.calibrated import as_calibrated, data_of
+from pipeline.run.calibration_files import misfit
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known
 from pipeline.run.stages.known import Frame
@@ -117,6 +118,27 @@ def test_stiffness_has_a_scale_only_with_forces():
         float(np.sqrt(Problem(free, {}, (Evidence(t),), SETTINGS).linear(x).covariance[at, at])) for t in (one, silent)
     ]
     assert sd[0] < 0.2 < 0.65 < sd[1]
+
+
+def test_a_sag_scan_weighs_the_wire():
+    wide = VesselWall(Grid(np.hypot(X - 5.0, Y) - 9.0, [0.5] * 3, [-5.0, -5.0, -4.0]), stiffness_N_mm2=1.0)
+    heavy = replace(WIRE, bending_stiffness_N_mm2=0.8, rest_curvature_per_mm=0.0, weight_N_per_mm=2e-5)
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), None, down=np.array([1.0, 0.0, 0.0]))
+    one = Trial("sag", wide, heavy, Wall(0.05), clamp, Prior(0.05, 0.5), (), 0.3)
+    known = {}
+    for name, weight in (("sags", 2e-5), ("floats", 0.0)):
+        light = replace(one, wire=replace(heavy, weight_N_per_mm=weight))
+        planned = straight_to(light, (20.0, 30.0), (0.0, 0.0))
+        known[name] = {p.unknown.name: p.sd for p in predicted(all_of(one, weighed=True), [planned], SETTINGS)}
+    assert known["sags"][BENDING] < 0.1
+    assert known["floats"][BENDING] == pytest.approx(0.7, rel=0.01)
+
+
+def test_a_misfit_is_told():
+    one = trial()
+    fit = calibrated(all_of(one)[:1], [Evidence(one)], SETTINGS)
+    assert misfit(replace(fit, scale=1.0)) == []
+    assert "lumen, stated rolls" in misfit(replace(fit, scale=9.0))[0]
 
 
 def test_the_roll_of_one_frame_is_found_from_anywhere():

@@ -21,7 +21,9 @@ def with_fitted_roll(run: Context, known: Known) -> Known:
     if first is None:
         message = f'case {case.id!r}: roll_deg = "fit", but no frame has a trace to fit it on; give a number'
         raise StageError(FrameStatus.SIMULATE_FAILED, message)
-    found = own_roll(Evidence(trial_of(run, known, [first], roll_free=True)), case.wall.friction, run.config.solver)
+    # a sensitivity run turns the wire away from what is fitted: its offset is no part of the fit
+    trial = trial_of(run, known, [replace(first, roll_deg=0.0)], roll_free=True)
+    found = own_roll(Evidence(trial), case.wall.friction, run.config.solver)
     log.assumptions.append(
         f"the roll was fitted on frame {first.index}, which is not scored: {found.roll_deg:.1f} degrees "
         f"(standard deviation {found.sd_deg:.1f})"
