@@ -75,13 +75,6 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
     return wires[value]
 
 
-def _roll(value: Any) -> Any:
-    """A word is only ``fit``: pydantic would complain of every kind of number otherwise."""
-    if isinstance(value, str) and value != "fit":
-        raise ValueError('Input should be a number, a list with one per frame, or "fit"')
-    return value
-
-
 def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     known = {"entry_case": 'entry = "case:ID"'}
@@ -122,7 +115,7 @@ class Case(Strict):
     parameters: PathText | None = None
     calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
     own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
-    roll_deg: Annotated[Finite | tuple[Finite, ...] | Literal["fit"], BeforeValidator(_roll)] = 0.0
+    roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
     push_force_N: tuple[float, ...] | None = None
     push_force_sigma_N: Positive = 0.001
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
