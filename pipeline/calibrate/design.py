@@ -13,7 +13,7 @@ from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import FIRST_FRICTION
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
 from pipeline.calibrate.unknowns import FRICTION, Unknown
-from pipeline.model import Curve, Wire
+from pipeline.model import Curve
 from pipeline.simulate.clamp import Seen
 from pipeline.simulate.config import SolverConfig
 
@@ -62,8 +62,3 @@ def predicted(free: Sequence[Unknown], planned: Sequence[Trial], solver: SolverC
     x = np.concatenate([[shared[u.name] for u in free], np.zeros(sum(OWN + len(t.seen) for t in planned))])
     deviations = np.sqrt(np.diag(problem.linear(x).covariance))
     return [Predicted(u, float(v)) for u, v in zip(free, deviations, strict=False)]
-
-
-def uniform(wire: Wire) -> bool:
-    """The wire's stiffness is one number: it has no taper to be found."""
-    return isinstance(wire.bending_stiffness_N_mm2, (int, float))

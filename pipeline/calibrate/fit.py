@@ -34,7 +34,6 @@ class Linear:
     value: float
     weights: list[Array]
     scale: float
-    surprise: list[Array]
 
     @property
     def covariance(self) -> Array:
@@ -155,7 +154,7 @@ class Problem:
             normal, right = normal + j.T @ j, right + j.T @ r
             jacobians.append(j)
             residuals.append(r)
-        return Linear(x, jacobians, normal, right, self.value(x, residuals), weights, scale, surprise)
+        return Linear(x, jacobians, normal, right, self.value(x, residuals), weights, scale)
 
     def solved(self, x: Array, rounds: int = ROUNDS) -> Linear:
         """The problem about the vector at which the objective is least, from a first one."""

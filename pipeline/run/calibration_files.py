@@ -129,6 +129,3 @@ def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> N
     """Write design.json: the predicted standard deviations of a planned study."""
     found = [{"name": p.unknown.name, "sd": p.sd, "enough": p.unknown.enough, "seen": p.seen} for p in rows]
     write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": collect()}))
-
-
-__all__ = ["TAPER", "WALL", "estimates_of", "write_design", "write_parameters", "write_record"]
