@@ -146,7 +146,7 @@ def main(words: list[str]) -> None:
     good = True
     for seed in args.seed:
         folder = args.out / f"{seed}{'-forces' if args.forces else ''}"
-        physics = write_study(seed, folder / "study", forces=args.forces)
+        physics = write_study(seed, folder / "study", forces=args.forces, blind=not args.no_blind)
         print(f"seed {seed}: {physics}", flush=True)
         clock, work = perf_counter(), process_time()
         code = wireval(["calibrate", str(folder / "study" / "manifest.toml"), "-o", str(folder)])

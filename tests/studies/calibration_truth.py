@@ -170,7 +170,7 @@ def traced(points: Array, rng: np.random.Generator) -> Array:
     return np.asarray(found + beyond + TRACE_SIGMA_MM * noise)
 
 
-def write_study(seed: int, folder: Path, *, forces: bool = False) -> Physics:
+def write_study(seed: int, folder: Path, *, forces: bool = False, blind: bool = True) -> Physics:
     """Write lumens, traces, truth and manifest.toml; what is true."""
     physics, rng, blocks = Physics.drawn(seed), np.random.default_rng([seed, 16]), []
     wire = {
@@ -178,7 +178,7 @@ def write_study(seed: int, folder: Path, *, forces: bool = False) -> Physics:
         "bending_stiffness_N_mm2": NOMINAL.bending_N_mm2,
         "rest_curvature_per_mm": NOMINAL.rest_curvature_per_mm,
     }
-    for way in ways(seed):
+    for way in (way for way in ways(seed) if blind or way.role == "calibration"):
         frames, below = truth(way, physics), folder / way.name
         (below / "traces").mkdir(parents=True, exist_ok=True)
         surface(way.anatomy, below / "lumen.vtp")
