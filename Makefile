@@ -1,11 +1,12 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := reports/out
 SEED ?= 101
+CALIBRATED ?= 100 101 102
 export OMP_NUM_THREADS := 1
 
 validate: setup
@@ -20,6 +21,11 @@ planted: setup
 	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/planted --resume -j 2 --until compare \
 	  --sweep simulate.roll_offset_deg=-60,60 --sweep simulate.rest_curvature_scale=0 \
 	  --sweep simulate.taper_scale=2 --sweep simulate.friction=0.2
+
+# parameters found by `wireval calibrate` against the truth, and six blind insertions judged with them
+calibrated: setup
+	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED)
+	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED) --forces --no-blind
 
 test: setup lint
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile

@@ -14,7 +14,7 @@ from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
 from reports.schema import ERRORS, POINTS, TIMINGS
 
-GOOD = ("ok", "simulated")
+GOOD = ("ok", "simulated", "roll_fitted")
 
 
 @dataclass(frozen=True, eq=False)

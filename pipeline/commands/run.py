@@ -35,6 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame")
+    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
+    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither read nor write the stage store")
     folder = parser.add_argument_group("where MANIFEST is a folder of scans").add_argument
@@ -77,6 +79,7 @@ def main(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.cache import default_root
+    from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
@@ -95,10 +98,11 @@ def _plan(args: argparse.Namespace) -> "Plan":
     cache = None if args.no_cache else default_root()
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    cases = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, assumptions)
+    notes = (*assumptions, *notes)
+    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 
 def _manifest(args: argparse.Namespace) -> "tuple[Manifest, tuple[str, ...]]":

@@ -53,8 +53,9 @@ class Frame:
 
     @property
     def ok(self) -> bool:
-        """Traced, simulated to its depth, converged and compared (or simulated, in a case without scans)."""
-        return self.status in (FrameStatus.OK.identifier, FrameStatus.SIMULATED.identifier)
+        """Traced, simulated to its depth, converged and compared (or simulated, or what the roll was fitted on)."""
+        good = FrameStatus.OK, FrameStatus.SIMULATED, FrameStatus.ROLL_FITTED
+        return self.status in (status.identifier for status in good)
 
     @property
     def traced(self) -> bool:
