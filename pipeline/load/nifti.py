@@ -118,8 +118,10 @@ def _geometry(path: Path, fields: Any, shape: NDArray[Any]) -> tuple[Placed, tup
         forms["qform"] = _of_quaternion(path, fields, pixdim)
     used = next((f for f in forms.values() if _is_rigid(f)), next(iter(forms.values()), None))
     if used is None:
-        notes.append(f"{path.name}: the header has neither sform nor qform: axes along x, y, z (RAS), origin 0 assumed")
-        used = np.column_stack([np.diag(pixdim[1:4]), np.zeros(3)])
+        notes.append(
+            f"{path.name}: the header has neither sform nor qform: axes along x, y, z of LPS, origin 0 assumed"
+        )
+        used = np.column_stack([np.diag(pixdim[1:4] * (-1.0, -1.0, 1.0)), np.zeros(3)])  # as ITK takes it
     if len(forms) == 2:
         notes += _disagreement(path, forms, used, shape)
     matrix = used * np.array([[-1.0], [-1.0], [1.0]]) * UNITS_MM[unit]  # RAS to LPS

@@ -327,9 +327,8 @@ FORMS, QFORM, SFORM, UNITS, PIXDIM, SLOPE, DIM, SROW = 252, 252, 254, 123, 76, 1
 
 
 def nifti_variants() -> Iterator[Variant]:
-    flip = np.diag([-1.0, -1.0, 1.0])
     tipped = TURN + np.array([[-5e-5, 0, 0], [0, -5e-5, 0], [0, 0, 0]])
-    yield Variant("nii, no forms", nifti((QFORM, "hh", (0, 0))), "neither", origin=np.zeros(3), direction=flip)
+    yield Variant("nii, no forms", nifti((QFORM, "hh", (0, 0))), "neither", origin=np.zeros(3), direction=np.eye(3))
     yield Variant("nii, qform alone", nifti((SFORM, "h", 0)))
     yield Variant("nii, sform alone", nifti((QFORM, "h", 0)))
     yield Variant(
