@@ -12,7 +12,7 @@ from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 
-__all__ = ["LEVELS", "altered", "guide_wire", "insertion_of", "simulate", "together"]
+__all__ = ["LEVELS", "altered", "guide_wire", "insertion_of", "simulate", "together", "wall_of"]
 
 
 LEVELS = ("wall_look_ups_done_fraction", "start_energy_N_mm")
@@ -79,7 +79,7 @@ def together(
 
 
 @lru_cache(maxsize=1)
-def _wall_of(distance: Grid, hull: str) -> VesselWall:
+def wall_of(distance: Grid, hull: str) -> VesselWall:
     """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second."""
     return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
 
@@ -98,7 +98,7 @@ def insertion_of(
     friction = wall.friction if config.friction is None else config.friction
     return Insertion(
         guide_wire(altered(wire, config), solver.segment_mm, config.bending_scale),
-        _wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction),
+        wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction),
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,

@@ -7,6 +7,8 @@ import numpy as np
 
 from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
+from pipeline.load.wires import read_wires
+from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.settings import Config
 
@@ -28,12 +30,28 @@ def check_case(case: Case, config: Config) -> list[str]:
     count = len(scans.frames) or case.frame_count
     problems += _entry_problems(case, scans)
     problems += not_one_per_frame(case.lists, count)
+    problems += _others_problems(case, count)
     if case.truth:
         try:
             read_truth(case.truth, count)
         except LoadError as error:
             problems.append(str(error))
     return problems
+
+
+def _others_problems(case: Case, count: int) -> list[str]:
+    """What is wrong with all wires of another simulator; what is wrong with some of them is for their frames to say."""
+    if case.simulated is None:
+        return []
+    try:
+        files = read_wires(case.simulated.files, count, case.simulated.space, case.simulated.unit)
+    except LoadError as error:
+        return [str(error)]
+    entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
+    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
+    if not files or not case.simulated.files or not all(wrong):
+        return []
+    return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
 
 
 def inputs_of(case: Case) -> list[Path]:

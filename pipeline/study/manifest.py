@@ -3,7 +3,6 @@
 Everything that is wrong with it is listed at once.
 """
 
-import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,58 +10,15 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from pipeline.load import Source
 from pipeline.model import OverWire, Wall, Wire
 from pipeline.ranges import Axis, Direction, Finite, NonNegative, Positive, Vector
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
-
-WHOLE_CASE = "whole_case"
-"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
-
-
-def natural_key(text: str) -> list[Any]:
-    """Sort key under which frame_2 comes before frame_10."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
-
-
-def _problem(*problems: str) -> PydanticCustomError:
-    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
-
-
-def _source(value: Any, info: ValidationInfo) -> Source:
-    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
-    if not isinstance(value, str):
-        raise ValueError("Input should be a valid string")
-    name, _, dataset = value.partition("#")
-    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
-
-
-def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
-    """A list of sources, or a pattern whose matches come in natural order."""
-    if isinstance(value, list):
-        return tuple(_source(item, info) for item in value)
-    source, base = _source(value, info), Path((info.context or {}).get("folder", ""))
-    pattern = value.partition("#")[0]
-    if not any(mark in pattern for mark in "*?["):
-        return (source,)
-    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
-    if not found:
-        problem = f"{info.field_name} = {value!r} matches no file below {base}"
-        raise _problem(problem)
-    return tuple(Source(path, source.dataset) for path in found)
+from pipeline.study.others import Others, written_out
+from pipeline.study.sources import WHOLE_CASE, PathText, Sources, SourceText, Strict, problem_of
+from pipeline.study.sources import natural_key as natural_key
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
@@ -71,33 +27,22 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
     if value not in wires:
         problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
-        raise _problem(*[problem] * bool(wires))
+        raise problem_of(*[problem] * bool(wires))
     return wires[value]
 
 
 def _not_yet(value: Any, info: ValidationInfo) -> Any:
     """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
     if info.field_name == "parameters":
-        raise _problem("parameters cannot be read in this version; write the values into [wires] and [case.wall]")
+        raise problem_of("parameters cannot be read in this version; write the values into [wires] and [case.wall]")
     if value == "fit":
-        raise _problem('roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame')
+        raise problem_of('roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame')
     return value
 
 
 def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     raise ValueError(f'unknown key {info.field_name!r}; write entry = "case:ID"')
-
-
-SourceText = Annotated[Source, BeforeValidator(_source)]
-Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
-
-
-class Strict(BaseModel):
-    """Unknown keys are errors; values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Case(Strict):
@@ -124,14 +69,20 @@ class Case(Strict):
     roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
     truth: PathText | None = None
+    simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
     wall: Wall = Wall()
     down: Axis | None = None
     catheter: OverWire | None = None
 
     @property
     def frame_count(self) -> int:
-        """Frames to report on: scans, or depths of a case without scans."""
-        return len(self.frames) or len(self.insertion_mm or ())
+        """Frames to report on: scans, or own curves or depths of a case without scans."""
+        return len(self.frames) or len(self.traces) or len(self.insertion_mm or ())
+
+    @property
+    def compared(self) -> bool:
+        """Whether the real wire is known, in scans or as own curves."""
+        return bool(self.frames or self.traces)
 
     @property
     def lists(self) -> dict[str, Any]:
@@ -142,8 +93,8 @@ class Case(Strict):
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
-        if not self.frames and self.insertion_mm is None:
-            raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
+        if not self.compared and self.insertion_mm is None:
+            raise ValueError("neither frames nor insertion_mm: give scans (or traces) to compare with, or depths")
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self
@@ -160,7 +111,7 @@ class Case(Strict):
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
         problems += self._over_the_wire()
         if problems:
-            raise _problem(*problems)
+            raise problem_of(*problems)
         return self
 
     def _over_the_wire(self) -> list[str]:
@@ -216,8 +167,8 @@ class ManifestTables(Strict):
 
     @model_validator(mode="after")
     def _entries_known(self) -> "ManifestTables":
-        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames)) for c in self.case}):
-            raise _problem(*problems)
+        if problems := borrowing_problems({c.id: (c.entry, c.compared) for c in self.case}):
+            raise problem_of(*problems)
         return self
 
     @model_validator(mode="after")
@@ -225,7 +176,7 @@ class ManifestTables(Strict):
         repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
         if repeats:
             what = "this id is used more than once; ids name output folders"
-            raise _problem(*(f"case {name!r}: {what}" for name in repeats))
+            raise problem_of(*(f"case {name!r}: {what}" for name in repeats))
         return self
 
 

@@ -50,8 +50,7 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
 
 
 def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, seen: Seen) -> Frame:
-    assert known.scans is not None
-    if frame.ok and not known.scans.frames:
+    if frame.ok and not run.case.compared:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)
     if frame.curve is None or not frame.traced or frame.simulated is None or len(frame.simulated.joints_mm) < 2:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
-from pipeline.model import Array, Clamp, Curve, Lumen, Volume
+from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.log import Log, Stage
 from pipeline.run.store import Store, key_of
@@ -41,7 +41,7 @@ class Frame:
     roll_deg: float = 0.0
     catheter_mm: float = 0.0
     curve: Curve | None = None
-    simulated: Solution | None = None
+    simulated: Solution | OtherWire | None = None
     num_mm: float = float("nan")
     comparison: Comparison | None = None
     registration: Registration | None = None
@@ -66,9 +66,14 @@ class Frame:
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
 
     @property
+    def solved(self) -> Solution | None:
+        """The simulated wire where it is this project's own, with all that the solver knows of it."""
+        return self.simulated if isinstance(self.simulated, Solution) else None
+
+    @property
     def uncertain(self) -> bool:
         """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
-        return self.simulated is not None and (self.simulated.uncertain or self.num_mm > AGREED_MM)
+        return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
