@@ -115,6 +115,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         "title": "wireval",
         **_headline(cases, bool(failures)),
         "failures": failures,
+        "simulators": (out_dir / "simulators").is_dir(),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         "sections": draw_sections("run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed),

@@ -21,6 +21,8 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from reports.html import render_case, render_index
+    from reports.schema import SIMULATORS
+    from reports.simulators import render_simulators
 
     found = found_results(args.out)
     if not found:
@@ -37,5 +39,7 @@ def main(args: argparse.Namespace) -> int:
         except (OSError, EOFError, ValueError, KeyError) as error:
             sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
             drawn = False
+    if (args.out / SIMULATORS.file).exists():
+        render_simulators(args.out, embed=args.embed)
     say(last_line(totals, render_index(args.out, embed=args.embed)))
     return 0 if totals.all_ok and drawn else 1

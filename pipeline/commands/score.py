@@ -21,7 +21,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--curves", action="append", required=True, metavar="[NAME=]DIR", help=what)
     add("--space", default="", choices=("LPS", "RAS"), help="of coordinates whose files do not state it")
     add("--unit", default="", choices=("mm", "cm", "m"), help="of coordinates whose files do not state it")
-    add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder: of the first DIR; others in simulators/")
+    add(
+        "-o",
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="output folder; of all but the first DIR below simulators/",
+    )
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
     add("--fresh", action="store_true", help="compute every case again")
@@ -70,7 +77,8 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
-    plans, alone = {}, len(manifest.cases) == 1
+    plans: dict[str, Plan] = {}
+    alone = len(manifest.cases) == 1
     stated = {"space": args.space, "unit": args.unit}
     for name, place in {**named(args.curves), OURS: None}.items():
         cases = []
