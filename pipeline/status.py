@@ -35,6 +35,7 @@ class FrameStatus(Enum):
         "the other simulator's wire is longer or shorter than the frame is deep by more than "
         "trace.length_tolerance_mm; push it to the depth in errors.csv of a run of this manifest"
     )
+    VIEW_FAILED = "the wire cannot be held against its projection; see failures.csv for the reason"
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property

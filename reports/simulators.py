@@ -39,7 +39,7 @@ def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:
     table = rows[rows["against"].isna()].reset_index(drop=True)
     columns = list(SIMULATORS.shown("cases"))
     pairs = rows[rows["against"].notna()]
-    for other in dict.fromkeys(pairs["against"]):
+    for other in table["simulator"][table["simulator"].isin(pairs["against"])]:
         name = f"rms_ratio_to_{other}"
         mine = pairs[pairs["against"] == other].set_index("simulator")
         for end in ("", "_low", "_high"):

@@ -165,6 +165,8 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         error_mm=None if errors is None else errors.error_mm,
         arc_mm=None if errors is None else errors.arc_mm,
         truth_mm=frame.truth_mm,
+        seen_in_view_mm=frame.in_view_mm[0] if frame.in_view_mm else None,
+        simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,
         mips=dict(enumerate(frame.projections)),
     )
 
@@ -192,7 +194,7 @@ def _write_wires(folder: Path, frame: Frame) -> None:
     path = folder / f"wire_simulated_{name}.mrk.json"
     export.write_markups_curve(path, joints, f"simulated {name}", colour=SIMULATED_COLOUR)
     arrays: dict[str, Any] = {} if frame.solved is None else {"contact_force_N": frame.solved.contact_force_N}
-    if frame.comparison is not None:
+    if frame.comparison is not None and frame.view is None:
         errors = frame.comparison
         along = arc_length(joints)
         reach = along[along < errors.arc_mm[0] - 1e-9]

@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.load import LoadError, Scans, Source, read_headers
 from pipeline.load.curves import read_truth
+from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
 from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case, not_one_per_frame
@@ -31,9 +32,9 @@ def check_case(case: Case, config: Config) -> list[str]:
     problems += _entry_problems(case, scans)
     problems += not_one_per_frame(case.lists, count)
     problems += _others_problems(case, count)
-    if case.truth:
+    for path, read in ((case.truth, read_truth), (case.projections, read_views)):
         try:
-            read_truth(case.truth, count)
+            _ = None if path is None else read(path, count)
         except LoadError as error:
             problems.append(str(error))
     return problems

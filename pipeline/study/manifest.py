@@ -69,6 +69,7 @@ class Case(Strict):
     roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
     truth: PathText | None = None
+    projections: PathText | None = None
     simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
     wall: Wall = Wall()
     down: Axis | None = None
@@ -81,8 +82,8 @@ class Case(Strict):
 
     @property
     def compared(self) -> bool:
-        """Whether the real wire is known, in scans or as own curves."""
-        return bool(self.frames or self.traces)
+        """Whether the real wire is known: in scans, as own curves or from projections."""
+        return bool(self.frames or self.traces or self.projections)
 
     @property
     def lists(self) -> dict[str, Any]:
@@ -93,8 +94,10 @@ class Case(Strict):
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
-        if not self.compared and self.insertion_mm is None:
+        if not (self.frames or self.traces) and self.insertion_mm is None:
             raise ValueError("neither frames nor insertion_mm: give scans (or traces) to compare with, or depths")
+        if self.projections and (self.frames or self.traces):
+            raise ValueError("projections beside frames or traces: one tells of the real wire; make two cases")
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self
@@ -167,7 +170,7 @@ class ManifestTables(Strict):
 
     @model_validator(mode="after")
     def _entries_known(self) -> "ManifestTables":
-        if problems := borrowing_problems({c.id: (c.entry, c.compared) for c in self.case}):
+        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames or c.traces)) for c in self.case}):
             raise problem_of(*problems)
         return self
 

@@ -5,13 +5,11 @@ from itertools import cycle
 
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
 
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
-from reports.figures._style import GREEN, ORANGE, PALETTE, PURPLE, SIMULATED, VERMILION, Look
+from reports.figures._style import GREEN, ORANGE, PALETTE, PURPLE, SIMULATED, VERMILION
 
 OURS = "wireval"
-_STRIP = (-0.34, 0.06)  # of the nearest, below the axis: where it begins and how high it is, in shares of the panel
 _FAINT = 0.3  # of a lead that is not clear
 
 
@@ -35,29 +33,27 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     if where.empty:
         return None
     figure = new_figure(4.4, 10.0)
-    panels = figure.subplots(1, 2, sharey=True)
+    panels = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(14, 1))
     shown = colours(where["simulator"])
-    for axes, (along, rows) in zip(panels, where.groupby("along", sort=False), strict=False):
-        _panel(axes, rows, shown)
-        axes.set_xlabel(f"{along}, mm")
-        positive_axis(axes, [where["rms_mm"]])
-    panels[0].invert_xaxis()
-    panels[0].set_ylabel("rms distance to the traced wire, mm")
-    legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
+        for name, mine in rows.groupby("simulator", sort=False):
+            middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
+            axes.plot(middle, mine["rms_mm"], "o-", color=shown[str(name)], label=str(name), markersize=4)
+        plain(axes)
+        _nearest(strip, rows, shown)
+        strip.set_xlabel(f"{along}, mm")
+    positive_axis(panels[0, 0], [where["rms_mm"]])
+    panels[0, 0].invert_xaxis()
+    panels[0, 0].set_ylabel("rms distance to the traced wire, mm")
+    panels[1, 0].set_ylabel("nearest", rotation=0, ha="right", va="center", fontsize=8)
+    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
     return Drawing(figure, where)
 
 
-def _panel(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:
-    for name, mine in rows.groupby("simulator", sort=False):
-        middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
-        axes.plot(middle, mine["rms_mm"], "o-", color=shown[str(name)], label=str(name), markersize=4)
-    for row in rows[rows["lead"].notna()].to_dict("records"):
-        if row["lead"] == "tie":
-            continue
+def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:
+    """A strip with the colour of the nearest in each bin; white where several are as near."""
+    for row in rows[rows["lead"].notna() & (rows["lead"] != "tie")].to_dict("records"):
         alpha = 1.0 if row["lead"] == "clear" else _FAINT
-        look: Look = {"color": shown[row["simulator"]], "alpha": alpha, "transform": axes.get_xaxis_transform()}
-        width = row["high_mm"] - row["low_mm"]
-        strip = Rectangle((row["low_mm"], _STRIP[0]), width, _STRIP[1], clip_on=False, **look)
-        axes.add_patch(strip)
-    axes.text(0.0, _STRIP[0] - 0.03, "nearest (pale: not clear)", transform=axes.transAxes, fontsize=8, va="top")
-    plain(axes)
+        span = row["low_mm"], row["high_mm"]
+        axes.axvspan(*span, color=shown[row["simulator"]], alpha=alpha, linewidth=0)
+    axes.set_yticks([])

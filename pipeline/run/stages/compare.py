@@ -8,11 +8,15 @@ from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.run.stages.views import compare_in_views
 from pipeline.status import FrameStatus
 
 
 def compare_frames(run: Context, known: Known) -> Known:
     """Errors of every frame with both curves, beside those of the trivial predictors."""
+    if run.case.projections:
+        with run.log.timed("compare"):
+            return replace(known, frames=compare_in_views(run, known))
     with run.log.timed("compare"):
         clues = _clues(run, known)
         simulated = simulated_rivals(run, known) if clues else {}

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
+from pipeline.load.views import View
 from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.log import Log, Stage
@@ -28,6 +29,8 @@ class Frame:
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
     catheter_mm : depth of the tip of a catheter over the wire.
     num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
+    view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
+    one (k, 2) on the plane through the isocentre.
     projections : maximum-intensity projections of the scan along the array axes.
     """
 
@@ -44,6 +47,8 @@ class Frame:
     simulated: Solution | OtherWire | None = None
     num_mm: float = float("nan")
     comparison: Comparison | None = None
+    view: View | None = None
+    in_view_mm: tuple[Array, ...] = ()
     registration: Registration | None = None
     truth_mm: Array | None = None
     truth: dict[str, float] = field(default_factory=dict)
