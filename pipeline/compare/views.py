@@ -19,8 +19,8 @@ FIT_FROM_MM, FIT_TO_MM = 40.0, 110.0
 """Behind the tip: the part that a shift is fitted to; what lies nearer to the tip is scored."""
 LEAST_FIT_MM = 20.0
 """A shorter part tells no shift."""
-FREE_MM = 20.0
-"""How far a patient may have moved: along a straight stretch the shift would else be anything."""
+FREE_MM = 100.0
+"""Prior of the shift, as if one point were known so well: along a straight stretch it would else be anything."""
 ROUNDS, STILL_MM = 50, 1e-6
 IN_PLANE = (
     *("rms_mm", "mean_mm", "p95_mm", "max_mm", "distal10_rms_mm", "distal20_rms_mm", "back_rms_mm", "hausdorff_mm"),

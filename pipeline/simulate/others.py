@@ -50,7 +50,8 @@ def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
 
 
 def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
-    wire = begun(points_mm, entry_mm, direction)
+    # what is added to reach the plane points along the entry by construction: it tells nothing
+    wire = points_mm if (points_mm[0] - entry_mm) @ direction > 0 else begun(points_mm, entry_mm, direction)
     gap = float(np.linalg.norm(wire[0] - entry_mm))
     if gap > AT_ENTRY_MM:
         return f"its base passes {gap:.3g} mm from entry_mm and not within {AT_ENTRY_MM:g}"

@@ -39,7 +39,8 @@ def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
     pattern = value.partition("#")[0]
     if not any(mark in pattern for mark in "*?["):
         return (source,)
-    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
+    root = Path(Path(pattern).anchor or base)
+    found = sorted(root.glob(str(Path(pattern).relative_to(Path(pattern).anchor))), key=lambda p: natural_key(p.name))
     if not found:
         problem = f"{info.field_name} = {value!r} matches no file below {base}"
         raise problem_of(problem)

@@ -12,7 +12,7 @@ from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.simulate.others import oddity
+from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import of_length, trace
 
@@ -106,9 +106,13 @@ def _traced(frame: Frame, curve: Curve) -> Frame:
 
 def _as_given(run: Context, frame: Frame, curve: Curve) -> Frame:
     """The frame with the user's own curve; one that does not begin at the entry says what it may be instead."""
-    odd = oddity(curve.points_mm, np.array(run.case.entry_mm), np.array(run.case.entry_direction))
+    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
+    odd = oddity(curve.points_mm, entry, direction)
     if odd:
         return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
+    if (curve.points_mm[0] - entry) @ direction < 0:  # with a part in the introducer
+        points = begun(curve.points_mm, entry, direction)
+        curve = Curve(points, np.full(len(points), np.nan), note=curve.note)
     expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
     return _traced(frame, of_length(curve, expected, run.config.trace))
 
