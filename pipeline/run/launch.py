@@ -89,6 +89,8 @@ def guard_out(out: Path, manifest: Path) -> None:
     """Refuse an output folder that holds something else than a run of the same manifest."""
     if out.exists() and not out.is_dir():
         raise UsageError([f"-o {out}: this is a file; name a folder"])
+    if (out / "simulators").is_dir():
+        raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
     if not out.exists() or not any(out.iterdir()):
         return
     info = out / "run.json"

@@ -81,6 +81,8 @@ Part = tuple[str, Array, Array, Array]
 
 def _points(folder: Path, found: Sequence[Found], common: set[tuple[str, int]]) -> Iterator[Part]:
     for case in validation(found):
+        if not any((case.result.case, number) in common for number in case.frames):
+            continue
         table = tables.read(folder / "cases" / case.result.case / POINTS.file, POINTS)
         frames, arc = table["frame"].to_numpy(dtype=int), table["arc_mm"].to_numpy(dtype=float)
         for number, frame in case.frames.items():

@@ -111,14 +111,14 @@ def study(known: Known, folder: Path, translation: str = "none") -> Path:
 
 
 def in_plane(wire: Array, trace: Array, beam: Array) -> float:
-    """The part across the line of sight of the distances of samples of a wire, beyond the first 10 mm, to a curve; mm rms.
+    """The part across the line of sight of the distances of a wire, beyond its first 10 mm, to a curve; mm rms.
 
     Parallel rays and a curve of points 0.01 mm apart: nothing of the product is used.
     """
 
     def dense(curve: Array, step: float) -> tuple[Array, Array]:
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-        at = np.arange(0.0, s[-1] + 1e-9, step)
+        at = np.append(np.arange(0.0, s[-1] - 1e-6, step), s[-1])
         return np.column_stack([np.interp(at, s, curve[:, a]) for a in range(3)]), at
 
     points, at = dense(wire, 0.5)
