@@ -29,11 +29,15 @@ _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-z]+)|lengt
 
 @dataclass(frozen=True, eq=False)
 class OtherFile:
-    """A frame's wire as it was read. points_mm : (n, 3) LPS, or None where ``problem`` says why there is none."""
+    """A frame's wire as it was read. points_mm : (n, 3) LPS, or None where ``problem`` says why there is none.
+
+    missing : the simulator wrote nothing for the frame.
+    """
 
     name: str
     points_mm: Array | None = None
     problem: str = ""
+    missing: bool = False
 
 
 def kind_of(path: Path) -> str:
@@ -53,7 +57,7 @@ def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str =
     if wrong is not None:
         raise refused(wrong, repr(wrong.suffix), ", ".join(KINDS), "export the wire in one of these")
     numbered = numbered_frames([file.path for file in files], count)
-    missing = OtherFile("none", problem="there is no file for this frame")
+    missing = OtherFile("no file", problem="there is none for this frame", missing=True)
     return [_read(numbered[i], space, unit) if i in numbered else missing for i in range(count)]
 
 
@@ -86,14 +90,14 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     beyond = sorted(n for n in groups if not 0 <= n < count)
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
-    missing = OtherFile(path.name, problem="the file has no simulated_mm for this frame")
+    missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
     return [_checked(f"{path.name}#{n}", points[n]) if n in points else missing for n in range(count)]
 
 
 def _read(path: Path, space: str, unit: str) -> OtherFile:
     """One file; raises LoadError where nothing says what its numbers mean, or two statements differ."""
     if not path.exists() or path.stat().st_size == 0:
-        return OtherFile(path.name, problem="there is no such file" if not path.exists() else "the file is empty")
+        return OtherFile(path.name, problem="the file is empty, or not there", missing=True)
     kind = kind_of(path)
     in_space, in_unit = _agreed(path, kind, space, unit)
     try:

@@ -181,7 +181,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     (folder / "wire_002.csv").write_text("")
     code, table, result = run_with(known, f'"{folder}/*.csv"', "spoilt")
     assert code == 1
-    assert list(table["status"]) == ["ok", "curve_missing", "curve_unusable", "not_to_depth"]
+    assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
     assert "wire_003.csv: it is" in str(result["failures"])
     assert pd.DataFrame([result["summary"]])["frames_ok"].item() == 1
 

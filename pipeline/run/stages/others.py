@@ -42,8 +42,7 @@ def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
     assert known.clamp is not None
     case, clamp = run.case, known.clamp
     if file.points_mm is None:
-        missing = "there is no" in file.problem or "no simulated_mm" in file.problem
-        status = FrameStatus.CURVE_MISSING if missing else FrameStatus.CURVE_UNUSABLE
+        status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
         return frame.failed("simulate", status, f"{file.name}: {file.problem}")
     odd = oddity(file.points_mm, np.array(case.entry_mm), np.array(case.entry_direction))
     if odd:
