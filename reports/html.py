@@ -86,7 +86,8 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "cards": _content.cards(declared("cards"), case.statistics),
         "points": (case_dir / "points.csv.gz").exists(),
-        "compared": bool(errors["rms_mm"].notna().any()),
+        # of projections the assumptions say whether wires were shifted
+        "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
         "scene": scene.name if scene else "",
         "scene_note": scene_note,
         "sections": sections,

@@ -147,7 +147,9 @@ def test_a_projected_study_gives_the_in_plane_part_of_the_answer(known: Known, t
     assert table["null_centreline_rms_mm"].notna().all()
     assert table["skill"].notna().all()
     assert table[["arc_rms_mm", "branch_ok", "tip_along_mm"]].isna().all(axis=None), "a projection has none of these"
-    assert (tmp_path / "out" / "cases" / "bend" / "figures" / "views.png").exists()
+    case = tmp_path / "out" / "cases" / "bend"
+    assert (case / "figures" / "views.png").exists()
+    assert "no curve was fitted" not in (case / "report.html").read_text(), "the assumptions say what was"
 
 
 def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known: Known, tmp_path: Path) -> None:

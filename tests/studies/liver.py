@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.arrays.polyline import at_arc
+from pipeline.arrays.polyline import at_arc, smooth
 from pipeline.cli import main as wireval
 from pipeline.compare.metrics import point_to_curve
 from pipeline.compare.views import Screen, screen_of, shift_of
 from pipeline.model import Array, arc_length
 
-PLACEHOLDER_VOXELS, KNOWN_NODE, SMOOTH_MM, INTO_MM = 10.0, 294, 8.0, 3.0
+PLACEHOLDER_VOXELS, KNOWN_NODE, SMOOTH_MM, SCATTER_MM, INTO_MM = 10.0, 294, 8.0, 0.5, 3.0
 WIRE = """schema = 1
 [wires.micro]                              # a soft wire; the real one, and its roll, are not known
 radius_mm = 0.18
@@ -103,6 +103,12 @@ def depth_of(screen: Screen, path: Array) -> float:
     return depth
 
 
+def along(tree: Tree, way: list[int], path: Array) -> tuple[Array, Array]:
+    """Where on a smoothed path the nodes of a way lie, and their radii; both (n,)."""
+    place = np.maximum.accumulate(point_to_curve(tree.points[way], path)[1])
+    return place, tree.radii[way]
+
+
 def prepared(data: Path, folder: Path) -> Path:
     """The study's files; the manifest."""
     tree, matrix = Tree(data / "3dra"), projection(data)
@@ -115,7 +121,8 @@ def prepared(data: Path, folder: Path) -> Path:
 
     def path_of(leaf: int) -> tuple[list[int], Array]:
         way = [node for node in tree.way(leaf) if not tree.placeholder[node]]
-        return way, tree.points[way]
+        # nodes scatter by a voxel: along a zigzag every depth would be too deep
+        return way, smooth(tree.points[way], SCATTER_MM)
 
     def missed(leaf: int) -> float:
         path, screen = path_of(leaf)[1], screens[-1]
@@ -132,9 +139,9 @@ def prepared(data: Path, folder: Path) -> Path:
     start = at_arc(path, np.array([INTO_MM, INTO_MM + 2.0]))
     depths = [round(depth_of(screen, path) - INTO_MM, 2) for screen in screens]
     folder.mkdir(parents=True, exist_ok=True)
-    arc, radii = arc_length(path), tree.radii[way]
-    smooth = [float(np.quantile(radii[np.abs(arc - here) <= SMOOTH_MM], 0.25)) for here in arc]
-    rows = [[n + 1, 3, *path[n].round(4), round(smooth[n], 4), n if n else -1] for n in range(len(path))]
+    arc, radii = arc_length(path), np.interp(arc_length(path), *along(tree, way, path))
+    calm = [float(np.quantile(radii[np.abs(arc - here) <= SMOOTH_MM], 0.25)) for here in arc]
+    rows = [[n + 1, 3, *path[n].round(4), round(calm[n], 4), n if n else -1] for n in range(len(path))]
     (folder / "vessel.swc").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))
     views: dict[str, Any] = {"isocentre_mm": centre.tolist(), "leaf_mm": tree.points[leaf].tolist()}
     views["frames"] = [{"matrix": matrix.tolist(), "points_px": curve.tolist()} for curve in curves]

@@ -28,6 +28,7 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     limited = "" if clues is None else _limited(frames, clues, config)
     views = [frame.view for frame in frames if frame.view is not None]
     how = "shifted in the plane to lie best from 40 to 110 mm behind the tip, and scored on the last 40 mm"
+    run.log.chosen["projections"] = "translation fitted" if views[0].fitted else "no translation"
     run.log.assumptions.append(
         "distances are in the plane through the isocentre, parallel to the detector; each wire, predictors too, was "
         + (how if views[0].fitted else "taken where it lies: no translation was fitted")
