@@ -149,6 +149,7 @@ def test_a_projected_study_gives_the_in_plane_part_of_the_answer(known: Known, t
     assert table[["arc_rms_mm", "branch_ok", "tip_along_mm"]].isna().all(axis=None), "a projection has none of these"
     case = tmp_path / "out" / "cases" / "bend"
     assert (case / "figures" / "views.png").exists()
+    assert not (case / "figures" / "projections.png").exists(), "there is no scan to show"
     assert "no curve was fitted" not in (case / "report.html").read_text(), "the assumptions say what was"
 
 
