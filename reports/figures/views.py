@@ -16,6 +16,8 @@ _SHOWN_MM = 130.0  # of either wire, from the tip: what was fitted and what was 
 
 def views(case: CaseFiles) -> Drawing | None:
     """Every frame (42 at most): the polyline that was seen and the projected simulated wire, around their ends."""
+    if "projections" not in case.result.get("chosen", {}):
+        return None
     table = case.errors[case.errors["frame"].isin(case.frames)]
     read = {int(n): case.read_frame(int(n)) for n in table["frame"]}
     pairs = {
