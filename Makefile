@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -86,6 +86,11 @@ aneurism: setup
 	  mkdir -p $(OUT)/aneurism && cp tests/studies/aneurism/* $(OUT)/aneurism/ && \
 	  ln -sf "$$WIREVAL_DATA/aneurism_3dra/aneurism.raw.gz" $(OUT)/aneurism/ && \
 	  $(BIN)/wireval run $(OUT)/aneurism/manifest.toml -o $(OUT)/aneurism/out; fi
+
+# 37 real X-ray frames of a liver artery (needs WIREVAL_DATA): a simulated wire over the wire that was seen
+liver: setup
+	@if [ -z "$$WIREVAL_DATA" ]; then echo "skipped: set WIREVAL_DATA to the folder of real scans"; else \
+	  $(BIN)/python -m tests.studies.liver $(OUT)/liver; fi
 
 setup: $(VENV)/.ready
 

@@ -95,6 +95,19 @@ class Clamp:
 
 
 @dataclass(frozen=True, eq=False)
+class OtherWire:
+    """A wire that another simulator made: joints_mm (n, 3) from the clamp's plane to the tip, LPS mm; nothing is known
+    of forces. max_penetration_mm : how far it comes out of the lumen, its radius with it."""
+
+    joints_mm: Array
+    max_penetration_mm: float
+
+    def __post_init__(self) -> None:
+        """Freeze the points."""
+        object.__setattr__(self, "joints_mm", read_only(self.joints_mm, np.float64))
+
+
+@dataclass(frozen=True, eq=False)
 class Volume(Grid):
     """Grey values of one scan (or of a crop of it), indexed x, y, z.
 

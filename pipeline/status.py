@@ -30,6 +30,13 @@ class FrameStatus(Enum):
         "the simulated wire passes through itself; parts of the wire do not push each other in this model, so that "
         "shape and force are not to be trusted from here on"
     )
+    CURVE_MISSING = "the other simulator has no wire for this frame, which counts as one that it failed in"
+    CURVE_UNUSABLE = "the other simulator's wire cannot be used; see failures.csv for the file and the reason"
+    NOT_TO_DEPTH = (
+        "the other simulator's wire is longer or shorter than the frame is deep by more than "
+        "trace.length_tolerance_mm; push it to the depth in errors.csv of a run of this manifest"
+    )
+    VIEW_FAILED = "the wire cannot be held against its projection; see failures.csv for the reason"
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property

@@ -13,6 +13,7 @@
 ``scene3d``        an optional scene to turn (extra ``report3d``)
 ``diff``           two runs compared, the gate for continuous integration
 ``bench``          the page of a benchmark
+``simulators``     the page of several simulators side by side
 ``atomic``         every file appears whole or not at all
 =================  ====================================================================================
 

@@ -45,6 +45,8 @@ class FrameArrays:
 
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
     trace_flags (n,): 1 bridged, streaky or in contact, 2 nearly parallel to the plane of rotation, 3 both, 0 neither.
+    seen_in_view_mm (n, 2), simulated_in_view_mm (k, 2): the real and the simulated wire in an X-ray projection, mm on
+    the plane through the isocentre, whose origin it is.
     error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
     """
 
@@ -58,6 +60,8 @@ class FrameArrays:
     trace_sigma_mm: Array | None = None
     mips: Pictures = field(default_factory=dict)
     trace_flags: Array | None = None
+    seen_in_view_mm: Array | None = None
+    simulated_in_view_mm: Array | None = None
 
     @property
     def curves(self) -> dict[str, Array]:

@@ -88,7 +88,8 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "cards": _content.cards(declared("cards"), case.statistics),
         "points": (case_dir / "points.csv.gz").exists(),
-        "compared": bool(errors["rms_mm"].notna().any()),
+        # of projections the assumptions say whether wires were shifted
+        "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
         "scene": scene.name if scene else "",
         "scene_note": scene_note,
         "sections": sections,
@@ -117,6 +118,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         "title": "wireval",
         **_headline(cases, bool(failures)),
         "failures": failures,
+        "simulators": (out_dir / "simulators").is_dir(),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         "sections": draw_sections("run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed),

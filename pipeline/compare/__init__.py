@@ -8,9 +8,8 @@ import numpy as np
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, Pair, Way, measured, pair_of, point_to_curve, rms, scored
+from pipeline.compare.metrics import METRICS, Pair, Simulated, Way, measured, pair_of, point_to_curve, rms, scored
 from pipeline.model import Array, Curve, Lumen, arc_length
-from solver import Solution
 
 __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
 
@@ -31,7 +30,7 @@ class Comparison(Pair):
 
 
 def compare(
-    simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig(), way: Way | None = None
+    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig(), way: Way | None = None
 ) -> Comparison:
     """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
 
@@ -44,7 +43,7 @@ def compare(
 
 
 def compare_truth(
-    truth_mm: Array, traced: Curve | None, simulated: Solution | None, config: CompareConfig = CompareConfig()
+    truth_mm: Array, traced: Curve | None, simulated: Simulated | None, config: CompareConfig = CompareConfig()
 ) -> dict[str, float]:
     """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.
 

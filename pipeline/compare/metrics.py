@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from pipeline.arrays.polyline import angle_deg, at_arc, samples, tip_tangent
 from pipeline.compare.branches import Branches
 from pipeline.compare.config import CompareConfig
-from pipeline.model import Array, Curve, Lumen, arc_length
+from pipeline.model import Array, Curve, Lumen, OtherWire, arc_length
 from reports.schema import ERRORS, Column
 from solver import Solution
 
+Simulated = Solution | OtherWire
 COVERED_MM = 1.0
 """A point of the traced curve counts as covered where the simulated wire is no farther away."""
 TANGENT_MM = 1.0
@@ -111,7 +112,7 @@ def scored(arc_mm: Array, skip_mm: float) -> Array:
     return np.asarray(arc_mm[arc_mm >= min(skip_mm, max(length - SHORT_MM, 0.5 * length)) - 1e-9])
 
 
-def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
+def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
     """Sample both curves and measure their distances; ValueError where one of them is empty."""
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:

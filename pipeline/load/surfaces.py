@@ -29,7 +29,7 @@ _TYPES = {
 }  # fmt: skip
 
 
-def _to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (n, 3) of a file in LPS mm: 3D Slicer says SPACE=RAS in a comment or header, all else is taken as LPS."""
     return points * RAS_TO_LPS if b"SPACE=RAS" in text[:4096] else points
 
@@ -123,7 +123,7 @@ def read_vtp(path: Path) -> Shapes:
         node = None if piece is None else piece.find("./Points/DataArray")
         if piece is None or node is None:
             raise refused(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
-        points = reachable(path, _to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
+        points = reachable(path, to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
         fans = [
             np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
             for p in _cells(file, piece, "Polys", len(points))
@@ -155,4 +155,4 @@ def read_stl(path: Path) -> Shapes:
     if len(corners) == 0 or len(corners) % 3:
         raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
     points, index = np.unique(reachable(path, corners), axis=0, return_inverse=True)
-    return Shapes(_to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))
+    return Shapes(to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))

@@ -104,6 +104,8 @@ def guard_out(out: Path, manifest: Path) -> None:
     """Refuse an output folder that holds something else than a run of the same manifest."""
     if out.exists() and not out.is_dir():
         raise UsageError([f"-o {out}: this is a file; name a folder"])
+    if (out / "simulators").is_dir():
+        raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
     allowed = "say --resume (keep what fits) or --fresh (compute again)"
     # a run that ended before its first file was whole leaves nothing but that file's temporary name
     if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):

@@ -37,12 +37,13 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     pairs = zip(errors, points, strict=True)
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
-    if case.frames:
+    if case.compared:
         head["within_1mm"] = within(errors, len(errors))
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
-        head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
+    solved = [frame.solved.push_force_N for frame in known.frames if frame.solved is not None]
+    head |= {"push_force_max_N": max(solved)} if solved else {}
     return head | pooled(scored)
 
 
@@ -71,9 +72,10 @@ def error_row(frame: Frame) -> dict[str, Any]:
     if frame.curve is not None and len(frame.curve.sigma_mm):
         row["trace_sigma_mm"] = rms(frame.curve.sigma_mm)
     if frame.simulated is not None:
-        wire = frame.simulated
-        row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
-        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations, "num_mm": frame.num_mm}
+        row |= {"max_penetration_mm": frame.simulated.max_penetration_mm, "joints": len(frame.simulated.joints_mm)}
+    if frame.solved is not None:
+        wire = frame.solved
+        row |= {"push_force_N": wire.push_force_N, "iterations": wire.iterations, "num_mm": frame.num_mm}
         row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
     return row
 
@@ -93,13 +95,14 @@ def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
 
     Forces of joints are added up, so that their sum does not depend on the length of the segments.
     """
-    assert frame.simulated is not None
-    arc = arc_length(frame.simulated.joints_mm)
+    if frame.solved is None:
+        return np.full(len(arc_mm), np.nan)
+    arc = arc_length(frame.solved.joints_mm)
     # what lies before the first of them, in the clamp's reach, is none of theirs
     there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
     force = np.zeros((len(arc_mm), 3))
     nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
-    np.add.at(force, nearest, frame.simulated.contact_force_N[there])
+    np.add.at(force, nearest, frame.solved.contact_force_N[there])
     return np.asarray(np.linalg.norm(force, axis=1))
 
 
@@ -164,10 +167,12 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         trace_sigma_mm=None if curve is None else curve.sigma_mm,
         trace_flags=None if curve is None else np.asarray(curve.flagged) + 2.0 * np.asarray(curve.in_plane),
         simulated_mm=None if wire is None else wire.joints_mm,
-        contact_force_N=None if wire is None else wire.contact_force_N,
+        contact_force_N=None if frame.solved is None else frame.solved.contact_force_N,
         error_mm=None if errors is None else errors.error_mm,
         arc_mm=None if errors is None else errors.arc_mm,
         truth_mm=frame.truth_mm,
+        seen_in_view_mm=frame.in_view_mm[0] if frame.in_view_mm else None,
+        simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,
         mips=dict(enumerate(frame.projections)),
     )
 
@@ -194,13 +199,13 @@ def _write_wires(folder: Path, frame: Frame) -> None:
     points = joints = frame.simulated.joints_mm
     path = folder / f"wire_simulated_{name}.mrk.json"
     export.write_markups_curve(path, joints, f"simulated {name}", colour=SIMULATED_COLOUR)
-    arrays: dict[str, Any] = {"contact_force_N": frame.simulated.contact_force_N}
-    if frame.comparison is not None:
+    arrays: dict[str, Any] = {} if frame.solved is None else {"contact_force_N": frame.solved.contact_force_N}
+    if frame.comparison is not None and frame.view is None:
         errors = frame.comparison
         along = arc_length(joints)
         reach = along[along < errors.arc_mm[0] - 1e-9]
         arc = np.concatenate([reach, errors.arc_mm])
         points = np.concatenate([joints[: len(reach)], errors.sample_mm])
         arrays = {"error_mm": np.concatenate([np.full(len(reach), np.nan), errors.error_mm]), "arc_mm": arc}
-        arrays["contact_force_N"] = contact_at(frame, arc)
+        arrays |= {} if frame.solved is None else {"contact_force_N": contact_at(frame, arc)}
     export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)

@@ -154,7 +154,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
 
 def _events(frame: Frame) -> dict[str, Any]:
     """Where the simulated wire gave way since the frame before, and the hand's work that is not in wire and wall."""
-    wire = frame.simulated
+    wire = frame.solved
     if wire is None:
         return {}
     return {"snaps": [snap._asdict() for snap in wire.snaps], "dissipated_N_mm": wire.dissipated_N_mm}

@@ -12,7 +12,7 @@ from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 
-__all__ = ["LEVELS", "altered", "guide_wire", "inserted", "insertion_of", "simulate", "together"]
+__all__ = ["LEVELS", "altered", "guide_wire", "inserted", "insertion_of", "simulate", "together", "wall_of"]
 
 
 LEVELS = ("wall_look_ups_done_fraction", "start_energy_N_mm")
@@ -79,7 +79,7 @@ def together(
 
 
 @lru_cache(maxsize=1)
-def _wall_of(distance: Grid, hull: str) -> VesselWall:
+def wall_of(distance: Grid, hull: str) -> VesselWall:
     """The lumen's wall, filtered once for all insertions of a case: with 256^3 voxels that takes a second."""
     return VesselWall(distance, stiffness_N_mm2=1.0, hull=hull)
 
@@ -96,7 +96,7 @@ def insertion_of(
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
     friction = wall.friction if config.friction is None else config.friction
-    vessel = _wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction)
+    vessel = wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction)
     return inserted(vessel, altered(wire, config), clamp, solver, config.bending_scale, catheter)
 
 

@@ -20,7 +20,10 @@ from pipeline.load.curves import read_curve, read_truth
 from pipeline.load.guard import status_of
 from pipeline.load.lumens import read_lumen
 from pipeline.load.masks import mask_header
+from pipeline.load.views import read_views
+from pipeline.load.wires import read_wires
 from pipeline.model import Branches, Shapes
+from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
@@ -68,7 +71,9 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         count = len(scans.frames) or case.frame_count
         problems += _entry_problems(case, scans)
         problems += not_one_per_frame(case.lists, count)
+        problems += _others_problems(case, count)
         found(lambda: None if case.truth is None else _read(read_truth(case.truth, count)))
+        found(lambda: None if case.projections is None else _read(read_views(case.projections, count)))
     for source in case.traces:
         found(lambda source=source: _read(read_curve(source.path)))  # type: ignore[misc]
     if case.parameters:
@@ -112,6 +117,21 @@ def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
             f"{case.lumen}: entry_mm {list(case.entry_mm)} lies {away:.0f} mm from the lumen, which spans {spans}; "
             "is one of them in RAS, or in another unit than mm?"
         )
+
+
+def _others_problems(case: Case, count: int) -> list[str]:
+    """What is wrong with all wires of another simulator; what is wrong with some of them is for their frames to say."""
+    if case.simulated is None:
+        return []
+    try:
+        files = read_wires(case.simulated.files, count, case.simulated.space, case.simulated.unit)
+    except LoadError as error:
+        return [str(error)]
+    entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
+    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
+    if not files or not case.simulated.files or not all(wrong):
+        return []
+    return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
 
 
 def inputs_of(case: Case) -> list[Path]:

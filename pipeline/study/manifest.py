@@ -10,16 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_text, status_of
@@ -27,7 +18,8 @@ from pipeline.model import OverWire, Wall, Wire
 from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
-from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, saying
+from pipeline.study.others import Others, written_out
+from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, Strict, saying
 
 MANIFEST_BYTES = 16 * 2**20
 
@@ -46,12 +38,6 @@ def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     known = {"entry_case": 'entry = "case:ID"'}
     raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
-
-
-class Strict(BaseModel):
-    """Unknown keys are errors; values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Case(Strict):
@@ -84,14 +70,21 @@ class Case(Strict):
         default_factory=lambda data: (data.get("entry_mm"),)
     )
     truth: PathText | None = None
+    projections: PathText | None = None
+    simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
     wall: Wall = Wall()
     down: Axis | None = None
     catheter: OverWire | None = None
 
     @property
     def frame_count(self) -> int:
-        """Frames to report on: scans, or depths of a case without scans."""
-        return len(self.frames) or len(self.insertion_mm or ())
+        """Frames to report on: scans, or own curves or depths of a case without scans."""
+        return len(self.frames) or len(self.traces) or len(self.insertion_mm or ())
+
+    @property
+    def compared(self) -> bool:
+        """Whether the real wire is known: in scans, as own curves or from projections."""
+        return bool(self.frames or self.traces or self.projections)
 
     @property
     def stated_roll_deg(self) -> float | tuple[float, ...]:
@@ -107,8 +100,10 @@ class Case(Strict):
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
-        if not self.frames and self.insertion_mm is None:
-            raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
+        if not (self.frames or self.traces) and self.insertion_mm is None:
+            raise ValueError("neither frames nor insertion_mm: give scans (or traces) to compare with, or depths")
+        if self.projections and (self.frames or self.traces):
+            raise ValueError("projections beside frames or traces: one tells of the real wire; make two cases")
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self
@@ -181,7 +176,7 @@ class ManifestTables(Strict):
 
     @model_validator(mode="after")
     def _entries_known(self) -> "ManifestTables":
-        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames)) for c in self.case}):
+        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames or c.traces)) for c in self.case}):
             raise saying(*problems)
         return self
 

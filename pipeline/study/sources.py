@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
@@ -102,3 +102,9 @@ SourceText = Annotated[Source, BeforeValidator(_source)]
 MaskText = Annotated[Mask, BeforeValidator(_mask)]
 Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
 PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
+
+
+class Strict(BaseModel):
+    """Unknown keys are errors; values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -45,6 +45,9 @@ def projections(case: CaseFiles) -> Drawing | None:
     for title, place in (("first", 0), ("middle", len(numbers) // 2), ("last", -1), ("worst", worst)):
         titles.setdefault(numbers[place], []).append(title)
     chosen = [(n, " and ".join(titles[n])) for n in sorted(titles) if n in case.frames]
+    frames = [case.read_frame(n) for n, _ in chosen]
+    if not any(frame.mips or "traced" in frame.curves for frame in frames):
+        return None
     return _draw(case, case.scan, chosen)
 
 

@@ -61,7 +61,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
-    absent = {"failed_projections", "simulated_wires"} | ({"every_frame"} if count == 1 else set())
+    absent = {"failed_projections", "simulated_wires", "views"} | ({"every_frame"} if count == 1 else set())
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None

@@ -8,11 +8,15 @@ from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.run.stages.views import compare_in_views
 from pipeline.status import FrameStatus
 
 
 def compare_frames(run: Context, known: Known) -> Known:
     """Errors of every frame with both curves, beside those of the trivial predictors."""
+    if run.case.projections:
+        with run.log.timed("compare"):
+            return replace(known, frames=compare_in_views(run, known))
     with run.log.timed("compare"):
         clues = _clues(run, known)
         simulated = simulated_rivals(run, known) if clues else {}
@@ -50,8 +54,7 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
 
 
 def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, seen: Seen) -> Frame:
-    assert known.scans is not None
-    if frame.ok and not known.scans.frames:
+    if frame.ok and not run.case.compared:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)
     if frame.curve is None or not frame.traced or frame.simulated is None or len(frame.simulated.joints_mm) < 2:

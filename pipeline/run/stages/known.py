@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
-from pipeline.model import Array, Clamp, Curve, Lumen, Volume
+from pipeline.load.views import View
+from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.cache import Store
 from pipeline.run.log import Log, Stage
@@ -29,6 +30,8 @@ class Frame:
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
     catheter_mm : depth of the tip of a catheter over the wire.
     num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
+    view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
+    one (k, 2) on the plane through the isocentre.
     projections : maximum-intensity projections of the scan along the array axes.
     """
 
@@ -42,9 +45,11 @@ class Frame:
     roll_deg: float = 0.0
     catheter_mm: float = 0.0
     curve: Curve | None = None
-    simulated: Solution | None = None
+    simulated: Solution | OtherWire | None = None
     num_mm: float = float("nan")
     comparison: Comparison | None = None
+    view: View | None = None
+    in_view_mm: tuple[Array, ...] = ()
     registration: Registration | None = None
     truth_mm: Array | None = None
     truth: dict[str, float] = field(default_factory=dict)
@@ -68,9 +73,14 @@ class Frame:
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
 
     @property
+    def solved(self) -> Solution | None:
+        """The simulated wire where it is this project's own, with all that the solver knows of it."""
+        return self.simulated if isinstance(self.simulated, Solution) else None
+
+    @property
     def uncertain(self) -> bool:
         """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
-        return self.simulated is not None and (self.simulated.uncertain or self.num_mm > AGREED_MM)
+        return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""

@@ -10,6 +10,7 @@ from pipeline.model import Clamp
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate
 from pipeline.simulate.clamp import depth_from
@@ -25,11 +26,25 @@ NEARLY_MM = 1.0
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
-    lumen, case, config, log = known.lumen, run.case, run.config, run.log
-    assert lumen is not None
     known = with_fitted_roll(run, known)
     clamp = clamp_of(run, known)
-    frames = [_with_depth(frame, config.simulate.depth, clamp) for frame in known.frames]
+    known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
+    if run.case.simulated is None:
+        return _replayed(run, known)
+    try:
+        # the predictors that are simulations need segments of some length: those that the solver would choose
+        segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
+    except StageError:
+        segment = float("nan")
+    return replace(known, frames=frames_of_others(run, known), segment_mm=segment)
+
+
+def _replayed(run: Context, known: Known) -> Known:
+    """The solver's own wires."""
+    lumen, clamp, case, config, log = known.lumen, known.clamp, run.case, run.config, run.log
+    assert lumen is not None
+    assert clamp is not None
+    frames = list(known.frames)
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
     if case.catheter is not None:
         log.warnings += [_cut_short(f) for f in replay if f.catheter_mm > f.depth_mm + NEARLY_MM]
@@ -56,7 +71,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
     log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
-    return replace(known, frames=tuple(frames), clamp=clamp, segment_mm=resolved.segment_mm)
+    return replace(known, frames=tuple(frames), segment_mm=resolved.segment_mm)
 
 
 def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
@@ -113,6 +128,10 @@ def _told(frame: int, snap: Snap) -> str:
         f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); what is seen here and "
         "shortly after hangs on small causes"
     )
+
+
+def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
+    return tuple(_with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)
 
 
 def _with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
