@@ -45,6 +45,7 @@ class FrameArrays:
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
     trace_flags (n,): 1 bridged, streaky or in contact, 2 nearly parallel to the plane of rotation, 3 both, 0 neither.
     error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
+    median_mm (n, 3), covariance_mm2 (n, 3, 3): of the wires of the ensemble, at such samples.
     """
 
     frame: int
@@ -57,6 +58,8 @@ class FrameArrays:
     trace_sigma_mm: Array | None = None
     mips: Pictures = field(default_factory=dict)
     trace_flags: Array | None = None
+    median_mm: Array | None = None
+    covariance_mm2: Array | None = None
 
     @property
     def curves(self) -> dict[str, Array]:

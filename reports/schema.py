@@ -144,6 +144,8 @@ OVERALL_FILE = "overall.csv"  # one row over all validation cases, with the colu
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")
+BUDGET = Table("budget.csv")
+ENTRIES = Table("entries.csv")
 SWEEP = Table("sweep.csv")
 BENCH = Table("bench.csv")
 STRESS = Table("stress.csv")

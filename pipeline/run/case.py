@@ -19,7 +19,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.html import render_case
-from reports.schema import ERRORS, POINTS
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS
 from solver import warm_up
 from solver._compile import hash_of
 
@@ -55,7 +55,13 @@ class Job:
 def clear(folder: Path) -> None:
     """Make a case's folder, and take out of it what an earlier run wrote: it belongs to another result."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("result.json", ERRORS.file, POINTS.file, "frames.h5", "report.html", "scene3d.html"):
+    for name in (
+        "result.json",
+        *(table.file for table in (ERRORS, POINTS, BUDGET, ENTRIES)),
+        "frames.h5",
+        "report.html",
+        "scene3d.html",
+    ):
         (folder / name).unlink(missing_ok=True)
     for name in ("view", "figures"):
         shutil.rmtree(folder / name, ignore_errors=True)
@@ -103,6 +109,9 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
+    for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
+        if rows:
+            tables.write(job.folder / table.file, table, rows)
     outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
         outputs.write_view(job.folder / "view", known)

@@ -24,7 +24,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
-from pipeline.model import OverWire, Wall, Wire
+from pipeline.model import OverWire, Uncertainty, Wall, Wire
 from pipeline.ranges import Axis, Direction, Finite, NonNegative, Positive, Vector
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
@@ -117,14 +117,17 @@ class Case(Strict):
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
     insertion_mm: tuple[Positive, ...] | None = None
+    insertion_sigma_mm: NonNegative | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: SourceText | None = None
     traces: Sources = ()
     parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
     roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
+    roll_sigma_deg: NonNegative | None = None
     lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
     truth: PathText | None = None
     wall: Wall = Wall()
+    uncertainty: Uncertainty = Uncertainty()
     down: Axis | None = None
     catheter: OverWire | None = None
 
@@ -292,6 +295,7 @@ def _siblings(location: tuple[int | str, ...]) -> set[str]:
         "case": set(Case.model_fields),
         "wires": {item.name for item in fields(Wire)} - {"name"},
         "wall": {item.name for item in fields(Wall)},
+        "uncertainty": {item.name for item in fields(Uncertainty)},
         "catheter": {item.name for item in fields(OverWire)},
     }
     nearest = next((part for part in reversed(location[:-1]) if part in tables), None)

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.budget import Budget
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
 from pipeline.model import Array, Clamp, Curve, Lumen, Volume
@@ -44,6 +45,7 @@ class Frame:
     simulated: Solution | None = None
     num_mm: float = float("nan")
     comparison: Comparison | None = None
+    budget: Budget | None = None
     registration: Registration | None = None
     truth_mm: Array | None = None
     truth: dict[str, float] = field(default_factory=dict)
@@ -86,7 +88,8 @@ Result = TypeVar("Result", Lumen, Curve)
 class Known:
     """What is known of a case so far.
 
-    clamp, segment_mm : what was simulated with.     failure : why the case went no further.
+    clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
+    failure : why the case went no further.
     """
 
     scans: Scans | None = None
@@ -94,6 +97,8 @@ class Known:
     clamp: Clamp | None = None
     segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()
+    sources: tuple[dict[str, Any], ...] = ()
+    entries: tuple[dict[str, Any], ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""
 
