@@ -9,9 +9,10 @@ from pipeline.ranges import Count
 class BudgetConfig:
     """The uncertainty budget."""
 
-    members: Count = 64
-    """Insertions whose inputs are drawn from what they may be; 0: no budget."""
+    members: Count = 0
+    """Insertions whose inputs are drawn from what they may be; 0: no budget. 200 of them take as long as segmenting and
+    tracing ten frames of 256³."""
     members_alone: Count = 32
-    """As many for each input by itself, the same draws, for the table by source; 0: no table."""
+    """So many for each input by itself, the same draws, for the table by source; 0: no table."""
     seed: Count = 0
     """Of the draws."""

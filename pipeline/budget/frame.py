@@ -1,13 +1,13 @@
 """What an ensemble says of one frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.budget.shapes import Shapes, energy_score_mm, shapes_of
-from pipeline.budget.verdict import axes_across, judged, reach_mm
+from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.model import Array
 
 FEWEST = 8
@@ -35,8 +35,9 @@ class Budget:
 
     median_mm (n, 3).     covariance_mm2 (n, 3, 3) : of the inputs; second moment about the nominal wire, so that what
     the mean is off counts, too; of the members that have the nominal wire's shape.     input_mm (n,) : u of the inputs.
-    members : at rest.     shapes : where there are two.     u_mm, ratio (n,) : u_val in the direction of the error, and
-    the error over it; None where nothing was traced, as is energy_score_mm NaN.     released : see ``shapes.releases``.
+    members : at rest.     shapes : where there are two.     whole_mm (n,) : u_val, of inputs, trace and segments.
+    u_mm, ratio (n,) : u_val in the direction of the error, and the error over it. All three are None where nothing was
+    traced, as is energy_score_mm NaN.     released : see ``shapes.releases``.
     """
 
     arc_mm: Array
@@ -45,6 +46,7 @@ class Budget:
     input_mm: Array
     members: int
     shapes: Shapes | None = None
+    whole_mm: Array | None = None
     u_mm: Array | None = None
     ratio: Array | None = None
     energy_score_mm: float = float("nan")
@@ -67,5 +69,10 @@ def frame_budget(wires: Array, seen: Seen) -> Budget | None:
     if curve is None or foot is None or own is None or real is None:
         return budget
     verdict = judged(at_arc(curve, foot) - nominal, moment, own, axes, len(near))
-    scores = {"u_mm": verdict.u_mm, "ratio": verdict.ratio, "energy_score_mm": energy_score_mm(wires, real)}
-    return Budget(**{**vars(budget), **scores})
+    return replace(
+        budget,
+        whole_mm=np.sqrt(budget.input_mm**2 + ROUND**2 * own),
+        u_mm=verdict.u_mm,
+        ratio=verdict.ratio,
+        energy_score_mm=energy_score_mm(wires, real),
+    )

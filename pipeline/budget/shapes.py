@@ -16,7 +16,7 @@ from pipeline.model import Array
 
 DISTAL_MM = 20.0
 """A tip lets go, not a whole wire: shapes are told apart by so much of its end."""
-GAP_MM, GAP_SIGMAS = 0.1, 2.0
+GAP_MM, GAP_SIGMAS = 0.1, 3.0
 """Two shapes are those between which nothing lies: a gap along the main direction of the spread, of as much, and of as
 many standard deviations within the shapes."""
 LEAST_SHARE, LEAST = 0.02, 2

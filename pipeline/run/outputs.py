@@ -81,8 +81,8 @@ def budget_of(frame: Frame) -> dict[str, Any]:
         return {}
     row: dict[str, Any] = {"u_input_mm": rms(budget.input_mm), "energy_score_mm": budget.energy_score_mm}
     row["released"] = budget.released or None
-    if budget.u_mm is not None:
-        row["u_val_mm"] = rms(budget.u_mm)
+    if budget.whole_mm is not None:
+        row["u_val_mm"] = rms(budget.whole_mm)
     if budget.shapes is not None:
         real = budget.shapes.real
         row |= {"release": budget.shapes.simulated, "release_real": real, "log_score_bits": -float(np.log2(real))}

@@ -1,4 +1,4 @@
-"""How far the budget is right: ``python -m tests.studies.budget FOLDER [--seed 100] [--studies 20] [--members 100]``.
+"""How far the budget is right: ``python -m tests.studies.budget FOLDER [--seed 100] [--studies 20] [--members 48]``.
 
 Twenty insertions whose inputs lie as far off as the budget says: clamp, depth, roll, the lumen's surface, rest
 curvature, taper and the wall's stiffness are drawn, the true wire is that of ``data_synthetic``'s rod. To be quick no
@@ -39,8 +39,8 @@ from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.settings import Config
 from solver import Grid
 
-SCENES = ("siphon", "bend", "s-curve", "incomplete-circle")
-FRAMES, VOXEL_MM, ROOM_MM, STEP_MM = 6, 0.3, 7.0, 0.2
+SCENES = ("siphon", "bend", "s-curve")
+FRAMES, VOXEL_MM, ROOM_MM, STEP_MM = 6, 0.3, 7.0, 0.3
 ENTRY_MM, DIRECTION_DEG, ROLL_DEG, INSERTION_MM = 0.15, 2.0, 2.0, 0.5
 REST_CURVATURE, TAPER, WALL = 0.02, 0.05, 0.5
 LUMEN_VOXELS, LUMEN_SMOOTH_VOXELS, BIAS_VOXELS = 0.12, 1.1, 0.05
@@ -214,7 +214,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=100)
     parser.add_argument("--studies", type=int, default=20)
-    parser.add_argument("--members", type=int, default=100)
+    parser.add_argument("--members", type=int, default=48)
     parser.add_argument("--plants", nargs="*", default=PLANTS)
     given = parser.parse_args()
     for plant in given.plants:

@@ -43,9 +43,14 @@ def budgeted(run: Context, known: Known) -> Known:
         return known
     with run.log.timed("compare"):
         work = _Work(run, known, frames)
-        budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members, PER_LUMEN))
-        found = dict(zip(work.numbers, budgets, strict=True))
-        rows = work.by_source(found) if settings.members_alone else []
+        try:
+            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members, PER_LUMEN))
+            found = dict(zip(work.numbers, budgets, strict=True))
+            rows = work.by_source(found) if settings.members_alone else []
+        except ValueError as error:  # an input was drawn that the solver refuses
+            run.log.warnings.append(f"case {run.case.id!r} has no budget: {error}; lower that input's uncertainty")
+            return known
+    run.log.assumptions.append(work.said())
     done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
     return replace(known, frames=done, sources=tuple(rows))
 
@@ -75,8 +80,10 @@ class _Work:
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
-        coarse = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
-        solver = replace(config.solver, segment_mm=coarse, finest_mm=config.solver.step_mm)
+        # the coarsest of them will do: what segments make is common to all members, and stands in num_mm
+        lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
+        segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
+        solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
         tips = [frame.catheter_mm for frame in frames] if case.catheter else None
         shared = case.wire, case.wall, known.lumen, solver, [*wires, *traces]
         self.scene = Scene(*shared, case.catheter, tips, config.budget.seed)
@@ -111,6 +118,12 @@ class _Work:
         """The same of the segments: num_mm is a bound, two standard deviations."""
         return 0.5 * float(np.nan_to_num(frame.num_mm))
 
+    def said(self) -> str:
+        """What the ensemble was drawn from, for the report."""
+        words = ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in self.sigmas.said.items())
+        count = self.run.config.budget.members
+        return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}"
+
     def budgets(self, sigmas: Sigmas, count: int, per_lumen: int) -> list[Budget | None]:
         """The budget of each frame by an ensemble."""
         members = drawn(self.nominal, sigmas, count, per_lumen, self.run.config.budget.seed)
@@ -126,10 +139,10 @@ class _Work:
         rows = [self._alone(source, calm) for source in SOURCES if np.any(getattr(alone(self.sigmas, source), source))]
         budgets, frames = [found[self.numbers[i]] for i in calm], [self.frames[i] for i in calm]
         ends = (
-            ("inputs", "all of these", [b.input_mm for b in budgets if b is not None]),
+            ("inputs", "all of these", [b.input_mm for b in budgets if b]),
             ("segments", "half of num_mm", [np.full(1, ROUND * self._segments_mm(frame)) for frame in frames]),
             ("trace", "its own", [ROUND * self._trace_mm(frame) for frame in frames]),
-            ("u_val", "inputs, segments and trace", [b.u_mm for b in budgets if b is not None and b.u_mm is not None]),
+            ("u_val", "inputs, segments, trace", [b.whole_mm for b in budgets if b and b.whole_mm is not None]),
             ("error", "simulated to traced", [f.comparison.error_mm for f in frames if f.comparison is not None]),
         )
         return rows + [_row(name, said, values) for name, said, values in ends if calm]
