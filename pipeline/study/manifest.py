@@ -291,12 +291,8 @@ def _place(data: dict[str, Any], location: tuple[int | str, ...]) -> list[int | 
 
 def _siblings(location: tuple[int | str, ...]) -> set[str]:
     """The keys that stand beside the one at a location."""
-    tables = {
-        "case": set(Case.model_fields),
-        "wires": {item.name for item in fields(Wire)} - {"name"},
-        "wall": {item.name for item in fields(Wall)},
-        "uncertainty": {item.name for item in fields(Uncertainty)},
-        "catheter": {item.name for item in fields(OverWire)},
-    }
+    kinds = {"wires": Wire, "wall": Wall, "catheter": OverWire, "uncertainty": Uncertainty}
+    tables = {name: {item.name for item in fields(kind)} - {"name"} for name, kind in kinds.items()}
+    tables["case"] = set(Case.model_fields)
     nearest = next((part for part in reversed(location[:-1]) if part in tables), None)
     return tables[str(nearest)] if nearest else {"schema", "wires", "case"}

@@ -205,6 +205,13 @@ def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:
     assert not (paths[2] / "entries.csv").exists()
 
 
+def test_an_ensemble_that_is_too_small_says_so(study: Path, tmp_path: Path) -> None:
+    words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=0"]
+    assert main(["run", str(study / "manifest.toml"), *words, "--set", "compare.simulated_nulls=false"]) == 0
+    assert tables.read(tmp_path / "cases/bend/errors.csv", ERRORS)["u_val_mm"].isna().all()
+    assert "fewer than 90 % of the 4 insertions" in (tmp_path / "cases/bend/result.json").read_text()
+
+
 def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -> None:
     case = out / "cases" / "bend"
     rows = tables.read(case / "budget.csv", BUDGET).set_index("source")["u_mm"]

@@ -20,6 +20,7 @@ from pipeline.budget import (
     releases,
     replayed,
 )
+from pipeline.budget.frame import FEWEST
 from pipeline.budget.inputs import INSERTION_MM, TIP_VOXELS, sigmas_of
 from pipeline.budget.verdict import ROUND
 from pipeline.compare.metrics import rms, scored
@@ -31,6 +32,7 @@ from pipeline.simulate.resolution import lengths_mm
 
 PER_LUMEN, PER_LUMEN_ALONE = 8, 2
 """Members that share a draw of the lumen's surface: as many as go side by side; few where it alone is looked at."""
+AT_REST = 0.9
 DISTAL = 20
 """Points of a wire's end, at the usual 0.5 mm its last 10 mm."""
 
@@ -51,8 +53,22 @@ def budgeted(run: Context, known: Known) -> Known:
             run.log.warnings.append(f"case {run.case.id!r} has no budget: {error}; lower that input's uncertainty")
             return known
     run.log.assumptions.append(work.said())
+    run.log.warnings += _lost(found, settings.members)
     done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
     return replace(known, frames=done, sources=tuple(rows))
+
+
+def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
+    """A warning where much of the ensemble came to no rest: its spread is that of the rest."""
+    few = [n for n, budget in found.items() if budget is None or budget.members < AT_REST * count]
+    if not few:
+        return []
+    frames = ", ".join(map(str, few))
+    return [
+        f"frames {frames}: fewer than {100 * AT_REST:.0f} % of the {count} insertions of the budget came to rest, or "
+        f"fewer than {FEWEST}, of which nothing is said: u_val is that of the others; raise budget.members, or state "
+        "smaller uncertainties"
+    ]
 
 
 def _with_releases(frames: Sequence[Frame], budgets: Sequence[Budget | None]) -> list[Budget | None]:
