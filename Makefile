@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test lint study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,7 +11,7 @@ export OMP_NUM_THREADS := 1
 
 validate: setup
 	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
-	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume -j 2 \
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume -j 2 --set budget.members=100 \
 	  --sweep simulate.roll_offset_deg=-15,15 --sweep simulate.taper_scale=0.5,2 \
 	  --sweep simulate.rest_curvature_scale=0.8,1.2 --sweep simulate.friction=0.2
 
@@ -46,6 +46,10 @@ bars: setup
 	  $(BIN)/wireval synth circle-of-willis -o $(OUT)/bars/$$seed --frames 30 --size 256 --seed $$seed && \
 	  $(BIN)/wireval run $(OUT)/bars/$$seed/manifest.toml -o $(OUT)/bars/out-$$seed --resume || exit 1; done
 	$(BIN)/python -m tests.studies.bars $(foreach seed,$(SEEDS),$(OUT)/bars/out-$(seed))
+
+# how far the uncertainty budget is right: insertions with inputs as far off as it says, and with errors planted
+budget: setup
+	$(BIN)/python -m tests.studies.budget $(OUT)/budget
 
 # the golden errors of the small catalogue, written anew: look at the difference before committing it
 baseline: setup

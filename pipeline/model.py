@@ -55,6 +55,24 @@ class Wall:
     friction: NonNegative = 0.0
 
 
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well inputs are known: one standard deviation of each; None is the default of ``budget.inputs``.
+
+    lumen_mm, lumen_bias_mm : of the lumen's surface, place by place and common to
+    all of it.     Relative: rest_curvature; taper (lengths over which the stiffness changes) and wall_stiffness, of
+    their logarithms.     friction : of the coefficient.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    lumen_mm: NonNegative | None = None
+    lumen_bias_mm: NonNegative | None = None
+    rest_curvature: NonNegative | None = None
+    taper: NonNegative | None = None
+    wall_stiffness: NonNegative | None = None
+    friction: NonNegative | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Clamp:
     """Where the wire is held: entry_mm (3,) LPS, direction (3,) of length 1; note and warning are for the report.

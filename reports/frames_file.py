@@ -48,6 +48,7 @@ class FrameArrays:
     seen_in_view_mm (n, 2), simulated_in_view_mm (k, 2): the real and the simulated wire in an X-ray projection, mm on
     the plane through the isocentre, whose origin it is.
     error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
+    median_mm (n, 3), covariance_mm2 (n, 3, 3): of the wires of the ensemble, at such samples.
     """
 
     frame: int
@@ -62,6 +63,8 @@ class FrameArrays:
     trace_flags: Array | None = None
     seen_in_view_mm: Array | None = None
     simulated_in_view_mm: Array | None = None
+    median_mm: Array | None = None
+    covariance_mm2: Array | None = None
 
     @property
     def curves(self) -> dict[str, Array]:

@@ -144,6 +144,8 @@ ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")
 TIMINGS = Table("timings.csv")  # of a case and its frames; of a run, one row a case
+BUDGET = Table("budget.csv")
+ENTRIES = Table("entries.csv")
 SWEEP = Table("sweep.csv")
 SIMULATORS = Table("simulators.csv")
 WHERE = Table("where.csv")

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pipeline.compare import intervals
-from pipeline.compare.metrics import OF_POINTS
+from pipeline.compare.metrics import OF_POINTS, rms
 from pipeline.compare.nulls import ANOTHER, rivals
 from pipeline.model import Array
 from pipeline.status import FrameStatus
@@ -54,7 +54,24 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
     # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
     left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
     result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
-    return result | _with_intervals(frames, points)
+    return result | _releases(frames) | _with_intervals(frames, points)
+
+
+def _releases(frames: Sequence[Scored]) -> dict[str, Any]:
+    """How often tips let go, and the error without the frames in which they may have; empty without a budget."""
+    if not np.isfinite(numbers(frames, "u_input_mm")).any():
+        return {}
+    calm = [frame for frame, p in zip(frames, numbers(frames, "release"), strict=True) if not np.isfinite(p)]
+    told = [frame.row.get("released") for frame in frames]
+    return {
+        "release_frames": len(frames) - len(calm),
+        "rms_calm_mm": rms(np.concatenate([np.zeros(0), *(frame.error_mm for frame in calm)])),
+        **{f"releases_{word}": told.count(word) for word in RELEASED},
+    }
+
+
+RELEASED = ("both", "missed", "spurious")
+"""What may become of a release: simulated and real, real alone, simulated alone."""
 
 
 WITHIN_MM = 1.0

@@ -22,7 +22,7 @@ from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import writing
 from reports.html import render_case
-from reports.schema import ERRORS, POINTS, TIMINGS
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up
 from solver._compile import hash_of
 
@@ -148,6 +148,9 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
+    for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
+        if rows:
+            tables.write(job.folder / table.file, table, rows)
     outputs.write_frames(job.folder / ledger.FRAMES, known)
     if job.pictures:
         outputs.write_view(job.folder / "view", known)

@@ -13,13 +13,13 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from reports.atomic import write_bytes
-from reports.schema import ERRORS, POINTS, TIMINGS
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 
 FILE = "ledger.json"
 RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"
 TABLES = (RESULT, ERRORS.file, POINTS.file)
 """What numbers over many cases are made of."""
-DATA = (*TABLES, TIMINGS.file, PROVENANCE, FRAMES)
+DATA = (*TABLES, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE, FRAMES)
 PAGES = ("report.html", "scene3d.html")
 Pages = Literal["", "linked", "embedded"]
 """Which pages a case has: none, ones with links to their pictures, ones with the pictures inside."""

@@ -24,6 +24,8 @@ from reports import export, frames_file
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
+BEYOND = 2.0
+"""Times u, beyond which an error is the model's."""
 SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
@@ -77,6 +79,25 @@ def error_row(frame: Frame) -> dict[str, Any]:
         wire = frame.solved
         row |= {"push_force_N": wire.push_force_N, "iterations": wire.iterations, "num_mm": frame.num_mm}
         row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
+    return row | budget_of(frame)
+
+
+def budget_of(frame: Frame) -> dict[str, Any]:
+    """What the ensemble says of a frame, as fields of errors.csv."""
+    budget = frame.budget
+    if budget is None:
+        return {}
+    row: dict[str, Any] = {"u_input_mm": rms(budget.input_mm), "energy_score_mm": budget.energy_score_mm}
+    row["released"] = budget.released or None
+    if budget.whole_mm is not None:
+        row["u_val_mm"] = rms(budget.whole_mm)
+    if budget.shapes is not None:
+        real = budget.shapes.real
+        row |= {"release": budget.shapes.simulated, "release_real": real, "log_score_bits": -float(np.log2(real))}
+    elif budget.ratio is not None:
+        row["share_beyond_2u"] = float(np.mean(budget.ratio > BEYOND))
+    if frame.solved is not None and frame.solved.snaps:
+        row["released_at_mm"] = frame.solved.snaps[0].from_mm
     return row
 
 
@@ -122,7 +143,15 @@ def _points(frame: Frame) -> dict[str, NDArray[Any]]:
         "error_mm": c.error_mm,
         "foot_arc_mm": c.foot_arc_mm,
         "contact_force_N": contact_at(frame, c.arc_mm),
+        **_over_u(frame, len(c.arc_mm)),
     }
+
+
+def _over_u(frame: Frame, count: int) -> dict[str, NDArray[Any]]:
+    """u_val and the error over it at the points of a frame; NaN where there is no budget."""
+    budget, nothing = frame.budget, np.full(count, np.nan)
+    u, ratio = (None, None) if budget is None else (budget.u_mm, budget.ratio)
+    return {"u_val_mm": nothing if u is None else u, "error_over_u": nothing if ratio is None else ratio}
 
 
 def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
@@ -170,6 +199,8 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         contact_force_N=None if frame.solved is None else frame.solved.contact_force_N,
         error_mm=None if errors is None else errors.error_mm,
         arc_mm=None if errors is None else errors.arc_mm,
+        median_mm=None if frame.budget is None else frame.budget.median_mm,
+        covariance_mm2=None if frame.budget is None else frame.budget.covariance_mm2,
         truth_mm=frame.truth_mm,
         seen_in_view_mm=frame.in_view_mm[0] if frame.in_view_mm else None,
         simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,

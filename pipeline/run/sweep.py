@@ -32,9 +32,10 @@ class SweepPoint:
 
     @property
     def cheap(self) -> Resolved:
-        """The settings without the predictors that are simulations: those of the plain run stand for all points."""
+        """The settings without predictors that are simulations and without a budget: those of the plain run stand."""
         config = self.settings.config
-        return replace(self.settings, config=replace(config, compare=replace(config.compare, simulated_nulls=False)))
+        compare, budget = replace(config.compare, simulated_nulls=False), replace(config.budget, members=0)
+        return replace(self.settings, config=replace(config, compare=compare, budget=budget))
 
     @property
     def folder(self) -> Path:

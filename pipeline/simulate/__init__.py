@@ -67,15 +67,19 @@ def simulate(
 def together(
     insertions: Sequence[Insertion],
     depths_mm: Sequence[Sequence[float]],
-    roll_deg: Sequence[float],
+    roll_deg: Sequence[float] | Sequence[Sequence[float]],
     catheter_mm: Sequence[float] | None = None,
 ) -> list[list[Solution]]:
-    """The wires of several insertions, each with its own depths, with the same rolls and catheter; side by side."""
+    """The wires of several insertions, each with its own depths, with the same catheter; side by side.
+
+    roll_deg : of every depth, the same for all or for each insertion its own.
+    """
+    rolls = np.broadcast_to(np.asarray(roll_deg, dtype=np.float64), np.shape(depths_mm)).tolist()
     if catheter_mm is None:
-        return Insertions(insertions, threads=1).to_depths(depths_mm, [list(roll_deg)] * len(insertions))
+        return Insertions(insertions, threads=1).to_depths(depths_mm, rolls)
     tips = [[min(tip, mm) for tip, mm in zip(catheter_mm, depths, strict=True)] for depths in depths_mm]
-    ways = zip(insertions, depths_mm, tips, strict=True)
-    return [list(one.to_depths(depths, list(roll_deg), tip)) for one, depths, tip in ways]
+    ways = zip(insertions, depths_mm, rolls, tips, strict=True)
+    return [list(one.to_depths(depths, roll, tip)) for one, depths, roll, tip in ways]
 
 
 @lru_cache(maxsize=1)
@@ -87,16 +91,20 @@ def wall_of(distance: Grid, hull: str) -> VesselWall:
 def insertion_of(
     wire: Wire,
     wall: Wall,
-    lumen: Lumen,
+    lumen: Lumen | VesselWall,
     clamp: Clamp,
     solver: SolverConfig = SolverConfig(),
     config: SimulateConfig = SimulateConfig(),
     catheter: OverWire | None = None,
 ) -> Insertion:
-    """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
+    """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it.
+
+    lumen : or its wall, whose stiffness and friction do not count.
+    """
+    vessel = lumen if isinstance(lumen, VesselWall) else wall_of(lumen.distance, solver.hull)
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
     friction = wall.friction if config.friction is None else config.friction
-    vessel = wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction)
+    vessel = vessel.like(stiffness_N_mm2=stiffness, friction=friction)
     return inserted(vessel, altered(wire, config), clamp, solver, config.bending_scale, catheter)
 
 

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, fi
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_text, status_of
-from pipeline.model import OverWire, Wall, Wire
+from pipeline.model import OverWire, Uncertainty, Wall, Wire
 from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
@@ -57,6 +57,7 @@ class Case(Strict):
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
     insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
+    insertion_sigma_mm: NonNegative | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: MaskText | None = None
     traces: Sources = ()
@@ -64,6 +65,7 @@ class Case(Strict):
     calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
     own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
     roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
+    roll_sigma_deg: NonNegative | None = None
     push_force_N: tuple[Finite, ...] | None = None
     push_force_sigma_N: Positive = 0.001
     lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
@@ -73,6 +75,7 @@ class Case(Strict):
     projections: PathText | None = None
     simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
     wall: Wall = Wall()
+    uncertainty: Uncertainty = Uncertainty()
     down: Axis | None = None
     catheter: OverWire | None = None
 
@@ -250,11 +253,8 @@ def _place(data: dict[str, Any], location: tuple[int | str, ...]) -> list[int | 
 
 def _siblings(location: tuple[int | str, ...]) -> set[str]:
     """The keys that stand beside the one at a location."""
-    tables = {
-        "case": set(Case.model_fields),
-        "wires": {item.name for item in fields(Wire)} - {"name"},
-        "wall": {item.name for item in fields(Wall)},
-        "catheter": {item.name for item in fields(OverWire)},
-    }
+    kinds = {"wires": Wire, "wall": Wall, "catheter": OverWire, "uncertainty": Uncertainty}
+    tables = {name: {item.name for item in fields(kind)} - {"name"} for name, kind in kinds.items()}
+    tables["case"] = set(Case.model_fields)
     nearest = next((part for part in reversed(location[:-1]) if part in tables), None)
     return tables[str(nearest)] if nearest else {"schema", "wires", "case"}

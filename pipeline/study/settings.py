@@ -12,6 +12,7 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
+from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
 from pipeline.load.config import LoadConfig
 from pipeline.segment.config import SegmentConfig
@@ -30,6 +31,7 @@ class Config:
     solver: SolverConfig = field(default_factory=SolverConfig)
     simulate: SimulateConfig = field(default_factory=SimulateConfig)
     compare: CompareConfig = field(default_factory=CompareConfig)
+    budget: BudgetConfig = field(default_factory=BudgetConfig)
 
 
 class SettingsError(InputError):

@@ -18,6 +18,12 @@ def error_along_wire(case: CaseFiles) -> Drawing | None:
     return _along_wire(points, "error_mm", "distance to the traced curve, mm")
 
 
+def error_over_u(case: CaseFiles) -> Drawing | None:
+    """The error across the traced wire over its uncertainty, of frames that are ok."""
+    points = case.points[case.points["frame"].isin(case.good["frame"])]
+    return _along_wire(points, "error_over_u", "error over u (beyond 2: the model's)")
+
+
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
     """Magnitude of the wall's force along the simulated wire."""
     points = case.points if has(case.points, "contact_force_N") else _joints(case)

@@ -21,6 +21,7 @@ _LARGE: dict[str, Look] = {
     "true": {"color": GREEN, "linestyle": ":", "linewidth": 1.2},
     "simulated": {"color": SKY, "linestyle": (0, (4, 2)), "linewidth": 1.2},
 }
+_BAND: Look = {"facecolor": SKY, "alpha": 0.35, "linewidth": 0}
 _SMALL: dict[str, Look] = {
     "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.6},
     "simulated": {"color": SKY, "linestyle": "--", "linewidth": 1.0},
@@ -153,6 +154,8 @@ def _panel(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
     if plane.along not in frame.mips:
         axes.set_facecolor("0.25")
     view.show(axes, frame, plane)
+    if frame.median_mm is not None and frame.covariance_mm2 is not None:
+        view.band(axes, frame.median_mm, frame.covariance_mm2, plane, **_BAND)
     for label, points in frame.curves.items():
         view.draw(axes, points, plane, tip=3, label=label, **_LARGE[label])
     view.dress(axes, plane)

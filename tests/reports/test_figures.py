@@ -18,7 +18,7 @@ from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
-from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -62,6 +62,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
     absent = {"failed_projections", "simulated_wires", "views"} | ({"every_frame"} if count == 1 else set())
+    absent |= {"budget", "error_over_u", "release_frames"}  # it has none
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None
@@ -140,6 +141,42 @@ def test_views_follow_the_curves_and_stay_in_the_crop() -> None:
     for nothing in ([], [curve + 500.0]):
         outside = _planes.around(scan, nothing)
         np.testing.assert_allclose(outside.size, 50.0)
+
+
+def test_a_band_is_two_sigma_to_both_sides_however_the_scan_is_turned() -> None:
+    scan = ScanCrop(np.full(3, 0.5), np.zeros(3), TURN, (40, 40, 40))
+    curve = np.linspace(0.0, 10.0, 21)[:, None] * np.array([1.0, 2.0, 2.0]) / 3.0
+    for plane in _planes.PLANES:
+        axes = Figure().subplots()
+        _planes.whole(scan).band(axes, curve, np.tile(0.2**2 * np.eye(3), (21, 1, 1)), plane, alpha=0.5)
+        outline = axes.patches[0].get_xy()[:42]
+        width = np.linalg.norm(outline[:21] - outline[21:][::-1], axis=1)
+        np.testing.assert_allclose(width, 4 * 0.2, rtol=1e-9)
+
+
+def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
+    rows = [{"source": n, "sigma": "", "u_mm": u, "distal_u_mm": 2 * u} for n, u in (("roll", 0.1), ("error", 0.2))]
+    tables.write(tmp_path / "budget.csv", BUDGET, rows)
+    case = _empty_case(tmp_path)
+    drawing = CASE_FIGURES["budget"](case)
+    assert drawing is not None
+    (left,) = drawing.figure.axes
+    assert [bar.get_width() for bar in left.patches] == [0.1, 0.2, 0.2, 0.4]
+    entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
+    tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.3}])
+    both = CASE_FIGURES["budget"](case)
+    assert both is not None
+    assert len(both.figure.axes) == 2
+
+
+def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
+    errors = {"frame": [0, 1], "status": ["ok", "ok"], "insertion_mm": [5.0, 9.0], "release": [np.nan, 0.7]}
+    tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(errors | {"release_real": [np.nan, 0.3]}))
+    drawing = CASE_FIGURES["release_frames"](_empty_case(tmp_path, errors=tables.read(tmp_path / "errors.csv", ERRORS)))
+    assert drawing is not None
+    assert drawing.table["frame"].tolist() == [1]
+    lines = drawing.figure.axes[0].get_lines()
+    assert [list(line.get_ydata()) for line in lines] == [[0.7], [0.3]]
 
 
 def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:

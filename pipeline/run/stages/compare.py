@@ -6,6 +6,8 @@ from dataclasses import replace
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
+from pipeline.run.stages.budget import budgeted
+from pipeline.run.stages.entries import four_entries
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.rivals import simulated_rivals
 from pipeline.run.stages.views import compare_in_views
@@ -31,7 +33,11 @@ def compare_frames(run: Context, known: Known) -> Known:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
                 done = replace(done, truth=truth)
             frames.append(done)
-    return replace(known, frames=tuple(frames))
+    known = replace(known, frames=tuple(frames))
+    if clues is not None and run.config.compare.simulated_nulls:
+        with run.log.timed("compare"):
+            known = replace(known, entries=four_entries(run, known, clues.way))
+    return budgeted(run, known)
 
 
 def _clues(run: Context, known: Known) -> Clues | None:

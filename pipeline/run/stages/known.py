@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.budget import Budget
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
 from pipeline.load.views import View
@@ -50,6 +51,7 @@ class Frame:
     comparison: Comparison | None = None
     view: View | None = None
     in_view_mm: tuple[Array, ...] = ()
+    budget: Budget | None = None
     registration: Registration | None = None
     truth_mm: Array | None = None
     truth: dict[str, float] = field(default_factory=dict)
@@ -98,7 +100,8 @@ Result = TypeVar("Result", Lumen, Curve)
 class Known:
     """What is known of a case so far.
 
-    clamp, segment_mm : what was simulated with.     failure : why the case went no further.
+    clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
+    failure : why the case went no further.
     """
 
     scans: Scans | None = None
@@ -106,6 +109,8 @@ class Known:
     clamp: Clamp | None = None
     segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()
+    sources: tuple[dict[str, Any], ...] = ()
+    entries: tuple[dict[str, Any], ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""
 
