@@ -22,6 +22,7 @@ from pipeline.load.lumens import read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.model import Branches, Shapes
 from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
 
 NEAR_MM = 20.0
@@ -70,6 +71,11 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         found(lambda: None if case.truth is None else _read(read_truth(case.truth, count)))
     for source in case.traces:
         found(lambda source=source: _read(read_curve(source.path)))  # type: ignore[misc]
+    if case.parameters:
+        try:
+            read_parameters(case.parameters)
+        except ParametersError as error:
+            problems += error.problems
     return problems + list(_lumen_problems(case, config))
 
 

@@ -42,18 +42,10 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
     return wires[value]
 
 
-def _not_yet(value: Any, info: ValidationInfo) -> Any:
-    """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
-    if info.field_name == "parameters":
-        raise saying("parameters cannot be read in this version; write the values into [wires] and [case.wall]")
-    if value == "fit":
-        raise saying('roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame')
-    return value
-
-
 def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
-    raise ValueError(f'unknown key {info.field_name!r}; write entry = "case:ID"')
+    known = {"entry_case": 'entry = "case:ID"'}
+    raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
 
 
 class Strict(BaseModel):
@@ -82,8 +74,12 @@ class Case(Strict):
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: MaskText | None = None
     traces: Sources = ()
-    parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
-    roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
+    parameters: PathText | None = None
+    calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
+    own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
+    roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
+    push_force_N: tuple[Finite, ...] | None = None
+    push_force_sigma_N: Positive = 0.001
     lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
         default_factory=lambda data: (data.get("entry_mm"),)
     )
@@ -98,11 +94,16 @@ class Case(Strict):
         return len(self.frames) or len(self.insertion_mm or ())
 
     @property
+    def stated_roll_deg(self) -> float | tuple[float, ...]:
+        """The roll, one for all frames or one per frame; 0 where it is to be fitted."""
+        return 0.0 if self.roll_deg == "fit" else self.roll_deg
+
+    @property
     def lists(self) -> dict[str, Any]:
         """What must have one entry per frame."""
         catheter = self.catheter and self.catheter.insertion_mm
         named = {"insertion_mm": self.insertion_mm, "catheter insertion_mm": catheter}
-        return {**named, "roll_deg": self.roll_deg, "traces": self.traces}
+        return {**named, "roll_deg": self.stated_roll_deg, "traces": self.traces, "push_force_N": self.push_force_N}
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
