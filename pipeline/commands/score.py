@@ -65,10 +65,10 @@ def main(args: argparse.Namespace) -> int:
 
 def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     """A run for each simulator, the solver's own last; raises InputError."""
+    from pipeline.run.cache import default_root
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError
     from pipeline.run.simulators import OURS
-    from pipeline.run.store import default_root
     from pipeline.study.manifest import read_manifest
     from pipeline.study.others import Others, found_for, named
 
@@ -84,7 +84,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         cases = []
         for case in manifest.cases:
             files = None if place is None else found_for(case.id, place, alone)
-            others = None if files is None else Others.model_validate({"files": files, **stated}, context={})
+            others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
             cases.append(case.model_copy(update={"simulated": others}))
         out = args.out / "simulators" / name if plans else args.out
         template = Job(cases[0], settings, out, cache=default_root(), fresh=args.fresh, embed=args.embed)

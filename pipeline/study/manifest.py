@@ -10,50 +10,60 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
+from pipeline.load.geometry import LoadError
+from pipeline.load.guard import read_text, status_of
 from pipeline.model import OverWire, Wall, Wire
-from pipeline.ranges import Axis, Direction, Finite, NonNegative, Positive, Vector
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.others import Others, written_out
-from pipeline.study.sources import WHOLE_CASE, PathText, Sources, SourceText, Strict, problem_of
-from pipeline.study.sources import natural_key as natural_key
+from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, saying
+
+MANIFEST_BYTES = 16 * 2**20
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
-    if value not in wires:
+    if not isinstance(value, str) or value not in wires:
         problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
-        raise problem_of(*[problem] * bool(wires))
+        raise saying(*[problem] * bool(wires))
     return wires[value]
-
-
-def _not_yet(value: Any, info: ValidationInfo) -> Any:
-    """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
-    if info.field_name == "parameters":
-        raise problem_of("parameters cannot be read in this version; write the values into [wires] and [case.wall]")
-    if value == "fit":
-        raise problem_of('roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame')
-    return value
 
 
 def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
-    raise ValueError(f'unknown key {info.field_name!r}; write entry = "case:ID"')
+    known = {"entry_case": 'entry = "case:ID"'}
+    raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
+
+
+class Strict(BaseModel):
+    """Unknown keys are errors; values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Case(Strict):
     """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
     role: Literal["validation", "calibration"] = "validation"
-    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1)
+    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()
-    entry_mm: Vector
+    entry_mm: Point
     entry_direction: Direction
     entry: Annotated[str, Field(pattern=r"^(case:.+)?$")] = ""
     entry_case: Annotated["Case | None", BeforeValidator(_not_written)] = None
@@ -61,13 +71,19 @@ class Case(Strict):
     entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
-    insertion_mm: tuple[Positive, ...] | None = None
+    insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
-    lumen: SourceText | None = None
+    lumen: MaskText | None = None
     traces: Sources = ()
-    parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
-    roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
-    lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
+    parameters: PathText | None = None
+    calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
+    own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
+    roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
+    push_force_N: tuple[Finite, ...] | None = None
+    push_force_sigma_N: Positive = 0.001
+    lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
+        default_factory=lambda data: (data.get("entry_mm"),)
+    )
     truth: PathText | None = None
     projections: PathText | None = None
     simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
@@ -86,11 +102,16 @@ class Case(Strict):
         return bool(self.frames or self.traces or self.projections)
 
     @property
+    def stated_roll_deg(self) -> float | tuple[float, ...]:
+        """The roll, one for all frames or one per frame; 0 where it is to be fitted."""
+        return 0.0 if self.roll_deg == "fit" else self.roll_deg
+
+    @property
     def lists(self) -> dict[str, Any]:
         """What must have one entry per frame."""
         catheter = self.catheter and self.catheter.insertion_mm
         named = {"insertion_mm": self.insertion_mm, "catheter insertion_mm": catheter}
-        return {**named, "roll_deg": self.roll_deg, "traces": self.traces}
+        return {**named, "roll_deg": self.stated_roll_deg, "traces": self.traces, "push_force_N": self.push_force_N}
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
@@ -114,7 +135,7 @@ class Case(Strict):
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
         problems += self._over_the_wire()
         if problems:
-            raise problem_of(*problems)
+            raise saying(*problems)
         return self
 
     def _over_the_wire(self) -> list[str]:
@@ -171,7 +192,7 @@ class ManifestTables(Strict):
     @model_validator(mode="after")
     def _entries_known(self) -> "ManifestTables":
         if problems := borrowing_problems({c.id: (c.entry, bool(c.frames or c.traces)) for c in self.case}):
-            raise problem_of(*problems)
+            raise saying(*problems)
         return self
 
     @model_validator(mode="after")
@@ -179,7 +200,7 @@ class ManifestTables(Strict):
         repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
         if repeats:
             what = "this id is used more than once; ids name output folders"
-            raise problem_of(*(f"case {name!r}: {what}" for name in repeats))
+            raise saying(*(f"case {name!r}: {what}" for name in repeats))
         return self
 
 
@@ -198,11 +219,13 @@ class Manifest:
 def read_manifest(path: Path) -> Manifest:
     """Read and check a manifest (not the scans); raises ManifestError with every problem found."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ManifestError([f"{path}: no such manifest"]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ManifestError([f"{path}: not valid TOML: {error}"]) from None
+        if status_of(path) is None:
+            raise ManifestError([f"{path}: no such manifest"])
+        data = tomllib.loads(read_text(path, MANIFEST_BYTES))
+    except LoadError as error:
+        raise ManifestError([str(error)]) from None
+    except (ValueError, RecursionError) as error:
+        raise ManifestError([f"{path}: not valid TOML: {str(error)[:200]}"]) from None
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:

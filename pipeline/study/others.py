@@ -4,13 +4,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import BaseModel, ConfigDict
+
+from pipeline.load.order import natural_key
 from pipeline.load.wires import KINDS, kind_of
 from pipeline.status import InputError
-from pipeline.study.sources import Sources, Strict, natural_key
+from pipeline.study.sources import Sources
 
 
-class Others(Strict):
+class Others(BaseModel):
     """The files of one case. space, unit : of coordinates that no file states; where a file does, both must agree."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     files: Sources = ()
     space: Literal["", "LPS", "RAS"] = ""

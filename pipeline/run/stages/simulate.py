@@ -11,6 +11,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
+from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate
 from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
@@ -25,6 +26,7 @@ NEARLY_MM = 1.0
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
+    known = with_fitted_roll(run, known)
     clamp = clamp_of(run, known)
     known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
     if run.case.simulated is None:
