@@ -26,10 +26,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.atomic import WriteError
-    from reports.html import render_index
     from reports.inside import links_out
-    from reports.schema import SIMULATORS
-    from reports.simulators import render_simulators
 
     found = found_results(args.out)
     if not found:
@@ -54,7 +51,16 @@ def main(args: argparse.Namespace) -> int:
         except (OSError, EOFError, ValueError, KeyError) as error:
             sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
             drawn = False
-    if (args.out / SIMULATORS.file).exists():
-        render_simulators(args.out, embed=args.embed)
-    say(last_line(totals, render_index(args.out, embed=args.embed)))
+    say(last_line(totals, _pages(args.out, embed=args.embed)))
     return 0 if totals.all_ok and drawn else 1
+
+
+def _pages(out: Path, *, embed: bool) -> Path:
+    """The pages over all cases, and of several simulators side by side; the path of the first."""
+    from reports.html import render_index
+    from reports.schema import SIMULATORS
+    from reports.simulators import render_simulators
+
+    if (out / SIMULATORS.file).exists():
+        render_simulators(out, embed=embed)
+    return render_index(out, embed=embed)

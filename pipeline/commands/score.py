@@ -86,7 +86,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
         cases = []
         for case in calibrated:
             files = None if place is None else found_for(case.id, place, alone)
-            others = None if files is None else Others.model_validate({"files": files, **stated}, context={})
+            others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
             cases.append(case.model_copy(update={"simulated": others}))
         out = args.out / "simulators" / name if plans else args.out
         template = Job(cases[0], settings, out, cache=default_root(), fresh=args.fresh, embed=args.embed)

@@ -106,7 +106,8 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
         return OtherFile(path.name, problem=str(error))
     # all readers but that of tables turn what a file states to be RAS
     turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not _stated(path, kind)[0])
-    return _checked(path.name, points * UNITS_MM[in_unit] * (RAS_TO_LPS if turned else 1.0))
+    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # whose reader does it itself
+    return _checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0))
 
 
 def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:

@@ -71,9 +71,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         count = len(scans.frames) or case.frame_count
         problems += _entry_problems(case, scans)
         problems += not_one_per_frame(case.lists, count)
-        problems += _others_problems(case, count)
-        found(lambda: None if case.truth is None else _read(read_truth(case.truth, count)))
-        found(lambda: None if case.projections is None else _read(read_views(case.projections, count)))
+        problems += _told_problems(case, count)
     for source in case.traces:
         found(lambda source=source: _read(read_curve(source.path)))  # type: ignore[misc]
     if case.parameters:
@@ -117,6 +115,17 @@ def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
             f"{case.lumen}: entry_mm {list(case.entry_mm)} lies {away:.0f} mm from the lumen, which spans {spans}; "
             "is one of them in RAS, or in another unit than mm?"
         )
+
+
+def _told_problems(case: Case, count: int) -> list[str]:
+    """What is wrong with the truth, the projections and another simulator's wires."""
+    problems = []
+    for told, read in ((case.truth, read_truth), (case.projections, read_views)):
+        try:
+            _read(None if told is None else read(told, count))
+        except LoadError as error:
+            problems.append(str(error))
+    return problems + _others_problems(case, count)
 
 
 def _others_problems(case: Case, count: int) -> list[str]:

@@ -185,7 +185,7 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         ({"leaf_mm": [0.0, 1.0]}, "leaf_mm"),
         ({"frames": [{"points_px": [[0, 0], [1, 1]]}] * 4}, "one of matrix and c_arm"),
         ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, 0]]}] * 4}, "two different points"),
-        ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, float("nan")]]}] * 4}, "finite"),
+        ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, float("nan")]]}] * 4}, "points_px"),
         ({"frames": [{"matrix": np.eye(4)[[0, 1, 3]].tolist(), "points_px": [[0, 0], [1, 1]]}] * 4}, "source"),
         ({"translate": "none"}, "translate"),
     ):

@@ -57,7 +57,7 @@ def _pages(run: Path) -> list[Path]:
     return [run / "index.html", *(f / "report.html" for f in find_cases(run))]
 
 
-PAGES = ("case", "run", "simulators", "bench")
+PAGES = ("case", "run", "simulators", "calibration", "bench")
 
 
 def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
