@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.case_files import GOOD, WORST
 from reports.schema import SUMMARY, Column
 
 Grid = dict[str, Any]
@@ -95,8 +96,12 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
 
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
-    """One row per case, linked to its page."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=(summary["frames_failed"] > 0).fillna(value=False))
+    """One row per case, linked to its page; worst first: what failed, then by the 95th percentile."""
+    failed = ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
+    # stable, so that equal cases stay in the order of the manifest
+    order = summary.assign(_failed=failed).sort_values(["_failed", WORST], ascending=False, kind="stable").index
+    summary = summary.loc[order]
+    table = grid(summary, SUMMARY.shown("cases"), bad=failed.loc[order])
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, new_figure, plain
-from reports.figures._style import GREY, SIMULATED
+from reports.figures._style import GREY
 from reports.figures.run import RunFiles
 
 _MOST_MM = 100.0  # beyond it a frame may as well have failed
