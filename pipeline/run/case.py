@@ -15,6 +15,7 @@ from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.provenance import collect, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import Store, code_of, digest
+from pipeline.run.view import write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -105,7 +106,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
         tables.write(job.folder / POINTS.file, POINTS, points)
     outputs.write_frames(job.folder / "frames.h5", known)
     if job.pictures:
-        outputs.write_view(job.folder / "view", known)
+        write_view(job.folder / "view", known)
     details = results.details_of(job.case, known, log)
     details |= {"config": job.settings.as_dict(), "provenance": collect()}
     summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
