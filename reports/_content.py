@@ -95,13 +95,19 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     return [*cards(entries, row), {"value": number(row["insertions"]), "label": number(row["interval"])}]
 
 
+def worst_first(summary: pd.DataFrame) -> pd.DataFrame:
+    """The rows of summary.csv, cases with failed frames first, then by WORST; equal ones as the manifest has them."""
+    order = summary.assign(failed=_failed(summary)).sort_values(["failed", WORST], ascending=False, kind="stable").index
+    return summary.loc[order]
+
+
+def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
+    return ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
+
+
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
-    """One row per case, linked to its page; worst first: what failed, then by the 95th percentile."""
-    failed = ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
-    # stable, so that equal cases stay in the order of the manifest
-    order = summary.assign(_failed=failed).sort_values(["_failed", WORST], ascending=False, kind="stable").index
-    summary = summary.loc[order]
-    table = grid(summary, SUMMARY.shown("cases"), bad=failed.loc[order])
+    """One row per case, linked to its page."""
+    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary))
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

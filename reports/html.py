@@ -111,13 +111,14 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = _read_cases(out_dir)
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
-    whole = read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos = list(runs.values())
-    errors = {case.name: case.errors for case in cases}
+    found = {case.name: case.errors for case in cases}
+    errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
     page = {
@@ -129,7 +130,8 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         "failures": failures,
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
-        "sections": draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed),
+        # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
+        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed), key=_is_tall),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
@@ -157,6 +159,10 @@ def _case_verdict(case: CaseFiles) -> str:
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     counts = f"{good} of {planned} frames have a result." if planned and good != planned else ""
     return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", verdict(case.statistics))))
+
+
+def _is_tall(section: Mapping[str, Any]) -> bool:
+    return int(section["height"]) > int(section["width"])
 
 
 def _typed(infos: Sequence[Mapping[str, Any]]) -> Sequence[str]:

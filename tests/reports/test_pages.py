@@ -249,3 +249,22 @@ def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
     render_case(out / "cases" / "c")
     assert not list(figures.glob("error_along_wire*"))
     assert (figures / "contact_along_wire.png").exists()
+
+
+def test_cases_come_worst_first_and_a_tall_map_leaves_the_first_screen(tmp_path: Path) -> None:
+    cases = tuple(FakeCase(f"c{i:02d}", frames=2, error_mm=0.1 + 0.01 * i, simulated_only=False) for i in range(3))
+    out = write_run(tmp_path / "out", (*cases, FakeCase("bad", frames=3, failed=(1,), error_mm=0.05)))
+    text = render_index(out).read_text(encoding="utf-8")
+    table = text[text.index('<h2 id="cases">') :]
+    assert re.findall(r'<tr[^>]*><td class="text">(?:<a[^>]*>)?(\w+)', table)[:4] == ["bad", "c02", "c01", "c00"]
+    shutil.rmtree(out)
+    many = tmp_path / "many"
+    for i in range(45):
+        folder = many / "cases" / f"c{i:02d}"
+        folder.mkdir(parents=True)
+        tables.write(folder / "errors.csv", ERRORS, [{"frame": 0, "status": "ok", "rms_mm": 0.1, "p95_mm": 0.2}])
+        (folder / "result.json").write_text(json.dumps({"case": folder.name, "status": "ok"}))
+    rows = [{"case": f"c{i:02d}", "status": "ok", "frames": 1, "frames_ok": 1, "rms_mm": 0.1} for i in range(45)]
+    tables.write(many / "summary.csv", SUMMARY, rows)
+    ids = re.findall(r'<h2 id="(\w+)"', render_index(many).read_text(encoding="utf-8"))
+    assert ids.index("planned_within") < ids.index("cases") < ids.index("case_frame_map")
