@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam truth clean
+.PHONY: setup validate planted test browser lint study bars baseline anatomies bench stress peers aneurism conebeam truth clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -23,6 +23,11 @@ planted: setup
 
 test: setup lint
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
+
+# the pages in a browser (needs a Chromium on the path, and the network once)
+browser: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[browser]'
+	$(BIN)/python -m pytest -q tests/reports/test_browser.py
 
 lint: setup
 	$(BIN)/ruff check .

@@ -92,7 +92,8 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     if table.empty:
         return []
     row = {str(name): value for name, value in table.iloc[0].items()}
-    return [*cards(entries, row), {"value": number(row["insertions"]), "label": number(row["interval"])}]
+    rests = f"insertions stand behind the intervals ({number(row['interval'])})"
+    return [*cards(entries, row), {"value": number(row["insertions"]), "label": rests}]
 
 
 def worst_first(summary: pd.DataFrame) -> pd.DataFrame:

@@ -13,6 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     parser.add_argument("out", type=Path, metavar="OUT")
     parser.add_argument("--embed", action="store_true", help="put the pictures into the pages: one file a page")
+    parser.add_argument("--pdf", action="store_true", help="also write summary.pdf, four pages on paper")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -37,5 +38,10 @@ def main(args: argparse.Namespace) -> int:
         except (OSError, EOFError, ValueError, KeyError) as error:
             sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
             drawn = False
-    say(last_line(totals, render_index(args.out, embed=args.embed)))
+    page = render_index(args.out, embed=args.embed)
+    if args.pdf:
+        from reports.pdf import write_pdf
+
+        say(f"summary: {write_pdf(args.out)}")
+    say(last_line(totals, page))
     return 0 if totals.all_ok and drawn else 1

@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from itertools import cycle
 from typing import Any
 
-from reports.colours import BAD, SIMULATED, TRACED, TRUE
+from reports.colours import BAD, TRUE
+from reports.colours import SIMULATED as SIMULATED
+from reports.colours import TRACED as TRACED
 from reports.schema import ERRORS
 
 Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells

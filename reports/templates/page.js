@@ -66,8 +66,6 @@
     all("thead th", table).forEach((head) => {
       head.querySelector("button")?.addEventListener("click", () => sortBy(table, head, head.getAttribute("aria-sort") === "ascending"));
     });
-    const first = table.querySelector("th[data-first]");
-    if (first) sortBy(table, first, true);
     const show = () => {
       const words = box.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean);
       const only = box.querySelector("select")?.value ?? "";
@@ -96,6 +94,14 @@
   addEventListener("beforeprint", () => { folded = all("details:not([open])"); folded.forEach((part) => { part.open = true; }); });
   addEventListener("afterprint", () => folded.forEach((part) => { part.open = false; }));
 
+  // a page whose template lists no contents gets them from its headings
+  const nav = document.querySelector("nav.contents");
+  if (!nav.children.length) for (const head of all("main h2[id]")) {
+    const link = document.createElement("a");
+    link.href = `#${head.id}`;
+    link.textContent = head.textContent;
+    nav.append(link);
+  }
   const links = new Map(all("nav.contents a[href^='#']").map((link) => [link.hash.slice(1), link]));
   const watcher = new IntersectionObserver((seen) => {
     for (const { target, isIntersecting } of seen) if (isIntersecting) {
