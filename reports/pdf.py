@@ -22,6 +22,7 @@ from reports.verdict import next_command, verdict, worst_frames
 _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
+_LEAST_WIDTH = 0.3  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
 _LINE = 0.0165  # of the page's height, for type of 9 points
 
 
@@ -44,19 +45,21 @@ class _Page:
             self.at -= step
         self.at -= 0.4 * step
 
-    def picture(self, path: Path, most: float = 0.4) -> None:
-        """A figure at full width, or as high as ``most`` of the page and as what is left of it."""
+    def picture(self, path: Path, entry: Mapping[str, str], most: float) -> None:
+        """A figure with its title and caption, at full width or as high as ``most`` of the page and as its rest."""
         image = imread(path)
-        room = min(most, self.at - _BOTTOM)
+        room = min(most, self.at - _BOTTOM - 5 * _LINE)
         wide = _RIGHT - _LEFT
         high = wide * image.shape[0] / image.shape[1] * _A4_INCH[0] / _A4_INCH[1]
         shrink = min(1.0, room / high)
-        if room < 0.05:
+        if shrink < _LEAST_WIDTH:
             return
+        self.text(entry["title"], size=10.5, weight="bold")
         axes = self.figure.add_axes((_LEFT, self.at - shrink * high, shrink * wide, shrink * high))
         axes.imshow(image, interpolation="antialiased")
         axes.set_axis_off()
         self.at -= shrink * high + 0.015
+        self.text(entry["read"], size=8)
 
     def table(self, rows: Sequence[Sequence[str]], widths: Sequence[float]) -> None:
         """Rows of texts, the first as heading; ``widths``: of the columns, in sum the page's."""
@@ -124,9 +127,7 @@ def _draw(page: _Page, folder: Path, names: Sequence[str]) -> _Page:
     for name in names:
         path = folder / "figures" / f"{name}.png"
         if path.exists():
-            page.text(entries[name]["title"], size=10.5, weight="bold")
-            page.picture(path, most=0.38)
-            page.text(entries[name]["read"], size=8)
+            page.picture(path, entries[name], most=0.38)
     return page
 
 
@@ -154,7 +155,7 @@ def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
         + [_content.number(row[name]) for name in heads[3:]]
         for row in summary.head(_MOST_CASES).to_dict("records")
     ]
-    page.table([heads, *rows], (0.22, 0.17, 0.08, 0.075, 0.075, 0.11, 0.11))
+    page.table([heads, *rows], (0.22, 0.17, 0.08, 0.07, 0.07, 0.12, 0.11))
     if len(summary) > _MOST_CASES:
         page.text(f"… and {len(summary) - _MOST_CASES} more in summary.csv")
     page.text("Settings that are not defaults", size=10.5, weight="bold")

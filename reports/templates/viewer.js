@@ -284,7 +284,7 @@
     pen.fillStyle = ink; pen.textAlign = "center";
     for (let s = 0; s <= length + 1e-9; s += step) { pen.strokeStyle = line; pen.beginPath(); pen.moveTo(X(s), bottom); pen.lineTo(X(s), bottom + 4); pen.stroke(); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
     pen.fillText("arc length along the traced wire, mm", LEFT + (width - LEFT - RIGHT) / 2, bottom + 33);
-    pen.textAlign = "left"; pen.fillText(`offset across the traced wire, magnified ${Math.max(1, Math.round(tall / across))} times`, LEFT, 13);
+    pen.textAlign = "left"; pen.fillText(`offset across the traced wire, \u00d7 ${Math.max(1, Math.round(tall / across))}`, LEFT, 13);
     if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; pen.beginPath(); pen.moveTo(X(cursor.s), TOP); pen.lineTo(X(cursor.s), bottom); pen.stroke(); }
   };
   dragged($("straight"), (e) => {
