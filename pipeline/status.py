@@ -10,6 +10,7 @@ class FrameStatus(Enum):
 
     OK = "traced, simulated to its depth, converged and compared"
     SIMULATED = "simulated only: the case has no frames to compare with"
+    ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
     LOAD_FAILED = "the scan could not be read; see failures.csv for the file and the reason"
     SEGMENT_FAILED = "no lumen could be segmented; see failures.csv for the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"

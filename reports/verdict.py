@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import GOOD, WORST
+from reports.case_files import WORST
 
 _MANY = 5
 
@@ -45,11 +45,11 @@ def _against(statistics: Mapping[str, Any]) -> str:
 
 
 def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The frames with a result that are worst, worst first: case, frame, text and link of each.
+    """The frames that are scored and worst, worst first: case, frame, text and link of each.
 
     tables : errors.csv by case.     links : of the cases' pages.
     """
-    good = {case: table[table["status"].isin(GOOD) & table[WORST].notna()] for case, table in tables.items()}
+    good = {case: table[table["status"].eq("ok") & table[WORST].notna()] for case, table in tables.items()}
     rows = [(float(v), case, int(n)) for case, t in good.items() for n, v in zip(t["frame"], t[WORST], strict=True)]
     rows.sort(key=lambda row: (-row[0], *row[1:]))
     return [

@@ -35,7 +35,7 @@ def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
     frames = [_frame(case.read_frame(n), rows.loc[n] if n in rows.index else {}, shrink) for n in numbers]
     if not any(frame["curves"] or frame["pictures"] for frame in frames):
         return None
-    worst = [frame["p95_mm"] if frame["good"] else None for frame in frames]
+    worst = [frame["p95_mm"] if frame["status"] == "ok" else None for frame in frames]
     start = max(range(len(frames)), key=lambda i: (worst[i] is not None, worst[i] or 0.0, i))
     errors = [e for frame in frames for e in frame["error_mm"] if e is not None]
     top = float(np.percentile(errors, 99)) if errors else 0.0

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pipeline.study.settings import Resolved, Setting
 
-VERBS = ("check", "run", "report", "diff", "synth", "bench", "cache")
+VERBS = ("check", "run", "calibrate", "report", "diff", "synth", "bench", "cache")
 """In the order of --help."""
 
 

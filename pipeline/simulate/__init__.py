@@ -12,7 +12,7 @@ from pipeline.ranges import Profile
 from pipeline.simulate.config import COARSEST_MM, Segment, SimulateConfig, SolverConfig
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 
-__all__ = ["LEVELS", "altered", "guide_wire", "insertion_of", "simulate", "together"]
+__all__ = ["LEVELS", "altered", "guide_wire", "inserted", "insertion_of", "simulate", "together"]
 
 
 LEVELS = ("wall_look_ups_done_fraction", "start_energy_N_mm")
@@ -96,9 +96,22 @@ def insertion_of(
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it."""
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
     friction = wall.friction if config.friction is None else config.friction
+    vessel = _wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction)
+    return inserted(vessel, altered(wire, config), clamp, solver, config.bending_scale, catheter)
+
+
+def inserted(
+    vessel: VesselWall,
+    wire: Wire,
+    clamp: Clamp,
+    solver: SolverConfig,
+    bending_scale: float = 1.0,
+    catheter: OverWire | None = None,
+) -> Insertion:
+    """A wire clamped at the entry of a vessel whose wall is there already, before its first push."""
     return Insertion(
-        guide_wire(altered(wire, config), solver.segment_mm, config.bending_scale),
-        _wall_of(lumen.distance, solver.hull).like(stiffness_N_mm2=stiffness, friction=friction),
+        guide_wire(wire, solver.segment_mm, bending_scale),
+        vessel,
         clamp.entry_mm,
         clamp.direction,
         method=solver.method,

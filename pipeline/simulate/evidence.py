@@ -66,17 +66,22 @@ def _bell(a: Sight, b: Sight) -> Array:
 
 def covariance_of(sights: Sequence[Sight], voxel_mm: float) -> Array:
     """Covariance of one component of all points of all frames: of the traces, and of what the wire may be off."""
+    noise = covariance_of_traces(sights, voxel_mm)
+    modes = [_modes(sight, voxel_mm) for sight in sights]
+    all_modes, own_modes = np.concatenate(modes), block_diag(*modes)
+    noise += MODEL_SHARED * all_modes @ all_modes.T + (1.0 - MODEL_SHARED) * own_modes @ own_modes.T
+    return np.asarray(noise)
+
+
+def covariance_of_traces(sights: Sequence[Sight], voxel_mm: float) -> Array:
+    """Covariance of one component of all points of all frames by what the traces are off."""
     arc = np.concatenate([sight.arc_mm for sight in sights])
     sigma = np.concatenate([_sigma(sight, voxel_mm) for sight in sights])
     all_bells, own_bells = np.block([[_bell(a, b) for b in sights] for a in sights]), [_bell(a, a) for a in sights]
     shared = np.sqrt(SHARED_FARTHER + (SHARED - SHARED_FARTHER) * np.exp(-0.5 * (arc / SHARED_MM) ** 2))
     alone = np.sqrt(1.0 - shared**2)
     bells = all_bells * np.outer(shared, shared) + block_diag(*own_bells) * np.outer(alone, alone)
-    noise = ((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma)
-    modes = [_modes(sight, voxel_mm) for sight in sights]
-    all_modes, own_modes = np.concatenate(modes), block_diag(*modes)
-    noise += MODEL_SHARED * all_modes @ all_modes.T + (1.0 - MODEL_SHARED) * own_modes @ own_modes.T
-    return np.asarray(noise)
+    return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma))
 
 
 def posterior(residual: Array, jacobian: Array, noise: Array, sigmas: Array, at: Array) -> tuple[Array, Array, Array]:

@@ -3,23 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from pipeline.model import Clamp, Curve
+from pipeline.model import Clamp
 from pipeline.run.log import Log
-from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.given import manifest_clamp, seen_in
+from pipeline.run.stages.known import Context, Known
 from pipeline.run.stages.load import open_case
+from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.trace import trace_frames
 from pipeline.simulate import altered, insertion_of, together
-from pipeline.simulate.clamp import Prior, Seen, estimated_clamp
+from pipeline.simulate.clamp import Seen, estimated_clamp
 from pipeline.simulate.resolution import lengths_mm
-from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from solver import Solution
-
-ENTRY_SIGMA_VOXELS = 0.5
-"""How well a point of a scan can be pointed at."""
 
 
 def clamp_of(run: Context, known: Known) -> Clamp:
@@ -29,12 +25,7 @@ def clamp_of(run: Context, known: Known) -> Clamp:
         return given
     if run.case.entry_case is not None:
         return _of_another(run, run.case.entry_case, given)
-    seen = [
-        Seen(frame.index, curve, frame.roll_deg, frame.catheter_mm)
-        for frame in known.frames
-        if (curve := frame.trusted_curve or _faint(frame)) is not None
-    ]
-    seen = seen if any(frame.trusted_curve for frame in known.frames) else []
+    seen = seen_in(known.frames) if any(frame.trusted_curve for frame in known.frames) else []
     clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
     run.log.assumptions += [clamp.note] * bool(clamp.note)
     run.log.warnings += [clamp.warning] * bool(clamp.warning)
@@ -44,30 +35,13 @@ def clamp_of(run: Context, known: Known) -> Clamp:
 def _of_another(run: Context, other: Case, given: Clamp) -> Clamp:
     """The clamp that another insertion of the same fixation shows: nothing of this case's own scans is in it."""
     silent = Context(other, run.config, run.store, Log(lambda *_: None))
-    known = trace_frames(silent, segment_vessel(silent, open_case(silent, Known())))
+    known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
     clamp = clamp_of(silent, known)
     run.log.assumptions.append(
         f"the clamp is blind to this case's scans, it is that of case {other.id!r}: {clamp.note}"
     )
     run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
     return replace(clamp, material_axis=given.material_axis, down=given.down)
-
-
-def _faint(frame: Frame) -> Curve | None:
-    """The curve of a frame of too low a contrast: its tip may be missed, its beginning is as good as its sigma says."""
-    return frame.curve if frame.traced and frame.status == FrameStatus.TRACE_LOW_CONTRAST.identifier else None
-
-
-def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
-    """The clamp as the manifest has it, how well it knows it, and the voxels' size, mm."""
-    case = run.case
-    assert known.lumen is not None
-    voxel = float(np.mean(known.lumen.distance.spacing_mm))
-    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
-    direction = np.array(case.entry_direction) / np.linalg.norm(case.entry_direction)
-    given = Clamp(np.array(case.entry_mm), direction, axis, down)
-    sigma = ENTRY_SIGMA_VOXELS * voxel if case.entry_sigma_mm is None else case.entry_sigma_mm
-    return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
 
 
 def _replayed(

@@ -19,8 +19,10 @@ def open_case(run: Context, known: Known) -> Known:
     wrong = not_one_per_frame(case.lists, count)
     if wrong:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
-    offset = run.config.simulate.roll_offset_deg
-    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(case.roll_deg, count))]
+    run.log.assumptions += [case.calibrated] * bool(case.calibrated)
+    run.log.warnings += [case.own_parameters] * bool(case.own_parameters)
+    offset, rolls = run.config.simulate.roll_offset_deg, case.stated_roll_deg
+    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(rolls, count))]
     if case.catheter:
         tips = each_frame(case.catheter.insertion_mm, count)
         frames = [replace(f, catheter_mm=tip) for f, tip in zip(frames, tips, strict=True)]

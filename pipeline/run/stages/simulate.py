@@ -10,6 +10,7 @@ from pipeline.model import Clamp
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate import LEVELS, altered, insertion_of, simulate
 from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
@@ -26,6 +27,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
     lumen, case, config, log = known.lumen, run.case, run.config, run.log
     assert lumen is not None
+    known = with_fitted_roll(run, known)
     clamp = clamp_of(run, known)
     frames = [_with_depth(frame, config.simulate.depth, clamp) for frame in known.frames]
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
