@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test lint study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -29,6 +29,11 @@ calibrated: setup
 
 test: setup lint
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
+
+# the pages in a browser (needs a Chromium on the path, and the network once)
+browser: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[browser]'
+	$(BIN)/python -m pytest -q tests/reports/test_browser.py
 
 lint: setup
 	$(BIN)/ruff check .

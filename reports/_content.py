@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.case_files import GOOD, WORST
 from reports.schema import SUMMARY, Column
 
 Grid = dict[str, Any]
@@ -91,12 +92,23 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     if table.empty:
         return []
     row = {str(name): value for name, value in table.iloc[0].items()}
-    return [*cards(entries, row), {"value": number(row["insertions"]), "label": number(row["interval"])}]
+    rests = f"insertions stand behind the intervals ({number(row['interval'])})"
+    return [*cards(entries, row), {"value": number(row["insertions"]), "label": rests}]
+
+
+def worst_first(summary: pd.DataFrame) -> pd.DataFrame:
+    """The rows of summary.csv, cases with failed frames first, then by WORST; equal ones as the manifest has them."""
+    order = summary.assign(failed=_failed(summary)).sort_values(["failed", WORST], ascending=False, kind="stable").index
+    return summary.loc[order]
+
+
+def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
+    return ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
 
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
     """One row per case, linked to its page."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=(summary["frames_failed"] > 0).fillna(value=False))
+    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary))
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

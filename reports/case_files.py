@@ -15,6 +15,8 @@ from reports.frames_file import FrameArrays, ScanCrop
 from reports.schema import ERRORS, POINTS, TIMINGS
 
 GOOD = ("ok", "simulated", "roll_fitted")
+WORST = "p95_mm"
+"""The one metric by which a frame or a case is called worst, wherever that is said."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,9 +74,16 @@ def read(path: Path, table: Table) -> pd.DataFrame:
         ) from error
 
 
+_EMPTY: dict[tuple[str, ...], pd.DataFrame] = {}
+
+
 def read_if_there(path: Path | None, table: Table) -> pd.DataFrame:
     """Read a table; without a file it has no rows, and every column in its kind."""
-    return read(path, table) if path is not None and path.exists() else _conform(pd.DataFrame(), table)
+    if path is not None and path.exists():
+        return read(path, table)
+    if table.names not in _EMPTY:  # kept: the page of 500 cases asks for thousands
+        _EMPTY[table.names] = _conform(pd.DataFrame(), table)
+    return _EMPTY[table.names].copy()
 
 
 def has(content: pd.DataFrame, *columns: str) -> bool:

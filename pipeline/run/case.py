@@ -17,6 +17,7 @@ from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import code_of, digest
+from pipeline.run.view import write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -153,7 +154,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
             tables.write(job.folder / table.file, table, rows)
     outputs.write_frames(job.folder / ledger.FRAMES, known)
     if job.pictures:
-        outputs.write_view(job.folder / "view", known)
+        write_view(job.folder / "view", known)
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})

@@ -1,7 +1,6 @@
 """What is written of a case beside result.json.
 
-A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5, and the files
-that 3D Slicer and ParaView open; LPS mm.
+A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5. LPS mm.
 """
 
 from collections.abc import Sequence
@@ -10,23 +9,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
-from pipeline.model import Array, Lumen, Volume, arc_length
+from pipeline.model import Volume
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
+from pipeline.run.view import contact_at
 from pipeline.study.manifest import Case
-from reports import export, frames_file
+from reports import frames_file
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
 BEYOND = 2.0
 """Times u, beyond which an error is the model's."""
-SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
 def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, Any]:
@@ -111,22 +109,6 @@ def with_strongest(errors: Sequence[dict[str, Any]], summary: Row) -> list[dict[
     return [row | {"skill_strongest": skill, "strongest_null": name} for row, skill in zip(errors, skills, strict=True)]
 
 
-def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
-    """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
-
-    Forces of joints are added up, so that their sum does not depend on the length of the segments.
-    """
-    if frame.solved is None:
-        return np.full(len(arc_mm), np.nan)
-    arc = arc_length(frame.solved.joints_mm)
-    # what lies before the first of them, in the clamp's reach, is none of theirs
-    there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
-    force = np.zeros((len(arc_mm), 3))
-    nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
-    np.add.at(force, nearest, frame.solved.contact_force_N[there])
-    return np.asarray(np.linalg.norm(force, axis=1))
-
-
 def point_columns(frames: Sequence[Frame]) -> dict[str, NDArray[Any]]:
     """points.csv.gz as columns; empty where nothing was compared."""
     parts = [_points(frame) for frame in frames if frame.comparison is not None]
@@ -180,14 +162,6 @@ def write_frames(path: Path, known: Known) -> None:
     frames_file.write_frames(path, scan, map(_arrays_of, known.frames))
 
 
-def write_view(folder: Path, known: Known) -> None:
-    """The lumen and every frame's wires, each in a file."""
-    if known.lumen is not None:
-        _write_lumen(folder, known.lumen)
-    for frame in known.frames:
-        _write_wires(folder, frame)
-
-
 def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
     curve, wire, errors = frame.curve, frame.simulated, frame.comparison
     return frames_file.FrameArrays(
@@ -206,37 +180,3 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,
         mips=dict(enumerate(frame.projections)),
     )
-
-
-def _write_lumen(folder: Path, lumen: Lumen) -> None:
-    grid = lumen.distance
-    inside = (grid.values < 0).astype(np.uint8)
-    export.write_segmentation_nrrd(
-        folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
-    )
-    if inside.any() and not inside.all():
-        # a copy, since marching cubes wants to write
-        vertices, triangles, _, _ = marching_cubes(np.array(grid.values, dtype=np.float32), 0.0)
-        export.write_surface_vtp(folder / "lumen.vtp", grid.to_mm(vertices), triangles)
-
-
-def _write_wires(folder: Path, frame: Frame) -> None:
-    name = f"{frame.index:03d}"
-    if frame.curve is not None and frame.traced:
-        path = folder / f"wire_traced_{name}.mrk.json"
-        export.write_markups_curve(path, frame.curve.points_mm, f"traced {name}")
-    if frame.simulated is None:
-        return
-    points = joints = frame.simulated.joints_mm
-    path = folder / f"wire_simulated_{name}.mrk.json"
-    export.write_markups_curve(path, joints, f"simulated {name}", colour=SIMULATED_COLOUR)
-    arrays: dict[str, Any] = {} if frame.solved is None else {"contact_force_N": frame.solved.contact_force_N}
-    if frame.comparison is not None and frame.view is None:
-        errors = frame.comparison
-        along = arc_length(joints)
-        reach = along[along < errors.arc_mm[0] - 1e-9]
-        arc = np.concatenate([reach, errors.arc_mm])
-        points = np.concatenate([joints[: len(reach)], errors.sample_mm])
-        arrays = {"error_mm": np.concatenate([np.full(len(reach), np.nan), errors.error_mm]), "arc_mm": arc}
-        arrays |= {} if frame.solved is None else {"contact_force_N": contact_at(frame, arc)}
-    export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)

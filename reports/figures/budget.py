@@ -5,8 +5,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from reports.case_files import CaseFiles
+from reports.colours import BAD, SIMULATED, TRACED
 from reports.figures._drawing import Drawing, legend, new_figure, plain
-from reports.figures._style import GREY, SIMULATED, SKY, TRACED, VERMILION, Look
+from reports.figures._style import GREY, PURPLE, Look
 from reports.schema import BUDGET, ENTRIES
 from reports.tables import has, read_if_there
 
@@ -33,7 +34,7 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     places = np.arange(len(table))
     colours = [{"u_val": TRACED, "error": SIMULATED}.get(name, GREY) for name in table["source"]]
     axes.barh(places - 0.15, table["u_mm"], 0.45, color=colours)
-    axes.barh(places + 0.25, table["distal_u_mm"], 0.2, color=SKY, label="last 10 mm")
+    axes.barh(places + 0.25, table["distal_u_mm"], 0.2, color=PURPLE, label="last 10 mm")
     names = [name.replace("_", " ") for name in table["source"]]
     axes.set_yticks(places, ["error" if n == "error" else "all: u val" if n == "u val" else n for n in names])
     axes.invert_yaxis()
@@ -45,8 +46,8 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
 def _by_entry(axes: Axes, table: pd.DataFrame) -> None:
     places = np.arange(len(table))
     axes.plot(table["rms_mm"], places, "o", color=SIMULATED, label="rms")
-    axes.plot(table["distal10_rms_mm"], places, "s", color=SKY, label="last 10 mm")
-    axes.plot(table["tip_median_mm"], places, "x", color=VERMILION, label="tip, median")
+    axes.plot(table["distal10_rms_mm"], places, "s", color=PURPLE, label="last 10 mm")
+    axes.plot(table["tip_median_mm"], places, "x", color=BAD, label="tip, median")
     rows = zip(table["clamp"], table["depth"], strict=True)
     axes.set_yticks(places, [f"clamp {clamp},\ndepth {depth}" for clamp, depth in rows], fontsize=8)
     axes.set_ylim(len(table) - 0.5, -0.5)

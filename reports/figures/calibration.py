@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from reports.colours import BAD, SIMULATED
 from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, positive_axis
-from reports.figures._style import BLUE, GREY, ORANGE, VERMILION
+from reports.figures._style import BROWN, GREY
 
 HIGHEST = 12.0
 """Rise up to which profiles are drawn: what lies above is out of the question."""
@@ -24,16 +25,16 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
     for axes, (name, points) in zip(panels, found.items(), strict=True):
         row = rows[name]
         curve = np.array(sorted([*points, [row["value"], 0.0]]))
-        axes.plot(curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9), color=BLUE, marker=".", markersize=4)
-        axes.plot([row["value"]], [0.0], color=BLUE, marker="o")
+        axes.plot(curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9), color=SIMULATED, marker=".", markersize=4)
+        axes.plot([row["value"]], [0.0], color=SIMULATED, marker="o")
         axes.axhline(1.0, color=GREY, linestyle="--", linewidth=0.8)
         low, high = _span(row)
         if low < row["prior"] < high:
-            axes.axvline(row["prior"], color=ORANGE, linestyle=":", linewidth=1.2)
+            axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
         axes.set_xlim(low, high)
         axes.set_ylim(-0.4, HIGHEST)
         verdict = "" if row["seen"] else ": not seen"
-        axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else VERMILION))
+        axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
         plain(axes)
         table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
     return Drawing(figure, pd.DataFrame(table))
@@ -71,10 +72,10 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
     figure, panels = lattice(len(cases), 3, row_inch=2.4, more_inch=0.3)
     for axes, case in zip(panels, cases, strict=True):
         own = table[table["case"] == case]
-        for column, colour, label in (("before_mm", GREY, "as stated"), ("after_mm", BLUE, "calibrated")):
+        for column, colour, label in (("before_mm", GREY, "as stated"), ("after_mm", SIMULATED, "calibrated")):
             axes.plot(own["frame"], own[column], color=colour, marker="o", markersize=3.5, linewidth=1.0, label=label)
         light = own[own["weight"] < 0.99]
-        axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=BLUE)
+        axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
         axes.set_title(str(case), fontsize=9)
         axes.set_xlabel("frame")
         plain(axes)

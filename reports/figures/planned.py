@@ -3,10 +3,12 @@
 import numpy as np
 import pandas as pd
 
+from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, new_figure, plain
-from reports.figures._style import GREY, SIMULATED
+from reports.figures._style import GREY
 from reports.figures.run import RunFiles
 
+_CLEAR_CURVES = 15
 _MOST_MM = 100.0  # beyond it a frame may as well have failed
 
 
@@ -20,8 +22,10 @@ def planned_within(run: RunFiles) -> Drawing | None:
     figure = new_figure(3.4)
     axes = figure.subplots()
     if len(planned) > 1:
+        pale = min(1.0, _CLEAR_CURVES / len(planned))  # hundreds become a cloud, dense where most cases are
         for case, values in found.items():
-            axes.step(*_curve(values, planned[case], everything[-1]), where="post", color=GREY, linewidth=0.8)
+            curve = _curve(values, planned[case], everything[-1])
+            axes.step(*curve, where="post", color=GREY, linewidth=0.8, alpha=pale)
     across, share = _curve(everything, sum(planned.values()), everything[-1])
     axes.step(across, share, where="post", color=SIMULATED, linewidth=2.0)
     axes.set_ylim(0.0, 1.02)

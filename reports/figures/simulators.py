@@ -6,8 +6,9 @@ from itertools import cycle
 import pandas as pd
 from matplotlib.axes import Axes
 
+from reports.colours import SIMULATED, TRACED, TRUE
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
-from reports.figures._style import GREEN, ORANGE, PALETTE, PURPLE, SIMULATED, VERMILION
+from reports.figures._style import BROWN, PURPLE, ROSE, SLATE
 
 OURS = "wireval"
 _FAINT = 0.3  # of a lead that is not clear
@@ -23,7 +24,7 @@ class SimulatorFiles:
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
     """The solver's own in its colour, every other simulator in one of its own."""
-    spare = cycle((ORANGE, GREEN, PURPLE, VERMILION, *PALETTE[5:]))
+    spare = cycle((TRACED, TRUE, PURPLE, BROWN, ROSE, SLATE))
     return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
 
 

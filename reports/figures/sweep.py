@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from reports.colours import SIMULATED, TRUE
 from reports.figures._drawing import Drawing, lattice, legend, plain
-from reports.figures._style import BLUE, GREEN, GREY, Look
+from reports.figures._style import GREY, Look
 from reports.figures.run import RunFiles
 from reports.tables import has
 
@@ -15,8 +16,8 @@ UNCHANGED = "(plain)"  # the parameter of the rows of sweep.csv in which nothing
 POOLED = "(all)"  # the case of the rows over all cases
 _LOG_FROM_RATIO = 5.0
 _STYLES: tuple[tuple[str, str, Look], ...] = (
-    ("rms_mm", "to the traced wire", {"color": BLUE, "marker": "o"}),
-    ("truth_rms_mm", "to the true wire", {"color": GREEN, "marker": "D", "linestyle": ":"}),
+    ("rms_mm", "to the traced wire", {"color": SIMULATED, "marker": "o"}),
+    ("truth_rms_mm", "to the true wire", {"color": TRUE, "marker": "D", "linestyle": ":"}),
 )
 
 
@@ -58,15 +59,13 @@ def _panel(axes: Axes, rows: pd.DataFrame) -> None:
         if has(whole, column):
             axes.plot(whole["place"], whole[column], markersize=4, label=label, **look)
     unchanged = whole[whole["in_use"]]
-    axes.plot(
-        unchanged["place"], unchanged["rms_mm"], "o", color=BLUE, fillstyle="none", markersize=10, label="unchanged"
-    )
+    ring: Look = {"color": SIMULATED, "fillstyle": "none", "markersize": 10, "label": "unchanged"}
+    axes.plot(unchanged["place"], unchanged["rms_mm"], "o", **ring)
     shown = [whole["rms_mm"], whole["truth_rms_mm"]]
     if len(unchanged) and has(whole, "rms_ratio_low"):
         base = float(unchanged["rms_mm"].iloc[0])
-        axes.vlines(
-            whole["place"], base * whole["rms_ratio_low"], base * whole["rms_ratio_high"], color=BLUE, linewidth=1.5
-        )
+        ends = base * whole["rms_ratio_low"], base * whole["rms_ratio_high"]
+        axes.vlines(whole["place"], *ends, color=SIMULATED, linewidth=1.5)
     # the whole range from zero: a slope must not be drawn steeper than it is
     axes.set_ylim(bottom=0.0, top=1.1 * max(float(np.nan_to_num(values.max())) for values in shown))
     axes.set_ylabel("pooled rms distance, mm")

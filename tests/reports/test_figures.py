@@ -14,7 +14,8 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
+from reports.colours import TRACED
+from reports.figures import RunFiles, _drawing, _planes, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
@@ -61,8 +62,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
-    absent = {"failed_projections", "simulated_wires", "views"} | ({"every_frame"} if count == 1 else set())
-    absent |= {"budget", "error_over_u", "release_frames"}  # it has none
+    absent = {"failed_projections", "simulated_wires", "views", "budget", "error_over_u", "release_frames"}
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None
@@ -183,7 +183,7 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=9, failed=(0,)),))
     path = out / "cases" / "c" / "errors.csv"
     errors = tables.read(path, ERRORS)
-    errors.loc[errors["frame"] == 3, "rms_mm"] = 99.0
+    errors.loc[errors["frame"] == 3, "p95_mm"] = 99.0
     tables.write(path, ERRORS, errors)
     case = read_case(path.parent)
     drawing = CASE_FIGURES["projections"](case)
@@ -198,17 +198,6 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
         "frame 8 (last)",
     ]
     assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
-
-
-def test_the_sheet_of_frames_names_each_and_thins_long_insertions(tmp_path: Path) -> None:
-    out = write_run(tmp_path / "out", (FakeCase("c", frames=41, failed=(0,)),))
-    drawing = CASE_FIGURES["every_frame"](read_case(out / "cases" / "c"))
-    assert drawing is not None
-    titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
-    assert len(titles) == 36
-    assert titles[0] == "0: no_wire"
-    assert titles[-1].startswith("40: 0.")
-    assert len(drawing.table) == 36
 
 
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
@@ -271,13 +260,13 @@ def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Pat
         figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
-        axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
+        axes.plot([0, 110], [40, 40], color=TRACED, linewidth=6)
         path = tmp_path / f"{compact}.png"
         _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
     assert pixels[0, 0].tolist() == [255, 255, 255]
-    assert np.any(np.all(pixels == (np.array(to_rgba(_style.ORANGE)[:3]) * 255).round(), axis=-1))
+    assert np.any(np.all(pixels == (np.array(to_rgba(TRACED)[:3]) * 255).round(), axis=-1))
     assert np.abs(pixels.astype(int) - exact).max() <= 24
     assert sizes[1] < 0.6 * sizes[0]
