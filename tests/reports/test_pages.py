@@ -64,8 +64,8 @@ def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     for path in Path(figures.__file__).parent.glob("[a-z]*.py"):
         module = importlib.import_module(f"reports.figures.{path.stem}")
         written |= {n for n, f in vars(module).items() if _draws(f) and not n.startswith("_")}
-    assert written == {s["figure"] for page in ("case", "run", "bench") for s in declared(page)}
-    for page in ("case", "run", "bench"):
+    assert written == {s["figure"] for page in ("case", "run", "bench", "calibration") for s in declared(page)}
+    for page in ("case", "run", "bench", "calibration"):
         for section in declared(page):
             assert section["read"].endswith(".")
             assert section["bad"].startswith(("Bad:", "Look"))
