@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism conebeam truth clean
+.PHONY: setup validate planted calibrated test lint study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -61,6 +61,21 @@ conebeam:
 	$(OUT)/rtk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[conebeam]'
 	$(OUT)/rtk/bin/python -m tests.studies.conebeam $(OUT)/conebeam --seed $(SEED)
 
+# every way to write a scan: right, noted, refused, or wrong and silent (the last is 0)
+formats: setup
+	$(BIN)/python -W ignore -m tests.studies.formats
+
+# malformed inputs, each in a process of its own: nothing crashes, hangs, dies or is believed (an hour)
+COUNT ?= 2000
+fuzz: setup
+	$(BIN)/python -W ignore -m tests.fuzz --count $(COUNT) --seed $(SEED)
+
+# known weaknesses of the locked packages (needs the network)
+audit:
+	test -x .audit/bin/pip-audit || { $(PYTHON) -m venv .audit && \
+	  .audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
+	.audit/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+
 # the truth against itself, every scene replayed on nodes half as far apart
 truth: setup
 	$(BIN)/python -m tests.studies.truth
@@ -93,6 +108,18 @@ peers: setup
 	test -x $(OUT)/peers/bin/python || $(PYTHON) -m venv $(OUT)/peers
 	$(OUT)/peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(OUT)/peers/bin/wireval bench -o $(OUT)/bench --peers
+
+# 60 runs that are ended by signals and resumed, against one that was not
+interrupt: setup
+	$(BIN)/python -m tests.studies.interrupt --seed $(SEED)
+
+# many small cases with a sweep on two workers and one, beside a busy loop
+scale: setup
+	$(BIN)/python -m tests.studies.scale
+
+# 100 random changes of product lines, each against the tests: the share that is noticed (hours)
+mutants: setup
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED)
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from pipeline.ranges import FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.ranges import FiniteProfile, NonNegative, Number, Positive, PositiveProfile, Radius
 from pipeline.status import FrameStatus
 from solver.grid import Grid, read_only
 
@@ -29,11 +29,11 @@ class Wire:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     name: str
-    radius_mm: Positive
+    radius_mm: Radius
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
-    torsional_stiffness_N_mm2: Annotated[float, Field(gt=0)] = float("inf")
-    weight_N_per_mm: Annotated[float, Field(ge=0, le=1)] = 0.0
+    torsional_stiffness_N_mm2: Annotated[float, Number, Field(gt=0)] = float("inf")
+    weight_N_per_mm: Annotated[float, Number, Field(ge=0, le=1)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class OverWire:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     bending_stiffness_N_mm2: NonNegative
-    radius_mm: Positive
+    radius_mm: Radius
     insertion_mm: NonNegative | tuple[NonNegative, ...]
 
 
@@ -132,11 +132,12 @@ class Branches:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS."""
+    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS; radius_mm (n,) where a file gives one a point."""
 
     points_mm: Array
     triangles: NDArray[np.int64]
     lines: tuple[NDArray[np.int64], ...] = ()
+    radius_mm: Array | None = None
 
 
 def arc_length(points_mm: NDArray[Any]) -> Array:

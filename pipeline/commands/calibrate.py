@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from pipeline.commands import add_settings, complain, resolved_settings, say
 
 if TYPE_CHECKING:
-    from pipeline.run.store import Store
+    from pipeline.run.cache import Store
     from pipeline.study.manifest import Case
     from pipeline.study.settings import Config
 
@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where some case was left out; 2 on wrong input."""
+    from pipeline.run.cache import Store, default_root
     from pipeline.run.calibration import chosen
-    from pipeline.run.store import Store, default_root
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.manifest import read_manifest

@@ -1,6 +1,8 @@
 """``wireval run MANIFEST -o OUT``: the whole pipeline over every case."""
 
 import argparse
+import math
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +11,7 @@ from pipeline.commands import add_settings, complain, resolved_settings, say, se
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
+    from pipeline.run.workers import Limits
     from pipeline.study.manifest import Manifest
 
 HELP = "the whole pipeline: scans in, errors and a report out"
@@ -21,6 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add("--case-timeout", type=float, default=math.inf, metavar="S", help="seconds that a case may take")
+    add("--case-memory", type=float, default=math.inf, metavar="MIB", help="MiB of memory that a case may take")
     add("--shard", default="", metavar="I/N", help="only the I-th of N parts of the cases; merge with cp -r")
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
@@ -46,6 +51,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import failure_lines, intention, last_line, launch
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from reports.inside import links_out
 
     try:
         plan = _plan(args)
@@ -53,14 +59,17 @@ def main(args: argparse.Namespace) -> int:
         return complain(error.problems, error.place or str(args.manifest))
     except LoadError as error:
         return complain([str(error)], "the command line")
-    problems = check(plan.cases, plan.template.settings.config)
+    problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
     if problems:
         return complain(problems, str(args.manifest))
     if args.dry_run:
         for line in intention(plan):
             say(line)
         return 0
-    totals, index = launch(plan, junit=args.junit)
+    try:
+        totals, index = launch(plan, junit=args.junit)
+    except InputError as error:
+        return complain(error.problems, error.place or "the command line")
     for line in failure_lines(plan):
         sys.stderr.write(f"{line}\n")
     say(last_line(totals, index))
@@ -69,20 +78,23 @@ def main(args: argparse.Namespace) -> int:
 
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
+    from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
-    from pipeline.run.store import default_root
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
 
+    if args.executor:  # workers elsewhere know nothing of this process's working folder
+        args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
     manifest, assumptions = _manifest(args)
     settings = resolved_settings(args)
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    limits = _limits(args)
     cache = None if args.no_cache else default_root()
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
     points = tuple(points_of(args.sweep, settings_of(args)))
@@ -91,7 +103,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
         say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, args.shard, (*assumptions, *notes))
+    notes = (*assumptions, *notes)
+    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 
 def _manifest(args: argparse.Namespace) -> "tuple[Manifest, tuple[str, ...]]":
@@ -114,6 +127,22 @@ def _manifest(args: argparse.Namespace) -> "tuple[Manifest, tuple[str, ...]]":
     written = args.out / "manifest.inferred.toml"
     write_text(written, text)
     return read_manifest(written), assumptions
+
+
+def _limits(args: argparse.Namespace) -> "Limits":
+    """What a case may take."""
+    from pipeline.run.launch import UsageError
+    from pipeline.run.workers import Limits, resident_mib
+
+    limits = Limits(args.case_timeout, args.case_memory)
+    for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
+        if not value > 0:
+            raise UsageError([f"{name} {value:g}: expected a number over 0"])
+    if limits.any and args.executor:
+        raise UsageError(["--case-timeout and --case-memory hold on this machine; a cluster's workers have their own"])
+    if limits.memory_mib < math.inf and not resident_mib(os.getpid()):
+        raise UsageError(["--case-memory: this system does not tell what a process takes (no /proc)"])
+    return limits
 
 
 def _vector(text: str | None, name: str) -> Any:

@@ -13,12 +13,12 @@ from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.trials import Trial, depths_at
 from pipeline.calibrate.unknowns import Unknown, unknowns
 from pipeline.load.curves import read_curve
+from pipeline.run.cache import Store
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.load import each_frame
-from pipeline.run.store import Store
 from pipeline.status import InputError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config

@@ -10,7 +10,7 @@ from pipeline.calibrate.design import Predicted
 from pipeline.calibrate.estimates import Calibration, Estimate
 from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, wall_factor
 from pipeline.run.calibration import Gathered, depth_offset, used_by
-from pipeline.run.provenance import collect
+from pipeline.run.provenance import code_state
 from pipeline.run.results import jsonable, write_json
 from pipeline.study.parameters import read_parameters
 from reports.atomic import write_text
@@ -120,7 +120,7 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "scale": fit.scale,
         "used": used_by(found),
         "notes": [*misfit(fit), *found.notes],
-        "provenance": collect(),
+        "provenance": code_state(),
     }
     write_json(path, {"schema": 1, **record})
 
@@ -128,4 +128,4 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
 def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> None:
     """Write design.json: the predicted standard deviations of a planned study."""
     found = [{"name": p.unknown.name, "sd": p.sd, "enough": p.unknown.enough, "seen": p.seen} for p in rows]
-    write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": collect()}))
+    write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))

@@ -3,7 +3,6 @@
 Everything that is wrong with it is listed at once.
 """
 
-import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -21,57 +20,25 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
 
-from pipeline.load import Source
+from pipeline.load.geometry import LoadError
+from pipeline.load.guard import read_text, status_of
 from pipeline.model import OverWire, Wall, Wire
-from pipeline.ranges import Axis, Direction, Finite, NonNegative, Positive, Vector
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
+from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, saying
 
-WHOLE_CASE = "whole_case"
-"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
-
-
-def natural_key(text: str) -> list[Any]:
-    """Sort key under which frame_2 comes before frame_10."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
-
-
-def _problem(*problems: str) -> PydanticCustomError:
-    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
-
-
-def _source(value: Any, info: ValidationInfo) -> Source:
-    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
-    if not isinstance(value, str):
-        raise ValueError("Input should be a valid string")
-    name, _, dataset = value.partition("#")
-    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
-
-
-def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
-    """A list of sources, or a pattern whose matches come in natural order."""
-    if isinstance(value, list):
-        return tuple(_source(item, info) for item in value)
-    source, base = _source(value, info), Path((info.context or {}).get("folder", ""))
-    pattern = value.partition("#")[0]
-    if not any(mark in pattern for mark in "*?["):
-        return (source,)
-    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
-    if not found:
-        problem = f"{info.field_name} = {value!r} matches no file below {base}"
-        raise _problem(problem)
-    return tuple(Source(path, source.dataset) for path in found)
+MANIFEST_BYTES = 16 * 2**20
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
-    if value not in wires:
+    if not isinstance(value, str) or value not in wires:
         problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
-        raise _problem(*[problem] * bool(wires))
+        raise saying(*[problem] * bool(wires))
     return wires[value]
 
 
@@ -79,11 +46,6 @@ def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     known = {"entry_case": 'entry = "case:ID"'}
     raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
-
-
-SourceText = Annotated[Source, BeforeValidator(_source)]
-Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
 
 
 class Strict(BaseModel):
@@ -95,12 +57,12 @@ class Strict(BaseModel):
 class Case(Strict):
     """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
     role: Literal["validation", "calibration"] = "validation"
-    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1)
+    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()
-    entry_mm: Vector
+    entry_mm: Point
     entry_direction: Direction
     entry: Annotated[str, Field(pattern=r"^(case:.+)?$")] = ""
     entry_case: Annotated["Case | None", BeforeValidator(_not_written)] = None
@@ -108,17 +70,19 @@ class Case(Strict):
     entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
-    insertion_mm: tuple[Positive, ...] | None = None
+    insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
-    lumen: SourceText | None = None
+    lumen: MaskText | None = None
     traces: Sources = ()
     parameters: PathText | None = None
     calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
     own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
     roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
-    push_force_N: tuple[float, ...] | None = None
+    push_force_N: tuple[Finite, ...] | None = None
     push_force_sigma_N: Positive = 0.001
-    lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
+    lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
+        default_factory=lambda data: (data.get("entry_mm"),)
+    )
     truth: PathText | None = None
     wall: Wall = Wall()
     down: Axis | None = None
@@ -161,7 +125,7 @@ class Case(Strict):
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
         problems += self._over_the_wire()
         if problems:
-            raise _problem(*problems)
+            raise saying(*problems)
         return self
 
     def _over_the_wire(self) -> list[str]:
@@ -218,7 +182,7 @@ class ManifestTables(Strict):
     @model_validator(mode="after")
     def _entries_known(self) -> "ManifestTables":
         if problems := borrowing_problems({c.id: (c.entry, bool(c.frames)) for c in self.case}):
-            raise _problem(*problems)
+            raise saying(*problems)
         return self
 
     @model_validator(mode="after")
@@ -226,7 +190,7 @@ class ManifestTables(Strict):
         repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
         if repeats:
             what = "this id is used more than once; ids name output folders"
-            raise _problem(*(f"case {name!r}: {what}" for name in repeats))
+            raise saying(*(f"case {name!r}: {what}" for name in repeats))
         return self
 
 
@@ -245,11 +209,13 @@ class Manifest:
 def read_manifest(path: Path) -> Manifest:
     """Read and check a manifest (not the scans); raises ManifestError with every problem found."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ManifestError([f"{path}: no such manifest"]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ManifestError([f"{path}: not valid TOML: {error}"]) from None
+        if status_of(path) is None:
+            raise ManifestError([f"{path}: no such manifest"])
+        data = tomllib.loads(read_text(path, MANIFEST_BYTES))
+    except LoadError as error:
+        raise ManifestError([str(error)]) from None
+    except (ValueError, RecursionError) as error:
+        raise ManifestError([f"{path}: not valid TOML: {str(error)[:200]}"]) from None
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:

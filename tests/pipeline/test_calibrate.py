@@ -18,13 +18,13 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, be
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
+from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration_files import misfit
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
-from pipeline.run.store import Store
 from pipeline.simulate.clamp import Prior, moved
 from pipeline.simulate.config import SolverConfig
 from pipeline.status import FrameStatus, StageError

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.manifest import ManifestError, natural_key, read_manifest
+from pipeline.load.order import natural_key
+from pipeline.study.manifest import ManifestError, read_manifest
 
 GOOD = """
 schema = 1
@@ -57,7 +58,7 @@ def test_natural_order() -> None:
     [
         (("radius_mm", "radus_mm"), "unknown key; did you mean 'radius_mm'?"),
         (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
-        (("radius_mm = 0.18", "radius_mm = -1"), "greater than 0; found -1"),
+        (("radius_mm = 0.18", "radius_mm = -1"), "greater than or equal to 0.001; found -1"),
         (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
         (('frames = "frames/*.mha"', 'frames = "nothing/*.mha"'), "matches no file"),
         (('frames = "frames/*.mha"', ""), "neither frames nor insertion_mm"),

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from pipeline.arrays.polyline import resample
 from pipeline.cli import main as wireval
 from pipeline.compare import intervals, point_to_curve
+from pipeline.run.cache import Store, default_root
 from pipeline.run.calibrated import as_calibrated
 from pipeline.run.calibration import _with_own_curves
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.simulate import simulate_frames
-from pipeline.run.store import Store, default_root
 from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.parameters import Parameters, read_parameters
 from pipeline.study.settings import Config
