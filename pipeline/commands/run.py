@@ -99,6 +99,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
     points = tuple(points_of(args.sweep, settings_of(args)))
     cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
+    for note in notes:
+        say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path)
     notes = (*assumptions, *notes)

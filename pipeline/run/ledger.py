@@ -20,7 +20,7 @@ RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"
 TABLES = (RESULT, ERRORS.file, POINTS.file)
 """What numbers over many cases are made of."""
 DATA = (*TABLES, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE, FRAMES)
-PAGES = ("report.html", "scene3d.html")
+PAGES = ("report.html",)
 Pages = Literal["", "linked", "embedded"]
 """Which pages a case has: none, ones with links to their pictures, ones with the pictures inside."""
 

@@ -32,6 +32,7 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
         if low < row["prior"] < high:
             axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
         axes.set_xlim(low, high)
+        axes.locator_params(axis="x", nbins=4)
         axes.set_ylim(-0.4, HIGHEST)
         verdict = "" if row["seen"] else ": not seen"
         axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))

@@ -25,7 +25,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
-from pipeline.simulate.clamp import Prior
+from pipeline.simulate.clamp import Prior, moved
 from pipeline.simulate.config import SolverConfig
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import read_manifest
@@ -69,7 +69,9 @@ def test_parameters_are_found_again_and_the_clamp_with_them():
     by_name = {e.unknown.name: e for e in fit.estimates}
     assert by_name[ROLL].seen
     assert by_name[REST].seen
-    assert fit.fit.linear.x[fit.fit.problem.parts()[0]][0:3] == pytest.approx([0.0, -0.05, 0.04], abs=0.04)
+    own = fit.fit.linear.x[fit.fit.problem.parts()[0]]
+    # stated 0.064 mm beside where it is held
+    assert np.linalg.norm(moved(shifted.given, own[:5]).entry_mm[:2]) < 0.03
     assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
 
 
