@@ -36,6 +36,7 @@ class Job:
     fresh: bool = False
     embed: bool = False
     quiet: bool = False
+    verbose: bool = False
     pictures: bool = True
 
     @property
@@ -76,7 +77,7 @@ def finished(job: Job, key: str) -> bool:
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs)."""
     key = job.key
-    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
+    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     if finished(job, key):
         progress("compare", 1, 1, "unchanged since the last run, kept")
         if job.embed and job.pictures:
@@ -88,7 +89,6 @@ def run_case(job: Job) -> None:
     clock = perf_counter()
     log = Log(progress)
     known = run_stages(Context(job.case, job.settings.config, Store(job.cache), log), job.until)
-    progress.close()
     _write(job, known, log, key, clock)
     if job.pictures and job.until == "report":
         render_case(job.folder, embed=job.embed)

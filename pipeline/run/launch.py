@@ -7,7 +7,7 @@ agreement that no parameter moves is suspicious.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,10 @@ from pipeline.run.provenance import collect
 from pipeline.run.results import LOST, Result, found_results, lost, write_json
 from pipeline.run.store import file_hash
 from pipeline.run.sweep import SweepPoint, write_sweep
+from pipeline.run.watch import Watch
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import to_toml
+from pipeline.study.settings import Resolved, SettingsError, read_settings, resolve, to_toml
 from reports.atomic import write_text
 from reports.html import render_index
 
@@ -85,10 +86,8 @@ def _shard(text: str) -> tuple[int, int]:
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
-def guard_out(out: Path, manifest: Path) -> None:
-    """Refuse an output folder that holds something else than a run of the same manifest."""
-    if out.exists() and not out.is_dir():
-        raise UsageError([f"-o {out}: this is a file; name a folder"])
+def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
+    """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
     if not out.exists() or not any(out.iterdir()):
         return
     info = out / "run.json"
@@ -102,6 +101,21 @@ def guard_out(out: Path, manifest: Path) -> None:
         what = "was made from another manifest" if known else "is not empty and holds no run"
         allowed = "name another folder, or say --resume (keep what fits) or --fresh (compute again)"
         raise UsageError([f"{out} {what}; {allowed}"])
+    others = _other_settings(out / "config.resolved.toml", settings)
+    if others:
+        allowed = "name another folder, or say --fresh (compute again) or --resume (keep what fits)"
+        raise UsageError([f"{out} was run with other settings: {others}; {allowed}"])
+
+
+def _other_settings(path: Path, settings: Resolved) -> str:
+    """Which settings a run before had otherwise; empty where none, or where it left none."""
+    try:
+        before = resolve(read_settings(path)).config if path.exists() else settings.config
+    except SettingsError as error:
+        return str(error)
+    old, new = asdict(before), asdict(settings.config)
+    names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
+    return ", ".join(f"{table}.{key} {old[table][key]} before, {new[table][key]} now" for table, key in names)
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
@@ -113,10 +127,12 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     write_text(out / "config.resolved.toml", to_toml(settings))
     write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
-    run_cases(plan, jobs)
-    for point in plan.points:
-        here = replace(plan.template, settings=point.cheap, out=out / point.folder, pictures=False, quiet=True)
-        run_cases(plan, [replace(here, case=case) for case in plan.cases])
+    of_points = [_jobs_at(plan, point) for point in plan.points]
+    everything = [*jobs, *(job for some in of_points for job in some)]
+    watch = Watch(everything, silent=plan.template.quiet, lines=plan.template.verbose)
+    with watch.shown():
+        for some in ([replace(job, quiet=job.quiet or watch.bar) for job in jobs], *of_points):
+            run_cases(plan, some, watch)
     if plan.points:
         write_sweep(out, plan.template.settings, plan.cases, plan.points)
     totals = replace(aggregate(out, info, name), sweep_lost=len(_lost_points(plan)))
@@ -125,13 +141,20 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     return totals, render_index(out, embed=plan.template.embed)
 
 
-def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
+def _jobs_at(plan: Plan, point: SweepPoint) -> list[Job]:
+    """The cases at a point of the sweep, whose errors alone are of interest."""
+    here = replace(plan.template, settings=point.cheap, out=plan.out / point.folder, pictures=False)
+    return [replace(here, case=case, quiet=True, verbose=False) for case in plan.cases]
+
+
+def run_cases(plan: Plan, jobs: Sequence[Job], watch: Watch) -> None:
     """Run jobs, the longest first, so that no long case is left for the end; a crash becomes that case's result."""
     several = plan.workers > 1 or plan.address
     longest = sorted(jobs, key=lambda job: -job.case.frame_count) if several else jobs
     for outcome in run_all(longest, run_case, plan.workers, plan.address):
         if outcome.error:
             _write_crash(outcome.job, outcome.error, outcome.log)
+        watch.finished(outcome.job, outcome.error)
 
 
 def _write_crash(job: Job, error: str, log: str) -> None:
