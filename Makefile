@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted test lint study bars baseline anatomies bench stress peers aneurism conebeam truth clean
+.PHONY: setup validate planted test lint package docs pages study bars baseline anatomies bench stress peers aneurism conebeam truth clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -29,6 +29,18 @@ lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# the wheel as a user gets it: built, installed where nothing is, outside the checkout, and run there
+AWAY = $(abspath $(OUT))/package
+package: setup
+	rm -rf $(AWAY) && mkdir -p $(AWAY)/wheel
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(AWAY)/wheel .
+	$(PYTHON) -m venv $(AWAY)/venv
+	$(AWAY)/venv/bin/python -m pip install --quiet --disable-pip-version-check $(AWAY)/wheel/*.whl
+	cd $(AWAY) && venv/bin/wireval synth straight -o study && venv/bin/wireval run study -o out
+	cd $(AWAY) && venv/bin/python -c 'import wireval; assert wireval.read_results("out").ok, "not all frames are ok"'
+	cd $(AWAY) && $(abspath $(BIN))/mypy --config-file /dev/null --strict --python-executable venv/bin/python \
+	  -c 'import wireval; wireval.run("study", "out").errors.plot()'
 
 study: setup
 	$(BIN)/python -m pytest -q -m slow
