@@ -42,6 +42,16 @@ package: setup
 	cd $(AWAY) && $(abspath $(BIN))/mypy --config-file /dev/null --strict --python-executable venv/bin/python \
 	  -c 'import wireval; wireval.run("study", "out").errors.plot()'
 
+# the pages of docs/ that are written from the code
+pages: setup
+	$(BIN)/python -m tests.studies.reference_pages
+
+# the manual as a site, in an environment of its own; a broken link is an error
+docs:
+	test -x $(OUT)/docs/bin/mkdocs || $(PYTHON) -m venv $(OUT)/docs
+	test -x $(OUT)/docs/bin/mkdocs || $(OUT)/docs/bin/python -m pip install --quiet --disable-pip-version-check $(DOCS)
+	$(OUT)/docs/bin/mkdocs build --strict --quiet --site-dir $(abspath $(OUT))/site
+
 study: setup
 	$(BIN)/python -m pytest -q -m slow
 

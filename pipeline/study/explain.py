@@ -91,4 +91,4 @@ def _list_in_words(schema: dict[str, Any]) -> str:
         return "empty"
     if parts and all(part == parts[0] for part in parts):
         return f"[{', '.join(['number'] * len(parts))}]" if parts[0] == {"type": "number"} else f"{len(parts)} values"
-    return f"a list of {in_words(schema['items'])}" if "items" in schema else "a list"
+    return f"a list, each {in_words(schema['items'])}" if "items" in schema else "a list"
