@@ -47,10 +47,12 @@ pages: setup
 	$(BIN)/python -m tests.studies.reference_pages
 
 # the manual as a site, in an environment of its own; a broken link is an error
+DOCS = "mkdocs-material>=9.5" "mkdocs-jupyter>=0.25"
+docs: export NO_MKDOCS_2_WARNING = 1
 docs:
 	test -x $(OUT)/docs/bin/mkdocs || $(PYTHON) -m venv $(OUT)/docs
 	test -x $(OUT)/docs/bin/mkdocs || $(OUT)/docs/bin/python -m pip install --quiet --disable-pip-version-check $(DOCS)
-	$(OUT)/docs/bin/mkdocs build --strict --quiet --site-dir $(abspath $(OUT))/site
+	$(OUT)/docs/bin/mkdocs build --strict --site-dir $(abspath $(OUT))/site
 
 study: setup
 	$(BIN)/python -m pytest -q -m slow

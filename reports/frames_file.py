@@ -5,7 +5,8 @@
     /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
 
-The file has the attributes of ``ATTRIBUTES``, every dataset of a frame the attribute ``unit``. Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
+The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attribute ``unit``. Curves are LPS mm,
+arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
 from collections.abc import Iterable, Mapping

@@ -33,7 +33,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("--size", type=int, metavar="N", help="voxels along each axis")
     add("--voxel-mm", type=float, metavar="V", help="size of a voxel")
     add("--seed", type=int, default=0, metavar="S", help="of what is drawn at random (default 0)")
-    add("--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])")
+    add(
+        "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
+    )
 
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import pipeline.compare.nulls  # noqa: F401 - registers
 import wireval
+
+import pipeline.compare.nulls  # noqa: F401 - registers
 from pipeline.cli import parsers
 from pipeline.run.results import LOST, RESULT
 from pipeline.status import FrameStatus
@@ -31,15 +32,15 @@ KEYS = {
     "role": "What the case is for: a calibration case counts in no score.",
     "group": "Insertions of one group are one unit of the intervals. Default: the case itself.",
     "reference": "Scan without the wire. Without it the lumen is segmented from the first frame.",
-    "frames": "Scans with the wire: a pattern in natural order, or a list. Files, DICOM folders, `study.h5#/frames`.",
+    "frames": "With the wire: a pattern in natural order, or a list; files, DICOM folders, `study.h5#/frames`.",
     "entry_mm": "Where the wire enters the lumen, LPS mm.",
     "entry_direction": "Where the wire points at the entry.",
     "entry": 'Take the clamp from another insertion of the same fixation: `"case:ID"`.',
     "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel.",
     "entry_direction_sigma_deg": "How well entry_direction is known; 0 is exact.",
-    "material_axis": "Where material axis 1 points at roll 0. Default: the world axis least aligned with the direction.",
+    "material_axis": "Where material axis 1 points at roll 0. Default: the world axis least along the direction.",
     "wire": "Name of one of `[wires.*]`.",
-    "insertion_mm": "Expected depths, one per frame, checked against the traced lengths. Without frames: depths to simulate.",
+    "insertion_mm": "Expected depths, one per frame, held against the traces. Without frames: depths to simulate.",
     "spacing_mm": "Voxel size, for files that lack it; reported as assumed.",
     "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json).",
     "traces": "Own or corrected centrelines instead of traced ones, one file per frame.",
@@ -80,9 +81,9 @@ def settings() -> str:
     parts = [
         "# Settings\n",
         NOTE,
-        "`--set table.key=value` for one, `-c FILE.toml` for many, `wireval settings > FILE.toml` for a file of all of\n"
-        "them; the command line wins over a file, a file over the default. `config.resolved.toml` in OUT says what was\n"
-        "in force and where it came from. *Left out* means: taken from the data or the manifest.\n",
+        "`--set table.key=value` for one, `-c FILE.toml` for many, `wireval settings > FILE.toml` for a file of all;\n"
+        "the command line wins over a file, a file over the default. `config.resolved.toml` in OUT says what\n"
+        "was in force and where it came from. *Left out* means: taken from the data or the manifest.\n",
     ]
     for group in groups:
         rows = [(f"`{s.key}`", s.meaning, s.allowed, s.value or "left out") for s in described() if s.table == group]
@@ -144,9 +145,9 @@ def manifest() -> str:
     parts = [
         "# The manifest\n",
         NOTE,
-        "TOML; paths are relative to the file; an unknown key is an error that names the nearest known one. `wireval init\n"
-        "FOLDER` writes one from a folder of scans, `wireval check FILE` lists every problem at once. For editors:\n"
-        "[manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
+        "TOML; paths are relative to the file; an unknown key is an error that names the nearest known one. `wireval\n"
+        "init FOLDER` writes one from a folder of scans, `wireval check FILE` lists every problem at once. For\n"
+        "editors: [manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
     ]
     names = {"Wire": "[wires.NAME]", "Case": "[[case]]", "Wall": "[case.wall]", "OverWire": "[case.catheter]"}
     for name, title in names.items():
@@ -176,10 +177,17 @@ def columns() -> str:
 
 
 def statuses() -> str:
-    parts = ["# Statuses\n", NOTE, "A frame is `ok` only if it was traced, simulated to its depth, converged and compared.\n"]
+    parts = [
+        "# Statuses\n",
+        NOTE,
+        "A frame is `ok` only if it was traced, simulated to its depth, converged and compared.\n",
+    ]
     for title, pairs in (
         ("Of a frame", [(one.identifier, one.value) for one in FrameStatus]),
-        ("Of a simulated wire, where it is not at rest: the frame's status, too", [(s.identifier, s.value) for s in Status]),
+        (
+            "Of a simulated wire, where it is not at rest: the frame's status, too",
+            [(s.identifier, s.value) for s in Status],
+        ),
         ("Of a case without a result", [*LOST.items()]),
     ):
         parts += [f"## {title}\n", table(("status", "sentence"), [(f"`{name}`", text) for name, text in pairs])]
@@ -188,9 +196,18 @@ def statuses() -> str:
 
 def command_line() -> str:
     parser, verbs = parsers()
-    parts = ["# Command line\n", NOTE, f"{parser.epilog}\n", "`wireval --print-completion bash` (zsh, fish, ...) completes.\n"]
+    parts = [
+        "# Command line\n",
+        NOTE,
+        f"{parser.epilog}\n",
+        "`wireval --print-completion bash` (zsh, fish, ...) completes.\n",
+    ]
     for name, verb in verbs.items():
-        parts += [f"## wireval {name}\n", f"{verb.description}\n", table(("argument", "meaning"), map(argument, shown(verb)))]
+        parts += [
+            f"## wireval {name}\n",
+            f"{verb.description}\n",
+            table(("argument", "meaning"), map(argument, shown(verb))),
+        ]
     return "\n".join(parts)
 
 
@@ -231,7 +248,9 @@ def member(owner: str, name: str, value: Any) -> str:
 
 def signature(thing: Callable[..., Any]) -> str:
     found = inspect.signature(thing)
-    inputs = [one.replace(annotation=inspect.Parameter.empty) for one in found.parameters.values() if one.name != "self"]
+    inputs = [
+        one.replace(annotation=inspect.Parameter.empty) for one in found.parameters.values() if one.name != "self"
+    ]
     return str(found.replace(parameters=inputs, return_annotation=inspect.Signature.empty))
 
 
