@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import wireval
-
 import pipeline.compare.nulls  # noqa: F401 - registers
+import wireval
 from pipeline.cli import parsers
 from pipeline.run.results import LOST, RESULT
 from pipeline.status import FrameStatus
