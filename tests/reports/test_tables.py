@@ -18,7 +18,7 @@ from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, Table
 
 # the contract that other people's scripts rely on, typed again on purpose: a rename must be seen here
 ERRORS_HEADER = (
-    "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,back_rms_mm,hausdorff_mm,arc_rms_mm,"
+    "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,distal10_rms_mm,distal20_rms_mm,back_rms_mm,hausdorff_mm,arc_rms_mm,"
     "arc_max_mm,tip_mm,tip_angle_deg,tip_along_mm,tip_across_mm,depth_offset_mm,side_ok,branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,"
     "null_min_bending_rms_mm,null_previous_rms_mm,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
     "null_pinned_rms_mm,null_neighbours_rms_mm,skill,skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,"
@@ -30,7 +30,7 @@ POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_
 SUMMARY_HEADER = (
     "case,group,role,status,frames,frames_ok,frames_failed,insertions,interval,effective_frames,"
     "rms_mm,rms_low_mm,rms_high_mm,mean_mm,p95_mm,"
-    "max_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,arc_offset_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,"
+    "max_mm,distal10_rms_mm,distal20_rms_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,arc_offset_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,"
     "null_min_bending_rms_mm,null_previous_rms_mm,skill,skill_low,skill_high,"
     "skill_strongest,skill_strongest_low,skill_strongest_high,strongest_null,null_another_rms_mm,frame_spacing_mm,"
     "branch_ok_fraction,coverage,within_1mm,"
