@@ -53,7 +53,7 @@ def _verdict(args: argparse.Namespace) -> Any:
     from reports.diff import DEFAULT_TOLERANCE, RATIO, diff_folders, load_tolerance
     from reports.origin import what_differs
     from reports.schema import SUMMARY
-    from reports.verdict import Verdict
+    from reports.two_runs import Verdict
 
     if not args.second.is_dir():
         raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")

@@ -6,15 +6,16 @@
     results = wireval.run("study/manifest.toml", "out", jobs=2)
     results.errors.plot(x="insertion_mm", y="rms_mm")
 
-Here is no code of its own: ``check`` and ``run`` are the verbs as typed, everything else is re-exported. What cannot be
-used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the sentences of the terminal.
+Here is no code of its own: ``check``, ``run``, ``score`` and ``calibrate`` are the verbs as typed, everything else is
+re-exported. What cannot be used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the
+sentences of the terminal.
 """
 
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pipeline.cli import carried_out, parsed
+from pipeline.cli import BAD_INPUT, carried_out, parsed
 from pipeline.compare import point_to_curve
 from pipeline.status import InputError, StageError
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
@@ -34,11 +35,13 @@ __all__ = [
     "StageError",
     "Status",
     "VesselWall",
+    "calibrate",
     "check",
     "point_to_curve",
     "read_results",
     "relax",
     "run",
+    "score",
 ]
 
 Place = str | Path
@@ -82,13 +85,29 @@ def run(
     return read_results(out)
 
 
-def _carried_out(verb: str, manifest: Place, settings: Settings | None = None, **options: object) -> int:
-    """The verb as typed with these options: its exit code. A list repeats its option, True stands for one alone."""
+def score(manifest: Place, out: Place, curves: Sequence[str], **more: bool | int | str | Settings) -> Results:
+    """Judge other simulators' wires: ``curves`` as ``["mine=DIR", ...]``; the results of the first one.
+
+    Those of the others: ``read_results(out / "simulators" / NAME)``.     more : options of ``wireval score``.
+    """
+    _carried_out("score", manifest, out=out, curves=list(curves), **more)
+    return read_results(out)
+
+
+def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
+    """Parameters from the cases whose role is calibration: the file that ``run`` takes. more : as for ``score``."""
+    _carried_out("calibrate", manifest, out=out, **more)
+    return Path(out) / "parameters.toml"
+
+
+def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:
+    """The verb as typed with these options. A list repeats its option, True stands for one alone."""
     words = [verb, str(manifest)]
-    for key, wanted in (settings or {}).items():
+    for key, wanted in (settings if isinstance(settings, Mapping) else {}).items():
         words += ["--set", f"{key}={json.dumps(wanted)}"]
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one is not False:
                 words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
-    return carried_out(parsed(words))
+    if carried_out(parsed(words)) == BAD_INPUT:
+        raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])

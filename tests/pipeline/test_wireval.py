@@ -22,7 +22,7 @@ def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
     for name in wireval.__all__:
         assert getattr(wireval, name).__doc__, name
     promised = {"check", "run", "read_results", "point_to_curve", "GuideWire", "Insertion", "Insertions", "VesselWall"}
-    assert promised | {"Grid", "relax", "InputError"} <= set(wireval.__all__)
+    assert promised | {"score", "calibrate", "Grid", "relax", "InputError"} <= set(wireval.__all__)
 
 
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
@@ -46,6 +46,22 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert results.cases["straight"].read_frame(1).simulated_mm is not None
     assert "straight" in results._repr_html_()
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
+
+
+def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    typed: list[str] = []
+    monkeypatch.setattr(wireval, "parsed", lambda words: typed.extend(words))
+    monkeypatch.setattr(wireval, "carried_out", lambda args: 0)
+    wireval.calibrate("m.toml", tmp_path, design=True, no_cache=False, settings={"solver.segment_mm": "auto"})
+    setting = ["--set", 'solver.segment_mm="auto"']
+    assert typed == ["calibrate", "m.toml", *setting, "--out", str(tmp_path), "--design"]
+    typed.clear()
+    with pytest.raises(wireval.InputError, match="no cases"):
+        wireval.score("m.toml", tmp_path, ["a=x", "b=y"], jobs=2)
+    assert typed == ["score", "m.toml", "--out", str(tmp_path), "--curves", "a=x", "--curves", "b=y", "--jobs", "2"]
+    monkeypatch.setattr(wireval, "carried_out", lambda args: 2)
+    with pytest.raises(wireval.InputError, match="nothing was run"):
+        wireval.calibrate("m.toml", tmp_path)
 
 
 def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:

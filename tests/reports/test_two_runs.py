@@ -14,7 +14,7 @@ from pipeline.cli import main
 from pipeline.run.overall import Ratio
 from reports import tables
 from reports.schema import ERRORS, POINTS
-from reports.verdict import Verdict
+from reports.two_runs import Verdict
 from tests.reports.fake_results import FakeCase, write_run
 
 GROUPS = ("a", "b", "c")
