@@ -66,7 +66,12 @@ class Watch:
         if not self.bar:
             yield
             return
-        columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+        )
         with Progress(*columns, console=Console(file=self.stream), transient=True) as progress:
             task, stop = progress.add_task("starting", total=len(self.jobs)), threading.Event()
             thread = threading.Thread(target=self._follow, args=(progress, task, stop), daemon=True)

@@ -34,7 +34,7 @@ def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
 
 def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     wall = {"simulate.wall_scale": [0.5]}
-    kept = {"settings": {"solver.segment_mm": 2.0}, "quiet": True, "until": "compare"}
+    kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}
     results = wireval.run(study, tmp_path / "out", sweep=wall, **kept)
     assert results.ok
     assert list(results.errors["case"]) == ["straight"] * 2

@@ -24,7 +24,7 @@ GROUPS = ("a", "b", "c")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of three insertions."""
     out = tmp_path_factory.mktemp("first") / "out"
-    write_run(out, tuple(FakeCase(name, frames=4, seed=n, error_mm=0.1) for n, name in enumerate(GROUPS)))
+    write_run(out, tuple(FakeCase(name, frames=3, seed=n, error_mm=0.1) for n, name in enumerate(GROUPS)))
     for name in GROUPS:
         path = out / "cases" / name / "result.json"
         result = json.loads(path.read_text(encoding="utf-8"))
