@@ -7,7 +7,7 @@ agreement that no parameter moves is suspicious.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from pipeline.run.sweep import SweepPoint, write_sweep
 from pipeline.run.watch import Watch
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import Resolved, SettingsError, read_settings, resolve, to_toml
+from pipeline.study.settings import Resolved, differing, to_toml
 from reports.atomic import write_text
 from reports.html import render_index
 
@@ -101,21 +101,10 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
         what = "was made from another manifest" if known else "is not empty and holds no run"
         allowed = "name another folder, or say --resume (keep what fits) or --fresh (compute again)"
         raise UsageError([f"{out} {what}; {allowed}"])
-    others = _other_settings(out / "config.resolved.toml", settings)
+    others = differing(out / "config.resolved.toml", settings)
     if others:
         allowed = "name another folder, or say --fresh (compute again) or --resume (keep what fits)"
         raise UsageError([f"{out} was run with other settings: {others}; {allowed}"])
-
-
-def _other_settings(path: Path, settings: Resolved) -> str:
-    """Which settings a run before had otherwise; empty where none, or where it left none."""
-    try:
-        before = resolve(read_settings(path)).config if path.exists() else settings.config
-    except SettingsError as error:
-        return str(error)
-    old, new = asdict(before), asdict(settings.config)
-    names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
-    return ", ".join(f"{table}.{key} {old[table][key]} before, {new[table][key]} now" for table, key in names)
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
