@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted test lint package docs pages study bars baseline anatomies bench stress peers aneurism conebeam truth clean
+.PHONY: setup validate planted test lint package docs pages study bars baseline anatomies bench stress peers aneurism conebeam truth interrupt scale mutants clean
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -111,6 +111,18 @@ peers: setup
 	test -x $(OUT)/peers/bin/python || $(PYTHON) -m venv $(OUT)/peers
 	$(OUT)/peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(OUT)/peers/bin/wireval bench -o $(OUT)/bench --peers
+
+# 60 runs that are ended by signals and resumed, against one that was not
+interrupt: setup
+	$(BIN)/python -m tests.studies.interrupt --seed $(SEED)
+
+# many small cases with a sweep on two workers and one, beside a busy loop
+scale: setup
+	$(BIN)/python -m tests.studies.scale
+
+# 100 random changes of product lines, each against the tests: the share that is noticed (hours)
+mutants: setup
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED)
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

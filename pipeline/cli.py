@@ -3,17 +3,25 @@
 import argparse
 import importlib
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import shtab
 
 from pipeline.commands import VERBS, complain, unwritable
 from pipeline.status import InputError, StageError, did_you_mean
+from reports.atomic import WriteError
 
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+OK, FAILED, BAD_INPUT = 0, 1, 2
 COMMAND_LINE = "the command line"
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, as a batch system sends it before it kills: ends like Ctrl-C."""
 
 
 def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
@@ -21,7 +29,8 @@ def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
     parser = argparse.ArgumentParser(
         prog="wireval",
         description="Validate simulated guide wires against 3D scans.",
-        epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted.",
+        epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted; "
+        "143 terminated.",
     )
     parser.add_argument("--version", action="store_true", help="print the version")
     shtab.add_argument_to(
@@ -71,6 +80,23 @@ def carried_out(args: argparse.Namespace) -> int:
     return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))
 
 
+@contextmanager
+def _ended_by_signal() -> Iterator[None]:
+    """SIGTERM ends a command like Ctrl-C: with its workers ended and what is finished kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     args = argparse.Namespace()
@@ -81,14 +107,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
             print(f"wireval {package_version()}")
             return OK
-        return carried_out(args)
+        with _ended_by_signal():
+            return carried_out(args)
     except InputError as error:
         return complain(error.problems, error.place or str(getattr(args, "manifest", COMMAND_LINE)))
     except StageError as error:
         return complain([str(error)], COMMAND_LINE)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as why:
+        number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
         print("\ninterrupted; what is finished is kept, the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
+        return 128 + number
+    except WriteError as error:
+        print(error, file=sys.stderr)
+        return FAILED
     except BrokenPipeError:
         # the reader of a pipe (head, less) has gone: not an error of ours
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

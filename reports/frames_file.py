@@ -9,6 +9,7 @@ The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attri
 arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
+import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -18,7 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.atomic import replacing
+from reports.atomic import write_bytes
 
 Array = NDArray[np.float64]
 Pictures = Mapping[int, NDArray[np.uint8]]
@@ -74,7 +75,8 @@ _ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "
 
 def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
     """Write frames.h5; ``frames`` may be a generator, so that one frame is held at a time."""
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    whole = io.BytesIO()  # a few MB; HDF5 on a full disk leaves a file that it can neither write nor close
+    with h5py.File(whole, "w") as file:
         file.attrs.update(ATTRIBUTES)
         everything = file.create_group("frames")
         if scan is not None:
@@ -89,6 +91,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
                     values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
                     values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
             _write_pictures(group, "mip", frame.mips)
+    write_bytes(path, whole.getvalue())
 
 
 def read_scan(path: Path) -> ScanCrop | None:

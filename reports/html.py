@@ -15,7 +15,7 @@ from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.scene3d import write_scene
-from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
 
 
@@ -61,7 +61,9 @@ def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
 
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
-_LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
+_LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
+_OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
+"""When and where a case was computed, and how long it took: no page says so, so that the same results give the same."""
 
 
 def render_case(case_dir: Path, embed: bool = False) -> Path:
@@ -177,7 +179,8 @@ def _files(case_dir: Path) -> list[dict[str, str]]:
     paths = [case_dir / name for name in _LISTED_FILES]
     paths += sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
     found = {path.relative_to(case_dir).as_posix(): path.stat().st_size for path in paths if path.exists()}
-    return [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
+    listed = [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
+    return listed + [{"name": n, "link": n, "size": ""} for n in _OF_THE_RUN if (case_dir / n).exists()]
 
 
 def _version(infos: Sequence[Any]) -> str:

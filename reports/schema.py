@@ -109,11 +109,10 @@ class Table:
         return tuple(c for place in places for c in self.columns if place in c.shown)
 
     def add(self, column: Column) -> None:
-        """Take in a column from outside, before the timings, and its pooled column; ValueError where it is there."""
+        """Take in a column from outside, at the end, and its pooled column; ValueError where it is there."""
         if column.name in self.names:
             raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
-        place = next((i for i, c in enumerate(self.columns) if c.unit == "s"), len(self.columns))
-        self.columns = (*self.columns[:place], column, *self.columns[place:])
+        self.columns = (*self.columns, column)
         self._pool(column)
 
     def check(self, given: Iterable[str], where: str) -> None:
@@ -144,6 +143,7 @@ OVERALL_FILE = "overall.csv"  # one row over all validation cases, with the colu
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")
+TIMINGS = Table("timings.csv")  # of a case and its frames; of a run, one row a case
 SWEEP = Table("sweep.csv")
 BENCH = Table("bench.csv")
 STRESS = Table("stress.csv")

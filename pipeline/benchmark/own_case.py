@@ -1,10 +1,10 @@
 """A user's own study as a scene of the benchmark: its lumen, its wire, its depth."""
 
 from pipeline.benchmark.scenes import BenchScene
+from pipeline.run.cache import Store, default_root
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import each_frame
-from pipeline.run.store import Store, default_root
 from pipeline.simulate import guide_wire
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config

@@ -1,6 +1,8 @@
 """``wireval run MANIFEST -o OUT``: the whole pipeline over every case."""
 
 import argparse
+import math
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +12,7 @@ from pipeline.commands.given import add_manifest, given
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
+    from pipeline.run.workers import Limits
 
 HELP = "the whole pipeline: scans in, errors and a report out"
 
@@ -21,6 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add("--case-timeout", type=float, default=math.inf, metavar="S", help="seconds that a case may take")
+    add("--case-memory", type=float, default=math.inf, metavar="MIB", help="MiB of memory that a case may take")
     add("--shard", default="", metavar="I/N", help="only the I-th of N parts of the cases; merge with cp -r")
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
@@ -62,19 +67,22 @@ def main(args: argparse.Namespace) -> int:
 
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
+    from pipeline.run.cache import default_root
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
-    from pipeline.run.store import default_root
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
 
+    if args.executor:  # workers elsewhere know nothing of this process's working folder
+        args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
     manifest, assumptions = given(args, None if args.dry_run else args.out)
     settings = resolved_settings(args)
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    limits = _limits(args)
     cache = None if args.no_cache else default_root()
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
@@ -82,4 +90,20 @@ def _plan(args: argparse.Namespace) -> "Plan":
     cases = chosen(manifest.cases, args.only, args.shard)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, args.shard, assumptions)
+    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, assumptions)
+
+
+def _limits(args: argparse.Namespace) -> "Limits":
+    """What a case may take."""
+    from pipeline.run.launch import UsageError
+    from pipeline.run.workers import Limits, resident_mib
+
+    limits = Limits(args.case_timeout, args.case_memory)
+    for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
+        if not value > 0:
+            raise UsageError([f"{name} {value:g}: expected a number over 0"])
+    if limits.any and args.executor:
+        raise UsageError(["--case-timeout and --case-memory hold on this machine; a cluster's workers have their own"])
+    if limits.memory_mib < math.inf and not resident_mib(os.getpid()):
+        raise UsageError(["--case-memory: this system does not tell what a process takes (no /proc)"])
+    return limits

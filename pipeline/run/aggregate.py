@@ -5,18 +5,20 @@ And to a JUnit summary for CI: one test a frame, so that a build server shows wh
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipeline.run.another import with_another
 from pipeline.run.overall import found_cases, frames_of, overall, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.atomic import write_bytes
-from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
+from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases = found_cases(out)
     found, whole = [case.result for case in cases], overall(with_another(out, cases))
-    rows = [result.summary for result in found]
+    rows, times = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
         (SUMMARY.file, SUMMARY, rows),
@@ -56,6 +58,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         # result files may come from another version, with other columns
         known = [{name: row[name] for name in row.keys() & table.names} for row in given]
         tables.write(out / file, table, known)
+    tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
         write_json(out / name, run_info | {"cases": [result.case for result in found], "overall": whole})
     points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in frames_of(validation(cases)))])
@@ -66,9 +69,19 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         sum(row["frames_ok"] for row in rows),
         float(np.median(points)) if points.size else float("nan"),
         float(np.percentile(points, 95)) if points.size else float("nan"),
-        sum(row.get("simulate_s") or 0.0 for row in rows),
+        float(times["simulate_s"].sum()),
         whole,
     )
+
+
+def _times(out: Path, found: Sequence[Result]) -> pd.DataFrame:
+    """timings.csv of the run: the row about the whole of each case. A file that is damaged costs its times alone."""
+    parts = []
+    for result in found:
+        with suppress(OSError, ValueError):
+            table = tables.read_if_there(out / "cases" / result.case / TIMINGS.file, TIMINGS)
+            parts.append(table[table["frame"].isna()])
+    return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS)
 
 
 def write_junit(path: Path, found: Sequence[Result]) -> None:

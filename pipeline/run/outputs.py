@@ -27,7 +27,7 @@ TIMED = STAGES[:-1]
 SIMULATED_COLOUR = (0.835, 0.369, 0.0)
 
 
-def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log) -> dict[str, Any]:
+def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, Any]:
     """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
@@ -39,15 +39,22 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log) -> di
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
     if case.frames:
         head["within_1mm"] = within(errors, len(errors))
-    times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
         head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
-    return head | pooled(scored) | times
+    return head | pooled(scored)
 
 
-def error_row(frame: Frame, log: Log) -> dict[str, Any]:
+def timing_rows(case: str, log: Log, **whole: float) -> list[dict[str, Any]]:
+    """timings.csv: the case with what is known of the ``whole``, then its frames."""
+    rows = {frame: {"case": case, "frame": frame} for frame in sorted({index for index, _ in log.frame_seconds})}
+    for (index, stage), seconds in log.frame_seconds.items():
+        rows[index] |= {f"{stage}_s": seconds}
+    return [{"case": case, **{f"{stage}_s": log.seconds[stage] for stage in TIMED}, **whole}, *rows.values()]
+
+
+def error_row(frame: Frame) -> dict[str, Any]:
     """One row of errors.csv."""
     row: dict[str, Any] = {
         "frame": frame.index,
@@ -55,7 +62,6 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
         "insertion_mm": frame.depth_mm,
         "roll_deg": frame.roll_deg,
     }
-    row |= {f"{stage}_s": s for (index, stage), s in log.frame_seconds.items() if index == frame.index}
     row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
     row |= frame.truth
     if frame.comparison is not None:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from pipeline.load import Scans
 from pipeline.register.frames import record
+from pipeline.run import ledger
 from pipeline.run.log import Log
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
@@ -22,6 +23,8 @@ from reports.atomic import write_text
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
+    "worker_lost": "the worker process was killed, twice; its log tells where it was",
+    "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "damaged": "a result file cannot be read; run the case again with --fresh",
 }
 """What may have become of a case that has no result of its own, and the sentences that say so."""
@@ -89,11 +92,16 @@ def found_results(out: Path) -> list[Result]:
 
 
 def _found(path: Path) -> Result:
+    folder = path.parent
+    written = ledger.read(folder)
+    wrong = written.amiss(folder, ledger.TABLES) if written else ""
+    if wrong:
+        return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")
     try:
         return read_result(path)
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        return lost(path.parent.name, "damaged", f"{path}: {why}")
+        return lost(folder.name, "damaged", f"{path}: {why}")
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
@@ -112,12 +120,14 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, details)
 
 
-def lost(name: str, status: str, reason: str, *, role: str = "", group: str = "", frames: int = 0) -> Result:
+def lost(name: str, status: str, reason: str, case: Case | None = None, stage: str = "") -> Result:
     """The result of a case that could not be finished, or whose result cannot be read (see LOST)."""
     sentence = LOST[status]
+    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", 0)
     summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
     summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
-    failure = {"case": name, "status": status, "sentence": sentence, "message": reason, "log": f"cases/{name}/log.txt"}
+    failure = {"case": name, "status": status, "sentence": sentence, "message": reason}
+    failure |= {"log": f"cases/{name}/log.txt"} | ({"stage": stage} if stage else {})
     return Result(name, role, group, status, sentence, [], [failure], summary)
 
 
@@ -129,7 +139,6 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         clamp |= {"sigma_mm": known.clamp.sigma_mm, "sigma_deg": known.clamp.sigma_deg}
         clamp["covariance"] = known.clamp.covariance
     return {
-        "seconds": log.seconds,
         "assumptions": log.assumptions,
         "warnings": log.warnings,
         "wire": case.wire,

@@ -11,9 +11,11 @@ from typing import Any
 
 from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
+from pipeline.run.results import LOST, Result, found_results
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
+from reports.case_files import read_json
 from reports.schema import SWEEP
 
 PLAIN = "(plain)"
@@ -37,7 +39,15 @@ class SweepPoint:
     @property
     def folder(self) -> Path:
         """Its sub-folder of the output."""
-        return Path("sweep", f"{self.parameter}={self.value}".replace("/", "_"))
+        return _folder({"parameter": self.parameter, "value": self.value})
+
+
+Head = dict[str, str]
+"""A point as run.json and sweep.csv name it: the setting, its value here and in the plain run (unchanged)."""
+
+
+def _folder(head: Head) -> Path:
+    return Path("sweep", f"{head['parameter']}={head['value']}".replace("/", "_"))
 
 
 def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
@@ -53,14 +63,36 @@ def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]
     return points
 
 
-def write_sweep(out: Path, plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint]) -> None:
+def heads_of(plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint]) -> list[Head]:
+    """The points as run.json names them."""
+    named = [{"parameter": point.parameter, "value": point.value} for point in points]
+    return [head | {"unchanged": unchanged(plain, cases, head["parameter"])} for head in named]
+
+
+def found_heads(out: Path) -> list[Head]:
+    """The points that the runs into an output folder name; ``unchanged`` is empty where shards differ in it."""
+    found: dict[tuple[str, str], Head] = {}
+    for path in sorted(out.glob("run*.json")):
+        for head in read_json(path).get("sweep", ()):
+            before = found.setdefault((head["parameter"], head["value"]), head)
+            if before["unchanged"] != head["unchanged"]:
+                found[head["parameter"], head["value"]] = head | {"unchanged": ""}
+    return list(found.values())
+
+
+def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
+    """Cases of which a sweep has no result, and at which point."""
+    return [(_folder(h), r) for h in heads for r in found_results(out / _folder(h)) if r.status in LOST]
+
+
+def write_sweep(out: Path, heads: Sequence[Head]) -> None:
     """sweep.csv: the plain result first, then every point, each of them case by case and over all of them."""
+    if not heads:
+        return
     before = with_another(out, found_cases(out))
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))
-    for point in points:
-        head = {"parameter": point.parameter, "value": point.value}
-        head["unchanged"] = unchanged(plain, cases, point.parameter)
-        rows += _rows(head, before, found_cases(out / point.folder))
+    for head in heads:
+        rows += _rows(head, before, found_cases(out / _folder(head)))
     tables.write(out / SWEEP.file, SWEEP, rows)
 
 
@@ -74,7 +106,7 @@ def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:
     return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _rows(head: dict[str, str], before: Sequence[Found], after: Sequence[Found]) -> Iterator[dict[str, Any]]:
+def _rows(head: Head, before: Sequence[Found], after: Sequence[Found]) -> Iterator[dict[str, Any]]:
     """A row for each case of ``after``, and one over all where there are several."""
     for case in after:
         yield _row(head, case.result.summary, before, [case])

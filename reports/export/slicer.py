@@ -84,7 +84,10 @@ def write_segmentation_nrrd(
     for key, text in _metadata(values.shape, segments).items():
         image.SetMetaData(key, text)
     with replacing(path) as temporary:
-        sitk.WriteImage(image, str(temporary), useCompression=True)
+        try:
+            sitk.WriteImage(image, str(temporary), useCompression=True)
+        except RuntimeError as error:  # of a full disk SimpleITK says no more than that it could not write
+            raise OSError(f"SimpleITK: {str(error).strip().splitlines()[-1]}") from error
 
 
 def _metadata(shape: tuple[int, ...], segments: Sequence[str]) -> dict[str, str]:

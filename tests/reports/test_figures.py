@@ -18,7 +18,7 @@ from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
-from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
+from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -34,6 +34,7 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
         "result": {},
         "errors": tables.read_if_there(None, ERRORS),
         "points": tables.read_if_there(None, POINTS),
+        "timings": tables.read_if_there(None, TIMINGS),
         "scan": None,
         "frames": (),
     }

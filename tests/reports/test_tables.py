@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from reports import tables
 from reports.atomic import replacing
-from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, Table
+from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, TIMINGS, Table
 
 # the contract that other people's scripts rely on, typed again on purpose: a rename must be seen here
 ERRORS_HEADER = (
@@ -23,7 +23,7 @@ ERRORS_HEADER = (
     "null_min_bending_rms_mm,null_previous_rms_mm,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
     "null_pinned_rms_mm,null_neighbours_rms_mm,skill,skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,"
     "push_force_N,joints,iterations,num_mm,snaps,uncertain,least_pivot,"
-    "load_s,segment_s,trace_s,simulate_s,compare_s,trace_mean_mm,"
+    "trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
 POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N"
@@ -36,9 +36,9 @@ SUMMARY_HEADER = (
     "branch_ok_fraction,coverage,within_1mm,"
     "trace_mean_median_mm,trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,"
     "tip_along_median_mm,tip_across_median_mm,depth_offset_mm,side_ok,"
-    "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,num_mm,load_s,"
-    "segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
+    "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,num_mm"
 )
+TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log"
 
 
@@ -50,10 +50,12 @@ def test_headers_are_the_contract(tmp_path: Path) -> None:
     tables.write(tmp_path / "errors.csv", ERRORS, [])
     tables.write(tmp_path / "summary.csv", SUMMARY, [])
     tables.write(tmp_path / "failures.csv", FAILURES, [])
+    tables.write(tmp_path / "timings.csv", TIMINGS, [])
     tables.write(tmp_path / "points.csv.gz", POINTS, {})
     assert _header(tmp_path / "errors.csv") == ERRORS_HEADER
     assert _header(tmp_path / "summary.csv") == SUMMARY_HEADER
     assert _header(tmp_path / "failures.csv") == FAILURES_HEADER
+    assert _header(tmp_path / "timings.csv") == TIMINGS_HEADER
     assert gzip.decompress((tmp_path / "points.csv.gz").read_bytes()).decode() == POINTS_HEADER + "\n"
 
 

@@ -26,11 +26,11 @@ from data_synthetic.write import write_study
 from pipeline.arrays.polyline import angle_deg, resample
 from pipeline.compare import point_to_curve
 from pipeline.model import Array
+from pipeline.run.cache import Store
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.simulate import simulate_frames
-from pipeline.run.store import Store
 from pipeline.simulate.clamp import axes_of
 from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.settings import Config

@@ -11,8 +11,9 @@ from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
 from pipeline.model import Array, Clamp, Curve, Lumen, Volume
 from pipeline.register import Registration
+from pipeline.run.cache import Store
 from pipeline.run.log import Log, Stage
-from pipeline.run.store import Store, key_of
+from pipeline.run.store import key_of
 from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
@@ -135,5 +136,9 @@ class Context:
             self.store.put(stage, key, result)
         else:
             result = cast(Result, kept)
-        self.log.count(stage, {"reused": 1} if kept else result.counters, result.levels)
+            self.log.reused[stage] = self.log.reused.get(stage, 0) + 1
+            for crop in (item for item in inputs if isinstance(item, Crop)):
+                self.log.count("load", crop.counters)
+        # the work behind a result, whenever it was done: a run that was interrupted says the same as one that was not
+        self.log.count(stage, result.counters, result.levels)
         return result
