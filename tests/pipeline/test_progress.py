@@ -41,6 +41,7 @@ def jobs(tmp_path: Path, count: int) -> list[Job]:
 def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path) -> None:
     stream, batch = Terminal(), jobs(tmp_path, 2)
     watch = Watch(batch, stream=stream)
+    batch[0].folder.mkdir(parents=True)
     with watch.shown():
         CaseProgress("c0", batch[0].folder / "log.txt", quiet=watch.bar)("trace", 3, 3, "ok 12.0 mm")
         done, heard = watch.now()
