@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -40,6 +40,30 @@ lint: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# the wheel as a user gets it: built, installed where nothing is, outside the checkout, and run there
+AWAY = $(abspath $(OUT))/package
+package: setup
+	rm -rf $(AWAY) && mkdir -p $(AWAY)/wheel
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(AWAY)/wheel .
+	$(PYTHON) -m venv $(AWAY)/venv
+	$(AWAY)/venv/bin/python -m pip install --quiet --disable-pip-version-check $(AWAY)/wheel/*.whl
+	cd $(AWAY) && venv/bin/wireval synth straight -o study && venv/bin/wireval run study -o out
+	cd $(AWAY) && venv/bin/python -c 'import wireval; assert wireval.read_results("out").ok, "not all frames are ok"'
+	cd $(AWAY) && $(abspath $(BIN))/mypy --config-file /dev/null --strict --python-executable venv/bin/python \
+	  -c 'import wireval; wireval.run("study", "out").errors.plot()'
+
+# the pages of docs/ that are written from the code
+pages: setup
+	$(BIN)/python -m tests.studies.reference_pages
+
+# the manual as a site, in an environment of its own; a broken link is an error
+DOCS = "mkdocs-material>=9.5" "mkdocs-jupyter>=0.25"
+docs: export NO_MKDOCS_2_WARNING = 1
+docs:
+	test -x $(OUT)/docs/bin/mkdocs || $(PYTHON) -m venv $(OUT)/docs
+	test -x $(OUT)/docs/bin/mkdocs || $(OUT)/docs/bin/python -m pip install --quiet --disable-pip-version-check $(DOCS)
+	$(OUT)/docs/bin/mkdocs build --strict --site-dir $(abspath $(OUT))/site
 
 study: setup
 	$(BIN)/python -m pytest -q -m slow

@@ -5,7 +5,8 @@
     /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
 
-Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
+The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attribute ``unit``. Curves are LPS mm,
+arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
 import io
@@ -73,6 +74,8 @@ class FrameArrays:
         return {name: points for name, points in wires.items() if points is not None and len(points)}
 
 
+ATTRIBUTES = {"schema": 1, "length_unit": "mm", "force_unit": "N", "coordinates": "LPS"}
+"""What stands at the root of the file: positive x to the patient's left, y to the back, z to the head."""
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 _ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips"))
 
@@ -81,6 +84,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
     """Write frames.h5; ``frames`` may be a generator, so that one frame is held at a time."""
     whole = io.BytesIO()  # a few MB; HDF5 on a full disk leaves a file that it can neither write nor close
     with h5py.File(whole, "w") as file:
+        file.attrs.update(ATTRIBUTES)
         everything = file.create_group("frames")
         if scan is not None:
             group = file.create_group("scan")
@@ -91,7 +95,8 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             group = everything.create_group(f"{frame.frame:03d}")
             for name in _ARRAYS:
                 if getattr(frame, name) is not None:
-                    group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
+                    values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
+                    values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
             _write_pictures(group, "mip", frame.mips)
     write_bytes(path, whole.getvalue())
 

@@ -16,7 +16,7 @@ HELP = "rebuild tables, figures and pages from result files"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
-    parser.add_argument("out", type=Path, metavar="OUT")
+    parser.add_argument("out", type=Path, metavar="OUT", help="a folder that `wireval run` wrote")
     parser.add_argument("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     parser.add_argument("--pdf", action="store_true", help="also write summary.pdf, four pages on paper")
 

@@ -16,12 +16,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     """What may follow the verb."""
     add = parser.add_argument
     add("name", nargs="?", metavar="NAME", help="a scene of the catalogue; --list names them")
-    add("-o", "--out", type=Path, metavar="DIR")
+    add("-o", "--out", type=Path, metavar="DIR", help="folder for the study")
     add("--list", action="store_true", help="name the scenes, each with its reason")
     add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii")
     add("--background", type=Path, metavar="VOLUME", help="paint a wire into this real scan")
-    add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"))
-    add("--frames", type=int, metavar="N")
+    add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"), help="of the scans (default mha)")
+    add("--frames", type=int, metavar="N", help="scans with the wire; each scene has its own number")
     add(
         "--insertions",
         type=int,
@@ -31,9 +31,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     add("-j", "--jobs", type=int, default=1, metavar="N", help="insertions made at once (default 1)")
     add("--size", type=int, metavar="N", help="voxels along each axis")
-    add("--voxel-mm", type=float, metavar="V")
-    add("--seed", type=int, default=0, metavar="S")
-    add("--scanner", default="psf", choices=("psf", "conebeam"))
+    add("--voxel-mm", type=float, metavar="V", help="size of a voxel")
+    add("--seed", type=int, default=0, metavar="S", help="of what is drawn at random (default 0)")
+    add(
+        "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
+    )
 
 
 if TYPE_CHECKING:

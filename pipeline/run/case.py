@@ -40,6 +40,7 @@ class Job:
     fresh: bool = False
     embed: bool = False
     quiet: bool = False
+    verbose: bool = False
     pictures: bool = True
 
     @property
@@ -94,7 +95,7 @@ def _why_again(job: Job, key: str) -> str | None:
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
     key = job.key
-    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
+    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     with held(job.folder, progress.warn):
         again = _why_again(job, key)
         if again is None:
@@ -113,7 +114,6 @@ def _compute(job: Job, key: str, progress: CaseProgress) -> None:
     clock = perf_counter()
     log = Log(progress)
     known = run_stages(Context(job.case, job.settings.config, Store(job.cache, progress.warn), log), job.until)
-    progress.close()
     _write(job, known, log, key, clock)
     if job.wants_pages:
         draw(job.folder, job.wants_pages)

@@ -26,10 +26,11 @@ from pipeline.run.provenance import code_state, this_run
 from pipeline.run.results import found_results, lost, write_json
 from pipeline.run.store import file_hash
 from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
+from pipeline.run.watch import Watch
 from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import to_toml
+from pipeline.study.settings import Resolved, differing, to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.html import render_index
 
@@ -100,10 +101,8 @@ def _shard(text: str) -> tuple[int, int]:
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
-def guard_out(out: Path, manifest: Path) -> None:
-    """Refuse an output folder that holds something else than a run of the same manifest."""
-    if out.exists() and not out.is_dir():
-        raise UsageError([f"-o {out}: this is a file; name a folder"])
+def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
+    """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
     if (out / "simulators").is_dir():
         raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
     allowed = "say --resume (keep what fits) or --fresh (compute again)"
@@ -120,6 +119,9 @@ def guard_out(out: Path, manifest: Path) -> None:
             raise UsageError([f"{out} was made from another manifest; name another folder, or {allowed}"])
     if not infos and not (out / "manifest.inferred.toml").exists():
         raise UsageError([f"{out} is not empty and holds no run; name another folder, or {allowed}"])
+    others = differing(out / "config.resolved.toml", settings)
+    if others:
+        raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
@@ -152,12 +154,16 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
 
 def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     """Run jobs; a case that could not be finished gets a result that says so. Raises WriteError, which ends the run."""
-    with closing(run_all(jobs, run_case, plan.workers, plan.address, plan.limits)) as outcomes:
+    watch = Watch(jobs, silent=plan.template.quiet, lines=plan.template.verbose)
+    quiet = [replace(job, quiet=True) for job in jobs] if watch.bar else jobs
+    outcomes = run_all(quiet, run_case, plan.workers, plan.address, plan.limits)
+    with watch.shown(), closing(outcomes):
         for outcome in outcomes:
             if outcome.status == "unwritable":
                 raise WriteError(outcome.error)
             if outcome.error:
                 _write_lost(outcome)
+            watch.finished(outcome.job, outcome.error)
 
 
 def _write_lost(outcome: Outcome[Job, None]) -> None:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, TextIO
+from typing import Literal, TextIO
 
 import numpy as np
 
@@ -91,20 +91,19 @@ def last_stage(log: Path) -> str:
 
 
 SHOWN = ("segment", "trace", "compare")
-"""Stages whose steps are printed; simulating a frame takes milliseconds and goes to the log alone."""
+"""Stages whose steps are printed; simulating a frame takes milliseconds and is printed with -v alone."""
 
 
 @dataclass
 class CaseProgress:
-    """Reports the steps of one case."""
+    """Reports the steps of one case, a line each. quiet : to its log alone; verbose : steps of every stage."""
 
     case: str
     log: Path
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     quiet: bool = False
+    verbose: bool = False
     _start: float = field(default_factory=perf_counter)
-    _bar: Any = None
-    _stage: str = ""
 
     def start(self) -> None:
         """Begin the log anew."""
@@ -115,11 +114,7 @@ class CaseProgress:
         """One step of a stage is finished."""
         line = f"[{self.case}] {stage} {done}/{total}  {text}"
         self.write(line)
-        if self.quiet or stage not in SHOWN or not total:
-            return
-        if self.stream.isatty():
-            self._show_bar(stage, done, total, text)
-        else:
+        if total and (self.verbose or (stage in SHOWN and not self.quiet)):
             self.stream.write(line + "\n")
             self.stream.flush()
 
@@ -140,19 +135,3 @@ class CaseProgress:
         """A line for the log alone."""
         with writing(self.log), self.log.open("a", encoding="utf-8") as handle:
             handle.write(f"{perf_counter() - self._start:8.2f} s  {line}\n")
-
-    def _show_bar(self, stage: str, done: int, total: int, text: str) -> None:
-        from tqdm import tqdm
-
-        if stage != self._stage:
-            self.close()
-            self._bar = tqdm(total=total, desc=f"{self.case} {stage}", file=self.stream, leave=False)
-            self._stage = stage
-        self._bar.update(done - self._bar.n)
-        self._bar.set_postfix_str(text)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None

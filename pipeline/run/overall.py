@@ -94,6 +94,19 @@ class Ratio:
         known = f"95 %: {self.low:.3f} to {self.high:.3f}, " if np.isfinite(self.low) else ""
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
+    @property
+    def verdict(self) -> str:
+        """The sentence, and what may be concluded from it."""
+        if self.value == 1.0 and not self.low < self.high:
+            meaning = "no frame's error changed"
+        elif not np.isfinite(self.low):
+            meaning = "too few insertions to say whether another study would show the same"
+        elif self.low <= 1.0 <= self.high:
+            meaning = "no difference is shown"
+        else:
+            meaning = "the second is worse" if self.low > 1.0 else "the second is better"
+        return f"{self.sentence}: {meaning}"
+
 
 def pairs(before: Sequence[Found], after: Sequence[Found]) -> list[tuple[Scored, Scored]]:
     """The frames that count in both runs, of validation cases."""

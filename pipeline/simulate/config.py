@@ -23,7 +23,7 @@ def _known(method: str) -> str:
 class SolverConfig:
     """The energy minimisation."""
 
-    method: Annotated[str, AfterValidator(_known)] = "newton"
+    method: Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum": [*METHODS]})] = "newton"
     """newton, or the seed's closed_form."""
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""

@@ -1,6 +1,7 @@
 """A manifest for a folder of scans: what can be seen is inferred, what cannot is assumed and said."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,11 @@ def _scans_in(folder: Path) -> tuple[Path | None, list[Path]]:
     return reference, [p for p in below if p != reference]
 
 
+def _named(path: Path, base: Path | None) -> str:
+    """A path as TOML writes it: a JSON text, whatever quotes and backslashes are in it."""
+    return json.dumps((path.relative_to(base) if base else path.resolve()).as_posix(), ensure_ascii=False)
+
+
 def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
     """Indices (n, 3) of the largest bright component: metal is brighter than anything else in a frame."""
     grey = frame.values.astype(np.float32)
@@ -85,17 +91,17 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
     return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis))
 
 
-def _quoted(path: Path) -> str:
-    """An absolute path as a string of TOML holds it."""
-    return json.dumps(str(path.resolve()))[1:-1]
-
-
 def infer_manifest(
-    folder: Path, entry: Array | None, direction: Array | None, radius_mm: float | None, config: LoadConfig
+    folder: Path,
+    entry: Array | None,
+    direction: Array | None,
+    radius_mm: float | None,
+    config: LoadConfig,
+    base: Path | None = None,
 ) -> tuple[str, tuple[str, ...]]:
     """The text of a manifest for one case from a folder of scans, and sentences that say where each guess comes from.
 
-    Raises LoadError where there is nothing to go by.
+    base : folder from which scans are named; None names them in full. Raises LoadError where there is nothing to go by.
     """
     reference, frames = _scans_in(folder)
     if not frames:
@@ -116,9 +122,9 @@ def infer_manifest(
     notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")
     text = MANIFEST.format(
         radius=radius,
-        id="".join(c if c.isalnum() or c in "._-" else "_" for c in folder.resolve().name),
-        reference=f'reference = "{_quoted(reference)}"\n' if reference else "",
-        frames=", ".join(f'"{_quoted(p)}"' for p in frames),
+        id=re.sub(r"[^A-Za-z0-9._-]", "_", folder.resolve().name).lstrip("._-") or "case",
+        reference=f"reference = {_named(reference, base)}\n" if reference else "",
+        frames=", ".join(_named(p, base) for p in frames),
         entry=[round(float(x), 3) for x in entry],
         direction=[round(float(x), 5) for x in direction],
     )

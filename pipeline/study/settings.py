@@ -125,6 +125,17 @@ def _applied(config: Config, setting: Setting) -> Config:
     return replace(config, **{table: replace(current, **{key: value})})
 
 
+def differing(path: Path, settings: Resolved) -> str:
+    """Which settings a run before had otherwise, by its config.resolved.toml; empty where none, or without the file."""
+    try:
+        before = resolve(read_settings(path)).config if path.exists() else settings.config
+    except SettingsError as error:
+        return str(error)
+    old, new = asdict(before), asdict(settings.config)
+    names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
+    return ", ".join(f"{table}.{key} {old[table][key]} before, {new[table][key]} now" for table, key in names)
+
+
 def to_toml(resolved: Resolved) -> str:
     """config.resolved.toml: every setting with a comment saying where it came from; reads back through -c."""
     lines: list[str] = []

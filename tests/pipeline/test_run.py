@@ -182,11 +182,11 @@ def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path:
     out = tmp_path / "out"
     assert run(folder, out) == 0
     assert reused_traces(out) == 0
-    assert run(folder, out, "--set", "simulate.wall_scale=2") == 0
+    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2") == 0
     assert reused_traces(out) == FRAMES
     labels[tuple(np.argwhere(labels)[0])] = 0
     with_lumen(study, folder, labels, like)
-    assert run(folder, out) == 0
+    assert run(folder, out, "--resume") == 0
     assert reused_traces(out) == 0
 
 
