@@ -145,7 +145,7 @@ def test_a_disk_that_fills_up_is_named_and_the_rest_comes_later(
 ) -> None:
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
-        patch.setattr("pipeline.run.outputs.export.write_surface_vtp", with_full_disk)
+        patch.setattr("pipeline.run.view.export.write_surface_vtp", with_full_disk)
         assert run(study, out) == 1
     said = capsys.readouterr().err
     assert "lumen.vtp: cannot be written: No space left on device; make room" in said
@@ -165,8 +165,7 @@ def test_an_output_that_cannot_be_written_is_named_before_anything_is_run(
     (tmp_path / "file").write_text("")
     assert run(study, tmp_path / "file" / "out") == 2
     said = capsys.readouterr().err
-    assert "run.json: cannot be written: Not a directory" in said
-    assert "nothing was run" in said
+    assert "cannot be written: Not a directory; name a place where you may write" in said
 
 
 def test_a_store_that_cannot_be_written_costs_a_warning(
