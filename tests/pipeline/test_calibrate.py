@@ -239,7 +239,7 @@ def test_a_run_takes_the_parameters(study):
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):
-    text = (study / "manifest.toml").read_text()
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
     renamed = text.replace('id = "a"\nrole = "calibration"', 'id = "innocent"')
     (study / "manifest.toml").write_text(renamed)
     cases = read_manifest(study / "manifest.toml").cases
@@ -251,7 +251,7 @@ def test_a_case_does_not_score_itself_under_another_name(study):
 
 
 def test_one_frame_in_common_is_enough(study):
-    text = (study / "manifest.toml").read_text().replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
     (study / "manifest.toml").write_text(text)
     with pytest.raises(ParametersError, match="'b'"):
         as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
@@ -267,14 +267,14 @@ def test_one_frame_in_common_is_enough(study):
     ],
 )
 def test_bad_parameters_are_told(study, change, told):
-    (study / "p.toml").write_text((study / "p.toml").read_text().replace(*change))
+    (study / "p.toml").write_text((study / "p.toml").read_text(encoding="utf-8").replace(*change))
     with pytest.raises(ParametersError, match=told):
         as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
 
 
 def test_the_verb_refuses_what_it_cannot_use(study, capsys):
     manifest = study / "manifest.toml"
-    manifest.write_text(manifest.read_text().replace('role = "calibration"\n', ""))
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace('role = "calibration"\n', ""))
     assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
     assert 'no case has role = "calibration"' in capsys.readouterr().err
     assert main(["run", str(manifest), "-o", str(study / "out"), "--parameters", str(study / "none.toml")]) == 2
@@ -287,14 +287,14 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert [used.case for used in found.used] == ["a"]
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
     assert "UNIDENTIFIABLE" in capsys.readouterr().out
-    page = (study / "out" / "calibration.html").read_text()
+    page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
     assert (study / "out" / "figures" / "profiles.png").exists()
 
 
 def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
     manifest = study / "manifest.toml"
-    manifest.write_text(manifest.read_text().replace("roll_deg = 5.0", 'roll_deg = "fit"'))
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace("roll_deg = 5.0", 'roll_deg = "fit"'))
     case, other = read_manifest(manifest).cases
     assert case.stated_roll_deg == 0.0
     run = Context(case.model_copy(update={"wire": bent(WIRE, TRUE)}), Config(), Store(None), Log(lambda *_: None))

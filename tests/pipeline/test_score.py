@@ -45,11 +45,13 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
 def run_with(known: Known, files: str, name: str) -> tuple[int, pd.DataFrame, dict[str, object]]:
     """A run of the study with ``simulated`` in its manifest."""
     manifest, out = known[0].with_name(f"{name}.toml"), known[0].parent / name
-    manifest.write_text(known[0].read_text().replace('id = "bend"', f'id = "bend"\nsimulated = {files}'))
+    manifest.write_text(
+        known[0].read_text(encoding="utf-8").replace('id = "bend"', f'id = "bend"\nsimulated = {files}')
+    )
     code = main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK])
     if code == 2:
         return code, pd.DataFrame(), {}
-    return code, errors_of(out), json.loads((out / "cases" / "bend" / "result.json").read_text())
+    return code, errors_of(out), json.loads((out / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
 
 
 def test_traces_without_scans_are_compared(known: Known) -> None:
@@ -65,10 +67,10 @@ def test_traces_without_scans_are_compared(known: Known) -> None:
 def test_a_trace_that_begins_at_its_tip_fails_by_name(known: Known) -> None:
     folder, traces = known[0].parent, peers("bend")
     write_csv(folder / "turned", [traces[0], traces[1][::-1], *traces[2:]])
-    (folder / "turned.toml").write_text(known[0].read_text().replace("traces/*.csv", "turned/*.csv"))
+    (folder / "turned.toml").write_text(known[0].read_text(encoding="utf-8").replace("traces/*.csv", "turned/*.csv"))
     assert main(["run", str(folder / "turned.toml"), "-o", str(folder / "out-turned"), *QUICK]) == 1
     assert list(errors_of(folder / "out-turned")["status"])[1] == "trace_failed"
-    assert "tip first" in (folder / "out-turned" / "failures.csv").read_text()
+    assert "tip first" in (folder / "out-turned" / "failures.csv").read_text(encoding="utf-8")
 
 
 SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
@@ -97,10 +99,10 @@ def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
     assert not where.loc[where["simulator"] == "straight-tip", "lead"].notna().any(), "nearest nowhere"
     for page in ("simulators.html", "index.html", "simulators/wireval/index.html", "simulators/PyElastica/index.html"):
         assert (out / page).exists()
-    assert "simulators.html" in (out / "index.html").read_text()
+    assert "simulators.html" in (out / "index.html").read_text(encoding="utf-8")
     (out / "simulators.html").unlink()
     assert main(["report", str(out)]) == 0
-    assert "straight-tip" in (out / "simulators.html").read_text()
+    assert "straight-tip" in (out / "simulators.html").read_text(encoding="utf-8")
 
 
 def test_a_third_party_in_a_bifurcation(tmp_path: Path) -> None:
@@ -270,7 +272,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
 
 
 def script(name: str) -> str:
-    found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(), re.DOTALL)
+    found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(encoding="utf-8"), re.DOTALL)
     assert found is not None
     return found[1]
 

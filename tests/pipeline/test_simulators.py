@@ -115,7 +115,7 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
     none = write_tree(tmp_path / "none", even(0.2))
     for folder in (none / "cases").iterdir():
         (folder / POINTS.file).unlink()
-        result = json.loads((folder / "result.json").read_text())
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         result["summary"] |= {"frames_ok": 0, "frames_failed": 4}
         (folder / "result.json").write_text(json.dumps(result))
     assert write_comparison(tmp_path, {"none": none, "wireval": ours}) == []

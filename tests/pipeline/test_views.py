@@ -97,7 +97,7 @@ def test_a_patient_who_moved_is_found_and_the_end_takes_no_part() -> None:
 
 def study(known: Known, folder: Path, translation: str = "none") -> Path:
     """The study that is known in space, its traces projected, at the depths of the run in space."""
-    text, arm = known[0].read_text(), c_arm()
+    text, arm = known[0].read_text(encoding="utf-8"), c_arm()
     traces = peers("bend")
     frames = [{"c_arm": arm.model_dump(), "points_px": seen(arm, trace).tolist()} for trace in traces]
     views = {"isocentre_mm": CENTRE.tolist(), "leaf_mm": traces[-1][-1].tolist(), "translation": translation}
@@ -150,18 +150,20 @@ def test_a_projected_study_gives_the_in_plane_part_of_the_answer(known: Known, t
     case = tmp_path / "out" / "cases" / "bend"
     assert (case / "figures" / "views.png").exists()
     assert not (case / "figures" / "projections.png").exists(), "there is no scan to show"
-    assert "no curve was fitted" not in (case / "report.html").read_text(), "the assumptions say what was"
+    assert "no curve was fitted" not in (case / "report.html").read_text(encoding="utf-8"), (
+        "the assumptions say what was"
+    )
 
 
 def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known: Known, tmp_path: Path) -> None:
     manifest = study(known, tmp_path / "study")
     file = manifest.parent / "projections.json"
-    views = json.loads(file.read_text())
+    views = json.loads(file.read_text(encoding="utf-8"))
     for frame in views["frames"]:
         frame["points_px"] = np.add(frame["points_px"], [0.0, 20.0]).tolist()
     file.write_text(json.dumps(views))
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
-    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text())
+    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
     said = r"registration-limited: centreline \d\.\d mm in a lumen of \d\.\d mm radius; no skill can be claimed"
     assert re.search(said, result["warnings"][0])
     assert "skill" not in {k for k, v in result["summary"].items() if v is not None}
@@ -172,12 +174,12 @@ def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path
     manifest = study(known, tmp_path / "study", "fitted")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"view_failed"}
-    assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text()
+    assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
 
 
 def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> None:
     file = study(known, tmp_path).with_name("projections.json")
-    good = json.loads(file.read_text())
+    good = json.loads(file.read_text(encoding="utf-8"))
     assert len(read_views(file, 4)) == 4
     arm = good["frames"][0]["c_arm"]
     for change, said in (
@@ -200,14 +202,16 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
 def test_projections_stand_for_scans_alone(known: Known, tmp_path: Path) -> None:
     manifest = study(known, tmp_path)
     write_csv(tmp_path / "traces", known[1])
-    manifest.write_text(manifest.read_text().replace("projections =", 'traces = "traces/*.csv"\nprojections ='))
+    manifest.write_text(
+        manifest.read_text(encoding="utf-8").replace("projections =", 'traces = "traces/*.csv"\nprojections =')
+    )
     assert main(["check", str(manifest)]) == 2
 
 
 def test_other_simulators_are_scored_in_projections_too(known: Known, tmp_path: Path) -> None:
     """Own wires handed in as another simulator's: the same errors."""
     manifest = study(known, tmp_path / "study")
-    text = manifest.read_text()
+    text = manifest.read_text(encoding="utf-8")
     curves = write_csv(tmp_path / "sim", known[1])
     manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='))
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
