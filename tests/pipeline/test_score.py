@@ -21,10 +21,9 @@ from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
 from pipeline.simulate.others import begun, not_to_depth, oddity
 from reports.export import write_markups_curve, write_polyline_vtp
-from tests.pipeline.known_study import FRAMES, PEERS, QUICK, errors_of, peers, simulated, write_csv, write_study
+from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
-Known = tuple[Path, list[Array]]
 ADAPTERS = Path(__file__).parents[2] / "docs" / "adapters.md"
 
 
@@ -35,11 +34,7 @@ def synth(name: str, folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
-    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
-    manifest = write_study(tmp_path_factory.mktemp("known"))
-    out = manifest.parent / "out"
-    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
-    return manifest, simulated(out)
+    return run_known(tmp_path_factory.mktemp("known"))
 
 
 def run_with(known: Known, files: str, name: str) -> tuple[int, pd.DataFrame, dict[str, object]]:

@@ -15,21 +15,16 @@ from pipeline.cli import main
 from pipeline.compare.views import screen_of, shift_of
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import CArm, read_views
-from tests.pipeline.known_study import QUICK, errors_of, peers, simulated, write_csv, write_study
+from tests.pipeline.known_study import QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
-Known = tuple[Path, list[Array]]
 CENTRE = np.array([12.0, 0.0, 10.0])
 WITHIN_MM = 0.02
 
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
-    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
-    manifest = write_study(tmp_path_factory.mktemp("known"))
-    out = manifest.parent / "out"
-    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
-    return manifest, simulated(out)
+    return run_known(tmp_path_factory.mktemp("known"))
 
 
 def c_arm(beam: tuple[float, float, float] = (0.3, -0.95, 0.1)) -> CArm:
