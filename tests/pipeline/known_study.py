@@ -53,9 +53,9 @@ def write_study(folder: Path) -> Path:
     rows = zip(tube.points_mm[::4], tube.radii_mm[::4], strict=True)
     lines = [f"{n + 1} 3 {' '.join(f'{x:.5f}' for x in p)} {r:.5f} {n or -1}" for n, (p, r) in enumerate(rows)]
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "vessel.swc").write_text("\n".join(lines))
+    (folder / "vessel.swc").write_text("\n".join(lines), encoding="utf-8")
     write_csv(folder / "traces", peers("bend"))
-    (folder / "manifest.toml").write_text(MANIFEST)
+    (folder / "manifest.toml").write_text(MANIFEST, encoding="utf-8")
     return folder / "manifest.toml"
 
 

@@ -175,7 +175,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     wires = known[1]
     folder = write_csv(tmp_path / "sim", [*wires[:3], wires[3][: len(wires[3]) // 2]])
     (folder / "wire_001.csv").unlink()
-    (folder / "wire_002.csv").write_text("")
+    (folder / "wire_002.csv").write_text("", encoding="utf-8")
     code, table, result = run_with(known, f'"{folder}/*.csv"', "spoilt")
     assert code == 1
     assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
@@ -247,7 +247,7 @@ def test_which_file_is_which_frame() -> None:
 def test_the_other_vtk_layouts(tmp_path: Path) -> None:
     text = "# vtk DataFile Version 5.1\nvtk output\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0\n1 2 0\n"
     text += "LINES 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n2 1 0\n"
-    (tmp_path / "a.vtk").write_text(text)
+    (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
     np.testing.assert_array_equal(read_vtk_points(tmp_path / "a.vtk"), [[1, 2, 0], [1, 0, 0], [0, 0, 0]])
 
 
@@ -278,7 +278,9 @@ def test_the_adapters_of_the_manual(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.chdir(tmp_path)
     nodes = [[0, 0, 0, 0, 0, 0, 1]] * 3 + [[*point, 0, 0, 0, 1] for point in wire.tolist()]
     numbers = " ".join(str(x) for node in nodes for x in node)
-    Path("wire.state").write_text("".join(f"T= {t}\n  X= {numbers} \n  V= {'0 ' * 36}\n" for t in (0.5, 1.0)))
+    Path("wire.state").write_text(
+        "".join(f"T= {t}\n  X= {numbers} \n  V= {'0 ' * 36}\n" for t in (0.5, 1.0)), encoding="utf-8"
+    )
     exec(script("sofa"), {})
     found = read_wires([Source(Path(f"wire_00{n}.csv")) for n in (0, 1)], 2)
     np.testing.assert_allclose(found[1].points_mm, wire)

@@ -97,11 +97,13 @@ def study(known: Known, folder: Path, translation: str = "none") -> Path:
     frames = [{"c_arm": arm.model_dump(), "points_px": seen(arm, trace).tolist()} for trace in traces]
     views = {"isocentre_mm": CENTRE.tolist(), "leaf_mm": traces[-1][-1].tolist(), "translation": translation}
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "projections.json").write_text(json.dumps(views | {"frames": frames}))
+    (folder / "projections.json").write_text(json.dumps(views | {"frames": frames}), encoding="utf-8")
     depths = errors_of(known[0].parent / "out")["insertion_mm"].tolist()
     text = re.sub(r"insertion_mm = .*", f"insertion_mm = {depths}", text)
     text = text.replace('traces = "traces/*.csv"', 'projections = "projections.json"')
-    (folder / "manifest.toml").write_text(text.replace("vessel.swc", str(known[0].parent / "vessel.swc")))
+    (folder / "manifest.toml").write_text(
+        text.replace("vessel.swc", str(known[0].parent / "vessel.swc")), encoding="utf-8"
+    )
     return folder / "manifest.toml"
 
 
@@ -156,7 +158,7 @@ def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known:
     views = json.loads(file.read_text(encoding="utf-8"))
     for frame in views["frames"]:
         frame["points_px"] = np.add(frame["points_px"], [0.0, 20.0]).tolist()
-    file.write_text(json.dumps(views))
+    file.write_text(json.dumps(views), encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
     result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
     said = r"registration-limited: centreline \d\.\d mm in a lumen of \d\.\d mm radius; no skill can be claimed"
@@ -186,10 +188,10 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         ({"frames": [{"matrix": np.eye(4)[[0, 1, 3]].tolist(), "points_px": [[0, 0], [1, 1]]}] * 4}, "source"),
         ({"translate": "none"}, "translate"),
     ):
-        file.write_text(json.dumps(good | change))
+        file.write_text(json.dumps(good | change), encoding="utf-8")
         with pytest.raises(LoadError, match=said):
             read_views(file, 4)
-    file.write_text("{")
+    file.write_text("{", encoding="utf-8")
     with pytest.raises(LoadError, match="cannot be read as projections"):
         read_views(file, 4)
 
@@ -208,8 +210,8 @@ def test_other_simulators_are_scored_in_projections_too(known: Known, tmp_path: 
     manifest = study(known, tmp_path / "study")
     text = manifest.read_text(encoding="utf-8")
     curves = write_csv(tmp_path / "sim", known[1])
-    manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='))
+    manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='), encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
-    manifest.write_text(text)
+    manifest.write_text(text, encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "own"), "--until", "compare", *QUICK]) == 0
     pd.testing.assert_series_equal(errors_of(tmp_path / "out")["rms_mm"], errors_of(tmp_path / "own")["rms_mm"])
