@@ -35,7 +35,8 @@ def render_bench(bench_csv: Path, out_dir: Path, *others: Path | None, note: str
         "sections": draw_sections("bench", bench, out_dir, embed),
         "recommended": _grid(best),
         "claims": _claims(bench.claims),
-        "broken": int(bench.claims["met"].eq(other=False).sum()) if bench.claims["met"].notna().any() else None,
+        "broken": int(bench.claims["met"].eq(other=False).sum()),
+        "promised": int(bench.claims["met"].notna().sum()),
         "rows": _grid(bench.rows.drop(columns="on_front")),
         "stress": _grid(outcomes.assign(all=outcomes.sum(axis=1)).reset_index()),
         # a table that has counts alone says nothing of how much and how well
@@ -101,8 +102,10 @@ def _numeric(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def _claims(claims: pd.DataFrame) -> Grid | None:
-    """The table of promises; a broken one is marked."""
+    """The table of promises; broken ones come first and are marked."""
     verdicts = claims["met"].map({True: "met", False: "NOT MET"}).astype("string").fillna("")
+    order = verdicts.ne("NOT MET").sort_values(kind="stable").index
+    claims, verdicts = claims.loc[order], verdicts[order]
     return _grid(claims.assign(met=verdicts).fillna({"aim": ""}), bad=verdicts == "NOT MET")
 
 

@@ -4,6 +4,8 @@
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
     /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
+    /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
+                         of samples ``across_mm`` apart, the wire in their middle; ``normal``: their first axis
 
 The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attribute ``unit``. Curves are LPS mm,
 arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
@@ -13,7 +15,7 @@ import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -38,6 +40,15 @@ class ScanCrop:
     def to_index(self, points_mm: Array) -> Array:
         """Continuous voxel indices (n, 3) of LPS points (n, 3)."""
         return np.asarray((points_mm - self.origin_mm) @ self.direction / self.spacing_mm)
+
+
+class Straightened(NamedTuple):
+    """The scan along a wire: k planes (k, m, m) and how far apart, as their samples; normal (3,): see above."""
+
+    values: NDArray[np.uint8]
+    along_mm: float
+    across_mm: float
+    normal: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +77,7 @@ class FrameArrays:
     simulated_in_view_mm: Array | None = None
     median_mm: Array | None = None
     covariance_mm2: Array | None = None
+    straightened: Straightened | None = None
 
     @property
     def curves(self) -> dict[str, Array]:
@@ -76,8 +88,11 @@ class FrameArrays:
 
 ATTRIBUTES = {"schema": 1, "length_unit": "mm", "force_unit": "N", "coordinates": "LPS"}
 """What stands at the root of the file: positive x to the patient's left, y to the back, z to the head."""
+_PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1}
+"""One fast pass of gzip: a projection is mostly dark, so it halves."""
+_OF_PLANES = ("along_mm", "across_mm", "normal")
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
-_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips"))
+_ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips", "straightened"))
 
 
 def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
@@ -98,6 +113,9 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
                     values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
                     values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
             _write_pictures(group, "mip", frame.mips)
+            if frame.straightened is not None:
+                planes = group.create_dataset("straightened", data=frame.straightened.values, **_PACKED)
+                planes.attrs.update(dict(zip(_OF_PLANES, frame.straightened[1:], strict=True)))
     write_bytes(path, whole.getvalue())
 
 
@@ -125,13 +143,20 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         names = {int(name): name for name in file["frames"]}
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
-        return FrameArrays(frame, mips=_read_pictures(group, "mip"), **arrays)
+        return FrameArrays(frame, mips=_read_pictures(group, "mip"), straightened=_read_straightened(group), **arrays)
+
+
+def _read_straightened(group: Any) -> Straightened | None:
+    if "straightened" not in group:
+        return None
+    planes = group["straightened"]
+    along, across, normal = (planes.attrs[name] for name in _OF_PLANES)
+    return Straightened(np.array(planes), float(along), float(across), np.array(normal, float))
 
 
 def _write_pictures(group: Any, prefix: str, pictures: Pictures) -> None:
     for axis, picture in pictures.items():
-        # one fast pass of gzip: a projection is mostly dark, so it halves
-        group.create_dataset(f"{prefix}_{axis}", data=picture, compression="gzip", compression_opts=1)
+        group.create_dataset(f"{prefix}_{axis}", data=picture, **_PACKED)
 
 
 def _read_pictures(group: Any, prefix: str) -> Pictures:

@@ -17,7 +17,7 @@ from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
-from reports.verdict import next_command, verdict, worst_frames
+from reports.verdict import next_command, typed, verdict, worst_frames
 from reports.viewer import viewer_data
 
 
@@ -41,6 +41,7 @@ def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[
         source = _link(path, folder, "image/png", embed)
         numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
         shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
+        shown["graded"] = drawing.graded
         sections.append({**entry, **shown})
     return sections
 
@@ -66,7 +67,8 @@ def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
 _OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
-"""When and where a case was computed, and how long it took: no page says so, so that the same results give the same."""
+"""When and where a case was computed, and how long it took: a page of what is ok says nothing of it, so that the same
+results give the same; one with failures repeats the command."""
 
 
 def render_case(case_dir: Path, embed: bool = False) -> Path:
@@ -88,7 +90,7 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "good": result.get("status") in GOOD,
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
-        "next": next_command([case.name]),
+        "next": next_command([case.name], typed(case_dir)),
         "viewer": viewer,
         "curves": {name for frame in viewer["frames"] for name in frame["curves"]} if viewer else (),
         **{key: result.get(key, "") for key in ("role", "group")},
@@ -129,7 +131,8 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         **_headline(cases, bool(failures)),
         "verdict": verdict(row),
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
-        "next": next_command([f["case"] for f in failures], _typed(infos)),
+        # of several shards' commands none is the one of the run
+        "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
         "failures": failures,
         "simulators": (out_dir / "simulators").is_dir(),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
@@ -167,11 +170,6 @@ def _case_verdict(case: CaseFiles) -> str:
 
 def _is_tall(section: Mapping[str, Any]) -> bool:
     return int(section["height"]) > int(section["width"])
-
-
-def _typed(infos: Sequence[Mapping[str, Any]]) -> Sequence[str]:
-    """The command of the run, where a single one wrote the folder."""
-    return infos[0].get("provenance", {}).get("argv", ()) if len(infos) == 1 else ()
 
 
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:

@@ -17,7 +17,7 @@ from reports.figures import declared
 from reports.html import draw_sections
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, verdict, worst_frames
+from reports.verdict import next_command, typed, verdict, worst_frames
 
 _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
@@ -110,8 +110,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
             page.text(f"{place}: {status}. {textwrap.shorten(str(text), 300, placeholder='…')}")
         if len(failures) > _MOST_FAILURES:
             page.text(f"… and {len(failures) - _MOST_FAILURES} more in failures.csv")
-        typed = run.get("provenance", {}).get("argv", ())
-        page.text(f"Next: do what the message says, then {next_command(failures['case'], typed)}", weight="bold")
+        command = next_command(failures["case"], typed(out_dir))
+        page.text(f"Next: do what the message says, then {command}", weight="bold")
     for card in _content.overall(declared("overall"), whole):
         page.text(f"{card['value']}  {card['label']}")
     return _draw(page, out_dir, ("case_frame_map",))

@@ -10,12 +10,27 @@ from typing import Any
 
 import pandas as pd
 
+from reports._content import grid
 from reports.atomic import write_bytes, write_text
 from reports.diff import Difference
 from reports.html import write_page
+from reports.schema import ERRORS, SUMMARY, Column
 
 SHOWN = 30
 """Regressions that a text names; JSON and JUnit have all."""
+
+_HEADS = {
+    "what": "a setting, an input, the code",
+    "column": "of overall.csv or errors.csv",
+    "before": "in the first run",
+    "after": "in the second run",
+    "pairs": "frames that both runs have",
+    "median_change": "second run less first run, median over the pairs",
+    "worst": "the largest change for the worse",
+    "regressions": "frames that became worse by more than is allowed",
+    "allowed": "by the tolerance",
+    "meaning": "what the column holds",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +82,24 @@ class Verdict:
             "json": lambda path: write_text(path, json.dumps(self._plain(), indent=1, ensure_ascii=False) + "\n"),
             "markdown": lambda path: write_text(path, self._markdown()),
             "junit": lambda path: write_bytes(path, ET.tostring(self._junit(), encoding="utf-8", xml_declaration=True)),
-            "html": lambda path: write_page("diff.html.j2", {"title": "wireval diff", "verdict": self}, path),
+            "html": lambda path: write_page("diff.html.j2", {**self._page(), "verdict": self}, path),
         }
         for kind, path in places.items():
             if path is not None:
                 writers[kind](path)
+
+    def _page(self) -> dict[str, Any]:
+        """Title and tables; a row of a column of errors.csv or overall.csv says what that is."""
+        known = {c.name: c.meaning for table in (SUMMARY, ERRORS) for c in table}
+        grids = []
+        for head, table in self.tables.items():
+            if not len(table):
+                continue
+            shown = table.assign(meaning=table["column"].map(known)) if "column" in table else table
+            texts = {str(n): shown[n].map(lambda v: isinstance(v, str)).any() for n in shown}
+            columns = [Column(n, "-", _HEADS.get(n, ""), "text" if text else "float") for n, text in texts.items()]
+            grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": grid(shown, columns)})
+        return {"title": "Two runs beside each other - wireval", "grids": grids}
 
     def _plain(self) -> dict[str, Any]:
         # pandas writes what does not apply as null

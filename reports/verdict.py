@@ -2,12 +2,14 @@
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import WORST
+from reports.case_files import WORST, read_json
+from reports.schema import SUMMARY
 
 _MANY = 5
 
@@ -35,13 +37,20 @@ def _against(statistics: Mapping[str, Any]) -> str:
         if number(skill) != NOTHING and name:
             least = statistics.get(f"{column}_low")
             known = number(least) != NOTHING
-            rival = f"the predictor {str(name).replace('_', ' ')}" if column != "skill" else "the lumen's centreline"
+            rival = _rival(str(name)) if column != "skill" else "the lumen's centreline"
             if float(skill or 0.0) <= 0.0:
-                return f"That is no better than {rival} (skill {number(skill)})."
+                return f"That is no better (skill {number(skill)}) than {rival}."
             if known and float(least or 0.0) <= 0.0:
-                return f"That it is better than {rival} is not shown: the skill's interval reaches {number(least)}."
-            return f"That is better than {rival} (skill {number(skill)})."
+                return f"It is not shown to be better (the skill's interval reaches {number(least)}) than {rival}."
+            return f"That is better (skill {number(skill)}) than {rival}."
     return ""
+
+
+def _rival(name: str) -> str:
+    """A predictor in words: what the meaning of its column says after the colon."""
+    column = f"null_{name}_rms_mm"
+    words = SUMMARY[column].meaning.partition("predictor: ")[2].partition(";")[0] if column in SUMMARY.names else ""
+    return f"the strongest trivial predictor: {words or name.replace('_', ' ')}"
 
 
 def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -56,6 +65,12 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
         {"case": case, "frame": frame, "text": number(value), "link": links.get(case, "")}
         for value, case, frame in rows[:_MANY]
     ]
+
+
+def typed(folder: Path) -> Sequence[str]:
+    """The command that wrote a run's or a case's folder; none where nothing tells."""
+    words = read_json(folder / "provenance.json").get("argv", ())
+    return [str(word) for word in words] if isinstance(words, list) else ()
 
 
 def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:

@@ -14,12 +14,13 @@ from PIL import Image
 
 from reports.case_files import GOOD, CaseFiles, thinned
 from reports.export.vtp import Index, read_surface_vtp
-from reports.frames_file import Array, FrameArrays, ScanCrop
+from reports.frames_file import Array, FrameArrays, ScanCrop, Straightened
 
 _MAX_TRIANGLES = 8_000  # 150 kB of page
 _MAX_POINTS = 240  # of a curve: 0.5 mm apart on a wire of 120 mm
 _PICTURES_BYTES = 1_000_000  # of all scans together, so that a page stays below 2 MB
 _QUALITY = 60  # of JPEG: a wire of one voxel still shows
+_PLANES, _MOST_PLANES = 1_800, 60  # across the wires, of all frames and of one: 10 kB
 _MAX_FRAMES = 120
 _WINDOW_PERCENTILES = (2.0, 99.8)
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
@@ -28,11 +29,15 @@ _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
     """The JSON of the viewer; None where no frame has a curve or a picture."""
     rows = case.errors.set_index("frame")
-    numbers = [case.frames[place] for place in thinned(len(case.frames), _MAX_FRAMES)]
-    if not numbers:
+    arrays = [case.read_frame(case.frames[place]) for place in thinned(len(case.frames), _MAX_FRAMES)]
+    if not arrays:
         return None
-    shrink = _shrink(case.read_frame(numbers[0]), len(numbers))
-    frames = [_frame(case.read_frame(n), rows.loc[n] if n in rows.index else {}, shrink) for n in numbers]
+    straight = [_straight(a.straightened, _PLANES // len(arrays)) for a in arrays]
+    shrink = _shrink(arrays[0], len(arrays), _PICTURES_BYTES - sum(len(str(one)) for one in straight))
+    frames = [
+        _frame(a, rows.loc[a.frame] if a.frame in rows.index else {}, shrink) | {"straight": one}
+        for a, one in zip(arrays, straight, strict=True)
+    ]
     if not any(frame["curves"] or frame["pictures"] for frame in frames):
         return None
     worst = [frame["p95_mm"] if frame["status"] == "ok" else None for frame in frames]
@@ -45,7 +50,7 @@ def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
         "top_mm": _round_up(max(top, 0.05)),
         "scan": None if case.scan is None else _scan(case.scan),
         "lumen": _lumen(case),
-        "left_out": len(case.frames) - len(numbers),
+        "left_out": len(case.frames) - len(arrays),
     }
 
 
@@ -81,6 +86,26 @@ def _frame(frame: FrameArrays, row: Any, shrink: float) -> dict[str, Any]:
         "arc_mm": _flat(_few(frame.arc_mm)) if good and frame.arc_mm is not None else [],
         "error_mm": _flat(_few(frame.error_mm)) if good and frame.error_mm is not None else [],
         "pictures": {axis: _jpeg(picture, shrink) for axis, picture in frame.mips.items()},
+    }
+
+
+def _straight(straight: Straightened | None, most: int) -> dict[str, Any] | None:
+    """Two slabs along the wire, three samples thick, and ``most`` planes across it, one below the other."""
+    if straight is None:
+        return None
+    values, middle = straight.values, straight.values.shape[1] // 2
+    thick = slice(middle - 1, middle + 2)
+    planes = values[thinned(len(values), min(most, _MOST_PLANES))]
+    # seen along the wire: up the first direction, to the right the second
+    below = planes[:, ::-1].reshape(-1, values.shape[2])
+    return {
+        "along_mm": straight.along_mm,
+        "across_mm": straight.across_mm,
+        "samples": values.shape[:2],
+        "planes": len(planes),
+        "normal": [round(float(x), 6) for x in straight.normal],
+        "slabs": [_jpeg(values[:, :, thick].max(axis=2), 1.0), _jpeg(values[:, thick].max(axis=1), 1.0)],
+        "across": _jpeg(below.T[:, ::-1], 1.0),
     }
 
 
@@ -127,10 +152,10 @@ def _lumen(case: CaseFiles) -> dict[str, Any] | None:
     return dict(zip(("vertices", "triangles"), packed, strict=True)) | {"low_mm": _flat(low), "size_mm": size}
 
 
-def _shrink(frame: FrameArrays, count: int) -> float:
-    """The scale of all pictures at which those of ``count`` frames like this one stay within the page's budget."""
+def _shrink(frame: FrameArrays, count: int, most_bytes: int) -> float:
+    """The scale of all projections at which those of ``count`` frames like this one stay within what is left."""
     scale = 1.0
-    while scale > 0.2 and count * sum(len(_jpeg(p, scale)) for p in frame.mips.values()) > _PICTURES_BYTES:
+    while scale > 0.2 and count * sum(len(_jpeg(p, scale)) for p in frame.mips.values()) > most_bytes:
         scale *= 0.8
     return scale
 

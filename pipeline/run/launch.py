@@ -33,6 +33,7 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import Resolved, differing, to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.html import render_index
+from reports.verdict import next_command, typed
 
 
 class UsageError(InputError):
@@ -194,16 +195,19 @@ def intention(plan: Plan) -> list[str]:
 
 
 def failure_lines(plan: Plan) -> list[str]:
-    """What went wrong, a line each: every frame or case that is not ok, and what crashed at points of a sweep."""
-    lines = []
+    """What went wrong, a line each (frames, cases, crashed points of a sweep), and the command that comes next."""
+    lines, cases = [], []
     for result in found_results(plan.out):
         for row in result.failures:
+            cases.append(row["case"])
             frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
             lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
-    return lines + [
+    lines += [
         f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
+    command = f"next: do what the message says, then {next_command(cases, typed(plan.out))}"
+    return [*lines, command] if cases else lines
 
 
 def last_line(totals: Totals, index: Path) -> str:

@@ -179,4 +179,5 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         seen_in_view_mm=frame.in_view_mm[0] if frame.in_view_mm else None,
         simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,
         mips=dict(enumerate(frame.projections)),
+        straightened=frame.straightened,
     )

@@ -12,6 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -47,6 +48,11 @@ class Drawing:
     table: pd.DataFrame
     compact: bool = False
     frames: Sequence[FrameAxis] = ()
+
+    @property
+    def graded(self) -> bool:
+        """It shows greys or a scale of colours: on a dark page bright must not become dark."""
+        return any(a.images or any(isinstance(c, QuadMesh) for c in a.collections) for a in self.figure.axes)
 
     @property
     def marks(self) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-// The viewer of a case: one frame at a time in three projections, in 3D, and along the wire; lengths in mm.
+// The viewer of a case: one frame at a time in slabs along and across the wire, in 3D, and in projections; lengths in mm.
 (() => {
   "use strict";
   const data = JSON.parse(document.getElementById("viewer-data").textContent);
@@ -63,6 +63,7 @@
     const tangents = curve.map((_, i) => unit(minus(curve[Math.min(i + 1, last)], curve[Math.max(i - 1, 0)])));
     const least = [0, 1, 2].reduce((a, b) => (Math.abs(tangents[0][b]) < Math.abs(tangents[0][a]) ? b : a));
     let first = [0, 0, 0]; first[least] = 1;
+    if (frame.straight) first = frame.straight.normal; // the directions of the slabs
     const normals = tangents.map((t) => { first = unit(along(first, t, -dot(first, t))); return first; });
     const against = (p) => {
       let best = Infinity, i = 1, u = 0;
@@ -249,49 +250,87 @@
   });
   all("[data-view]").forEach((button) => button.addEventListener("click", () => { camera = PRESETS[button.dataset.view]; near = 1; draw(); }));
 
-  // ---- along the wire
-  const LEFT = 62, RIGHT = 14, TOP = 20, STRIP = 116, GAP = 14;
-  $("straight").style.height = `${TOP + 2 * STRIP + GAP + 38}px`;
+  // ---- along the wire: two slabs of the scan pulled straight, magnified across, and the plane across it at the place
+  const LEFT = 62, RIGHT = 14, TOP = 20, STRIP = 140, GAP = 14;
+  const tall = `${TOP + 2 * STRIP + GAP + 38}px`;
+  $("straight").style.height = $("across").style.height = tall;
   const reach = (f) => f.lines.traced.arc[f.lines.traced.arc.length - 1];
+  const sizesOf = (f) => Object.values(f.offsets).flat();
+  // what of the wire the strips show: all of it, or around the place when zoomed
+  const seen = (f, width) => {
+    const whole = Math.max(reach(f), ...sizesOf(f).map((o) => o[0])) || 1, length = whole / zoom(), cursor = place();
+    const from = clamp((cursor ? cursor.s : 0) - length / 2, 0, whole - length), px = (width - LEFT - RIGHT) / length;
+    return { from, length, px, X: (s) => LEFT + (s - from) * px };
+  };
+  const slabOf = (f, k) => shown("scan") && f.straight && picture(f.straight.slabs[k]);
   const straight = () => {
     const { pen, width, height } = cleared($("straight")), f = frame(), ink = css("--ink"), line = css("--line");
     pen.font = "12px system-ui, sans-serif"; pen.fillStyle = ink;
     if (!f.offsets) { pen.textAlign = "left"; pen.fillText("No traced wire in this frame: nothing to measure offsets from.", 12, 28); return; }
-    const sizes = Object.values(f.offsets).flat(), most = nice(Math.max(LEAST_OFFSET_MM, ...sizes.map((o) => Math.max(Math.abs(o[1]), Math.abs(o[2])))), [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
-    const length = Math.max(reach(f), ...sizes.map((o) => o[0])) || 1, across = (width - LEFT - RIGHT) / length, tall = (STRIP / 2 - 4) / most;
-    const X = (s) => LEFT + s * across;
-    const step = nice(length / Math.max(3, width / 110));
-    for (const k of [1, 2]) {
-      const zero = TOP + (k - 0.5) * STRIP + (k - 1) * GAP, Y = (o) => zero - o * tall;
-      pen.strokeStyle = line; pen.lineWidth = 1; pen.fillStyle = ink; pen.textAlign = "right";
-      for (const o of [-most, 0, most]) { pen.beginPath(); pen.moveTo(LEFT, Y(o)); pen.lineTo(width - RIGHT, Y(o)); pen.stroke(); pen.fillText(`${o > 0 ? "+" : o < 0 ? "\u2212" : ""}${Math.abs(o)} mm`, LEFT - 6, Y(o) + 4); }
-      if (shown("traced")) {
-        pen.fillStyle = COLOUR.traced; pen.globalAlpha = 0.22;
-        if (f.sigma_mm) pen.fillRect(LEFT, Y(2 * f.sigma_mm), reach(f) * across, 4 * f.sigma_mm * tall);
-        pen.globalAlpha = 1; pen.strokeStyle = COLOUR.traced; pen.lineWidth = 2.4;
-        pen.beginPath(); pen.moveTo(LEFT, zero); pen.lineTo(X(reach(f)), zero); pen.stroke();
+    const least = slabOf(f, 0) ? f.straight.across_mm : LEAST_OFFSET_MM; // of a scan, a voxel and a half at least
+    const most = nice(Math.max(least, ...sizesOf(f).map((o) => Math.max(Math.abs(o[1]), Math.abs(o[2])))), [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
+    const { from, length, px, X } = seen(f, width), high = (STRIP / 2 - 4) / most;
+    for (const k of [0, 1]) {
+      const zero = TOP + (k + 0.5) * STRIP + k * GAP, Y = (o) => zero - o * high, image = slabOf(f, k);
+      pen.fillStyle = ink; pen.textAlign = "right";
+      for (const o of [-most, 0, most]) pen.fillText(`${o > 0 ? "+" : o < 0 ? "\u2212" : ""}${Math.abs(o)} mm`, LEFT - 6, Y(o) + 4);
+      pen.save(); pen.beginPath(); pen.rect(LEFT, Y(most), width - LEFT - RIGHT, 2 * most * high); pen.clip();
+      if (image) {
+        const { along_mm, across_mm, samples } = f.straight, half = 0.5 * samples[1] * across_mm;
+        pen.fillStyle = "#000000"; pen.fillRect(0, 0, width, height);
+        pen.drawImage(image, X(-0.5 * along_mm), Y(half), samples[0] * along_mm * px, 2 * half * high);
       }
-      pen.save(); pen.beginPath(); pen.rect(LEFT, zero - STRIP / 2, width - LEFT - RIGHT, STRIP); pen.clip();
+      if (shown("traced")) {
+        pen.fillStyle = COLOUR.traced; pen.globalAlpha = 0.3;
+        if (f.sigma_mm) pen.fillRect(X(0), Y(2 * f.sigma_mm), reach(f) * px, 4 * f.sigma_mm * high);
+        pen.globalAlpha = 1; pen.strokeStyle = COLOUR.traced; pen.lineWidth = 2.4;
+        trail(pen, [[X(0), zero], [X(reach(f)), zero]]);
+      }
       for (const name of ["true", "simulated"]) if (f.offsets[name] && shown(name)) {
-        const spots = f.offsets[name].map((o) => [X(o[0]), Y(o[k])]), colours = f.lines[name].colours;
-        pen.lineWidth = 2; pen.setLineDash(name === "true" ? [2, 4] : []);
-        for (let i = 1; i < spots.length; i++) { pen.strokeStyle = colours ? colours[i] : COLOUR[name]; if (!colours && i > 1) break; pen.beginPath(); if (colours) { pen.moveTo(...spots[i - 1]); pen.lineTo(...spots[i]); } else spots.forEach((s, j) => (j ? pen.lineTo(...s) : pen.moveTo(...s))); pen.stroke(); }
-        pen.setLineDash([]);
+        const spots = f.offsets[name].map((o) => [X(o[0]), Y(o[k + 1])]);
+        if (image) { pen.strokeStyle = "#ffffffb0"; pen.lineWidth = 3.8; trail(pen, spots); }
+        stroke(pen, name, spots, f.lines[name].colours, 2);
       }
       pen.restore();
+      pen.strokeStyle = line; pen.lineWidth = 1; pen.strokeRect(LEFT, Y(most), width - LEFT - RIGHT, 2 * most * high);
     }
-    const bottom = TOP + 2 * STRIP + GAP, cursor = place();
+    const bottom = TOP + 2 * STRIP + GAP, cursor = place(), step = nice(length / Math.max(3, width / 110));
     pen.fillStyle = ink; pen.textAlign = "center";
-    for (let s = 0; s <= length + 1e-9; s += step) { pen.strokeStyle = line; pen.beginPath(); pen.moveTo(X(s), bottom); pen.lineTo(X(s), bottom + 4); pen.stroke(); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
+    for (let s = Math.ceil(from / step) * step; s <= from + length + 1e-9; s += step) { pen.strokeStyle = line; pen.lineWidth = 1; trail(pen, [[X(s), bottom], [X(s), bottom + 4]]); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
     pen.fillText("arc length along the traced wire, mm", LEFT + (width - LEFT - RIGHT) / 2, bottom + 33);
-    pen.textAlign = "left"; pen.fillText(`offset across the traced wire, \u00d7 ${Math.max(1, Math.round(tall / across))}`, LEFT, 13);
-    if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; pen.beginPath(); pen.moveTo(X(cursor.s), TOP); pen.lineTo(X(cursor.s), bottom); pen.stroke(); }
+    pen.textAlign = "left"; pen.fillText(`offset across the traced wire, \u00d7 ${Number((high / px).toPrecision(2))}`, LEFT, 13);
+    if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; trail(pen, [[X(cursor.s), TOP], [X(cursor.s), bottom]]); }
   };
-  dragged($("straight"), (e) => {
+  const across = () => {
+    const { pen, width, height } = cleared($("across")), f = frame(), cursor = place();
+    if (!f.offsets || !cursor) return;
+    const half = f.straight ? 0.5 * f.straight.samples[1] * f.straight.across_mm : 3, scale = (Math.min(width, height) / (2 * half)) * zoom();
+    const spot = (o) => [width / 2 + o[2] * scale, height / 2 - o[1] * scale];
+    const image = f.straight && shown("scan") && picture(f.straight.across);
+    if (image) {
+      const { planes, samples, along_mm } = f.straight, k = Math.round(clamp(cursor.s / (along_mm * (samples[0] - 1) || 1), 0, 1) * (planes - 1));
+      pen.drawImage(image, 0, k * samples[1], samples[1], samples[1], ...spot([0, half, -half]), 2 * half * scale, 2 * half * scale);
+    }
+    const disc = (o, size, colour) => { pen.fillStyle = "#ffffffb0"; pen.beginPath(); pen.arc(...spot(o), size + 1.2, 0, 7); pen.fill(); pen.fillStyle = colour; pen.beginPath(); pen.arc(...spot(o), size, 0, 7); pen.fill(); };
+    if (shown("traced")) {
+      disc([0, 0, 0], 4, COLOUR.traced);
+      if (f.sigma_mm) { pen.strokeStyle = COLOUR.traced; pen.lineWidth = 1.5; pen.beginPath(); pen.arc(...spot([0, 0, 0]), 2 * f.sigma_mm * scale, 0, 7); pen.stroke(); }
+    }
+    for (const name of ["true", "simulated"]) if (f.offsets[name] && shown(name)) {
+      const i = f.offsets[name].findIndex((o) => o[0] >= cursor.s);
+      const o = f.offsets[name][i < 0 ? f.offsets[name].length - 1 : i];
+      disc(o, 4, f.lines[name].colours ? f.lines[name].colours[i < 0 ? f.lines[name].colours.length - 1 : i] : COLOUR[name]);
+    }
+    ruler(pen, width, height, scale);
+    $("across").previousElementSibling.textContent = `across the wire at ${cursor.s.toFixed(1)} mm, seen from the entry`;
+  };
+  // a click goes there; dragging follows the pointer, or pulls the zoomed strip along
+  dragged($("straight"), (e, before) => {
     const f = frame(), wire = wireOf(f);
     if (!f.offsets || !wire) return;
-    const box = $("straight").getBoundingClientRect(), sizes = Object.values(f.offsets).flat(), length = Math.max(reach(f), ...sizes.map((o) => o[0])) || 1;
-    $("place").value = clamp(((e.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT)) * length / wire.arc[wire.arc.length - 1], 0, 1);
+    const box = $("straight").getBoundingClientRect(), { from, px } = seen(f, box.width);
+    const s = zoom() > 1 && e !== before ? place().s - (e.clientX - before.clientX) / px : from + (e.clientX - box.left - LEFT) / px;
+    $("place").value = clamp(s / wire.arc[wire.arc.length - 1], 0, 1);
     draw();
   });
 
@@ -330,7 +369,7 @@
     const error = cursor && f.lines.simulated ? errorAt(f, cursor.s) : null;
     $("place-text").textContent = cursor ? `${cursor.s.toFixed(1)} mm from the entry${error === null ? "" : `, ${error.toFixed(3)} mm off`}` : "no wire in this frame";
     slabs.forEach((one) => one());
-    solid(); straight(); markAll(f.frame);
+    solid(); straight(); across(); markAll(f.frame);
   };
   function draw() { asked ||= requestAnimationFrame(paint); }
   const go = (i) => { now = clamp(i, 0, data.frames.length - 1); $("frame").value = now; draw(); };

@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from pipeline.model import Volume
+from pipeline.run.straightened import straightened
 from reports import export, frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, TIMINGS
@@ -67,6 +69,9 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
         tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
     tables.write(out / OVERALL_FILE, SUMMARY, [_overall(summaries)])
     run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance()}
+    typed = {"argv": ["wireval", "run", "manifest.toml", "-o", "out"]}
+    for folder in (out, *(out / "cases" / case.name for case in cases)):
+        (folder / "provenance.json").write_text(json.dumps(typed), encoding="utf-8")
     (out / "run.json").write_text(json.dumps(run, indent=1), encoding="utf-8")
     return out
 
@@ -248,7 +253,9 @@ def _frames(case: FakeCase) -> Iterator[FrameArrays]:
             continue
         traced = true + rng.normal(0, 0.02, true.shape)
         truth = true if case.truth else None
-        yield FrameArrays(frame, traced, simulated, error, arc, force, truth, np.full(len(true), 0.02), mips)
+        straight = straightened(Volume(scan, SPACING, ORIGIN), traced, (0.0, 255.0))
+        sigma = np.full(len(true), 0.02)
+        yield FrameArrays(frame, traced, simulated, error, arc, force, truth, sigma, mips=mips, straightened=straight)
 
 
 def _tube(curve: np.ndarray, radius: float, grey: float) -> np.ndarray:
@@ -335,7 +342,6 @@ def _provenance() -> dict[str, Any]:
         "wireval": "0.1.0",
         "git_commit": "0" * 40,
         "versions": {"numpy": "2.4.6", "SimpleITK": "2.5.7"},
-        "argv": ["wireval", "run", "manifest.toml", "-o", "out"],
         "host": "host",
         "cpu": "some processor",
         "threads": 1,

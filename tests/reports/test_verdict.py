@@ -11,21 +11,19 @@ from reports.verdict import next_command, verdict, worst_frames
 @pytest.mark.parametrize(
     ("skill", "low", "said"),
     [
-        (0.9, 0.7, "That is better than the predictor roll unknown (skill 0.900)."),
-        (0.9, None, "That is better than the predictor roll unknown (skill 0.900)."),
-        (
-            0.4,
-            -0.1,
-            "That it is better than the predictor roll unknown is not shown: the skill's interval reaches -0.100.",
-        ),
-        (-0.2, -0.5, "That is no better than the predictor roll unknown (skill -0.200)."),
+        (0.9, 0.7, "That is better (skill 0.900) than "),
+        (0.9, None, "That is better (skill 0.900) than "),
+        (0.4, -0.1, "It is not shown to be better (the skill's interval reaches -0.100) than "),
+        (-0.2, -0.5, "That is no better (skill -0.200) than "),
     ],
 )
 def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None, said: str) -> None:
     row = {"rms_mm": 0.25, "p95_mm": 0.5, "skill": 0.99, "skill_strongest": skill, "strongest_null": "roll_unknown"}
     text = verdict(row | {"skill_strongest_low": low})
     assert text.startswith("The simulated wire lies 0.250 mm (rms) from the traced one; 95 % of its points lie within")
-    assert text.endswith(said)
+    # a newcomer is told what "roll unknown" means
+    rival = "the simulator that does not know the roll, mean of 12 wires 30 degrees apart."
+    assert text.endswith(f"{said}the strongest trivial predictor: {rival}")
 
 
 def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:

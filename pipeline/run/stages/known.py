@@ -20,6 +20,7 @@ from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
+from reports.frames_file import Straightened
 from solver import Solution, Status
 
 
@@ -33,7 +34,7 @@ class Frame:
     num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
     view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
     one (k, 2) on the plane through the isocentre.
-    projections : maximum-intensity projections of the scan along the array axes.
+    projections, straightened : of the scan: its maxima along the array axes, and planes across the traced wire.
     """
 
     index: int
@@ -57,6 +58,7 @@ class Frame:
     truth: dict[str, float] = field(default_factory=dict)
     nulls_rms_mm: dict[str, float] = field(default_factory=dict)
     projections: tuple[NDArray[np.uint8], ...] = ()
+    straightened: Straightened | None = None
 
     @property
     def ok(self) -> bool:

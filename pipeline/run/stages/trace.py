@@ -12,6 +12,7 @@ from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.straightened import straightened
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import of_length, trace
@@ -81,7 +82,7 @@ class _Tracing:
         pictures = projections(shown, self.window)
         done = replace(frame, registration=registration, projections=pictures)
         if given is not None:
-            return _as_given(self.run, done, given)
+            return _along(_as_given(self.run, done, given), shown, self.window)
         curve = self.run.stored(
             "trace",
             trace,
@@ -95,7 +96,14 @@ class _Tracing:
             expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
             config=settings,
         )
-        return _traced(done, curve)
+        return _along(_traced(done, curve), shown, self.window)
+
+
+def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
+    """The frame with its scan pulled straight along the traced wire, where it has one."""
+    if frame.curve is None or not frame.traced:
+        return frame
+    return replace(frame, straightened=straightened(shown, frame.curve.points_mm, window))
 
 
 def _traced(frame: Frame, curve: Curve) -> Frame:

@@ -1,0 +1,49 @@
+"""The scan around a traced wire, pulled straight along it: what the viewer shows behind errors of a tenth of a mm."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from pipeline.arrays.polyline import at_arc
+from pipeline.model import Array, Volume, arc_length
+from reports.frames_file import Straightened
+
+STEP_VOXELS = 0.75  # of the smallest side of a voxel: finer shows nothing more
+ACROSS = 25  # samples, 9 voxels to either side: the vessel around the wire
+MOST_PLANES = 300  # 190 kB a frame, as much as its projections
+_AHEAD_MM = 0.5  # tangents are taken from so far behind to so far ahead: the trace's noise would tilt the planes
+
+
+def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -> Straightened:
+    """Planes across a curve (n, 3), LPS mm, one after the other, 8 bit within the grey-value ``window``.
+
+    Axes: along the curve, then two directions at right angles that are carried along it without turning.
+    """
+    length = float(arc_length(curve_mm)[-1])
+    across = STEP_VOXELS * float(np.min(volume.spacing_mm))
+    along = max(across, length / MOST_PLANES)
+    arc = np.arange(0.0, length, along)
+    tangents = _unit(at_arc(curve_mm, arc + _AHEAD_MM) - at_arc(curve_mm, np.maximum(arc - _AHEAD_MM, 0.0)))
+    first = _carried(tangents)
+    second = np.cross(tangents, first)
+    offsets = across * (np.arange(ACROSS) - ACROSS // 2)
+    # every plane's points: (planes, samples along the first direction, along the second, 3)
+    planes = offsets[:, None, None] * first[:, None, None] + offsets[:, None] * second[:, None, None]
+    index = volume.to_index(at_arc(curve_mm, arc)[:, None, None] + planes)
+    low, high = window
+    values = map_coordinates(volume.values, np.moveaxis(index, -1, 0), np.float32, order=1, cval=low)
+    grey = np.clip((values - low) * (255.0 / max(high - low, 1e-9)), 0, 255)
+    return Straightened(grey.astype(np.uint8), along, across, first[0])
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
+
+
+def _carried(tangents: Array) -> Array:
+    """A direction at right angles to each tangent (n, 3), taken from one to the next without turning about it."""
+    normals = np.zeros_like(tangents)
+    normal: Array = np.eye(3)[np.argmin(np.abs(tangents[0]))]
+    for i, tangent in enumerate(tangents):
+        normal = _unit(normal - (normal @ tangent) * tangent)
+        normals[i] = normal
+    return normals
