@@ -23,7 +23,7 @@ def number(value: Any, digits: int = 3) -> str:
     if not isinstance(value, float):
         return str(value)
     if value == 0 or math.isinf(value):
-        return f"{value:g}"
+        return f"{value + 0.0:g}"  # of -0.0, too
     exponent = math.floor(math.log10(abs(value)))
     if not -4 <= exponent < 6:
         return f"{value:.{digits}g}"

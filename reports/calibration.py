@@ -43,7 +43,7 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
 
 
 def _row(row: dict[str, Any]) -> dict[str, Any]:
-    spread = f"{100 * row['sd']:.2g} %" if row["logarithmic"] else number(row["sd"], 2)
+    spread = f"{number(100 * row['sd'], 2)} %" if row["logarithmic"] else number(row["sd"], 2)
     bounds = " to ".join(number(float(v)) for v in row["bounds"])
     return {
         "parameter": row["name"],

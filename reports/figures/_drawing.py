@@ -28,7 +28,7 @@ from reports.tables import write_csv
 Array = NDArray[np.floating[Any]]
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
-_LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
+LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
@@ -127,7 +127,7 @@ def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
     """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
     numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
     kept = numbers[np.isfinite(numbers) & (numbers > 0)]
-    if len(kept) and kept.max() > _LOG_FROM_RATIO * kept.min():
+    if len(kept) and kept.max() > LOG_FROM_RATIO * kept.min():
         axes.set_yscale("log")
         axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
         plain_decades(axes.yaxis)

@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from itertools import cycle
 from typing import Any
 
-from reports.colours import BAD, TRUE
 from reports.colours import SIMULATED as SIMULATED
 from reports.colours import TRACED as TRACED
+from reports.colours import TRUE
 from reports.schema import ERRORS
 
 Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
 INK, GREY = "#222222", "#767676"
-PALETTE = (SIMULATED, TRACED, TRUE, PURPLE, BROWN, BAD)
+PALETTE = (SIMULATED, PURPLE, BROWN, "#1F8A8A", ROSE, SLATE)  # no wire but ours, nor what failed, has one of these
 SPARE = ("#1F8A8A", "#7A7A00")  # of columns without a style: no predictor has these colours
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {

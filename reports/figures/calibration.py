@@ -7,7 +7,16 @@ import numpy as np
 import pandas as pd
 
 from reports.colours import BAD, SIMULATED
-from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, positive_axis
+from reports.figures._drawing import (
+    LOG_FROM_RATIO,
+    Drawing,
+    lattice,
+    legend,
+    new_figure,
+    plain,
+    plain_decades,
+    positive_axis,
+)
 from reports.figures._style import BROWN, GREY
 
 HIGHEST = 12.0
@@ -32,12 +41,17 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
         if low < row["prior"] < high:
             axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
         axes.set_xlim(low, high)
-        axes.locator_params(axis="x", nbins=4)
+        if low > 0 and high > LOG_FROM_RATIO * low:
+            axes.set_xscale("log")
+            plain_decades(axes.xaxis, (1.0,))
+        else:
+            axes.locator_params(axis="x", nbins=4)
         axes.set_ylim(-0.4, HIGHEST)
         verdict = "" if row["seen"] else ": not seen"
         axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
         plain(axes)
         table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
+    figure.supylabel("rise of minus twice the log-posterior", fontsize=8)
     return Drawing(figure, pd.DataFrame(table))
 
 

@@ -6,9 +6,9 @@ from itertools import cycle
 import pandas as pd
 from matplotlib.axes import Axes
 
-from reports.colours import SIMULATED, TRACED, TRUE
+from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
-from reports.figures._style import BROWN, PURPLE, ROSE, SLATE
+from reports.figures._style import PALETTE
 
 OURS = "wireval"
 _FAINT = 0.3  # of a lead that is not clear
@@ -24,7 +24,7 @@ class SimulatorFiles:
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
     """The solver's own in its colour, every other simulator in one of its own."""
-    spare = cycle((TRACED, TRUE, PURPLE, BROWN, ROSE, SLATE))
+    spare = cycle(PALETTE[1:])
     return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
 
 
