@@ -82,7 +82,7 @@
   };
 
   // ---- state
-  let now = data.start;
+  let now = data.start, paper = false; // on paper the ink is black, whatever the page's scheme
   const frame = () => ready(data.frames[now]);
   const wireOf = (f) => f.lines.simulated ?? f.lines.traced ?? f.lines.true ?? null;
   const place = () => {
@@ -114,10 +114,11 @@
     }
     return { ratio, width, height };
   };
-  const cleared = (canvas) => {
+  const cleared = (canvas, ground = "#101316") => {
     const box = fitted(canvas), pen = canvas.getContext("2d");
     pen.setTransform(box.ratio, 0, 0, box.ratio, 0, 0);
-    pen.clearRect(0, 0, box.width, box.height);
+    pen.fillStyle = ground; // on paper, what is clear would be white
+    pen.fillRect(0, 0, box.width, box.height);
     pen.lineJoin = pen.lineCap = "round";
     return { pen, ...box };
   };
@@ -217,7 +218,7 @@
     const { pen, width, height } = cleared($("wires")), f = frame(), cursor = place();
     const scale = (near * Math.min(width, height)) / (2 * radius), [right, up] = camera;
     const spot = (p) => { const d = minus(p, centre); return [width / 2 + dot(d, right) * scale, height / 2 - dot(d, up) * scale]; };
-    if (surface) surface(scale, width, height, shown("lumen"));
+    if (surface) { surface(scale, width, height, shown("lumen")); pen.drawImage($("surface"), 0, 0, width, height); }
     strokeAll(pen, f, spot, 2);
     if (cursor) ring(pen, ...spot(cursor.p));
     ruler(pen, width, height, scale);
@@ -252,7 +253,7 @@
 
   // ---- along the wire: two slabs of the scan pulled straight, magnified across, and the plane across it at the place
   const LEFT = 62, RIGHT = 14, TOP = 20, STRIP = 140, GAP = 14;
-  const tall = `${TOP + 2 * STRIP + GAP + 38}px`;
+  const tall = `${TOP + 2 * STRIP + GAP + 44}px`;
   $("straight").style.height = $("across").style.height = tall;
   const reach = (f) => f.lines.traced.arc[f.lines.traced.arc.length - 1];
   const sizesOf = (f) => Object.values(f.offsets).flat();
@@ -264,16 +265,17 @@
   };
   const slabOf = (f, k) => shown("scan") && f.straight && picture(f.straight.slabs[k]);
   const straight = () => {
-    const { pen, width, height } = cleared($("straight")), f = frame(), ink = css("--ink"), line = css("--line");
+    const { pen, width, height } = cleared($("straight"), paper ? "#ffffff" : css("--card")), f = frame(), ink = paper ? "#000000" : css("--ink"), line = paper ? "#bbbbbb" : css("--line");
     pen.font = "12px system-ui, sans-serif"; pen.fillStyle = ink;
     if (!f.offsets) { pen.textAlign = "left"; pen.fillText("No traced wire in this frame: nothing to measure offsets from.", 12, 28); return; }
     const least = slabOf(f, 0) ? f.straight.across_mm : LEAST_OFFSET_MM; // of a scan, a voxel and a half at least
-    const most = nice(Math.max(least, ...sizesOf(f).map((o) => Math.max(Math.abs(o[1]), Math.abs(o[2])))), [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
-    const { from, length, px, X } = seen(f, width), high = (STRIP / 2 - 4) / most;
+    const { from, length, px, X } = seen(f, width), within = sizesOf(f).filter((o) => o[0] >= from && o[0] <= from + length);
+    const most = nice(Math.max(least, ...within.map((o) => Math.max(Math.abs(o[1]), Math.abs(o[2])))), [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
+    const high = (STRIP / 2 - 4) / most;
     for (const k of [0, 1]) {
       const zero = TOP + (k + 0.5) * STRIP + k * GAP, Y = (o) => zero - o * high, image = slabOf(f, k);
       pen.fillStyle = ink; pen.textAlign = "right";
-      for (const o of [-most, 0, most]) pen.fillText(`${o > 0 ? "+" : o < 0 ? "\u2212" : ""}${Math.abs(o)} mm`, LEFT - 6, Y(o) + 4);
+      for (const o of [-most, 0, most]) pen.fillText(`${o > 0 ? "+" : o < 0 ? "\u2212" : ""}${Number(Math.abs(o).toPrecision(3))} mm`, LEFT - 6, Y(o) + 4);
       pen.save(); pen.beginPath(); pen.rect(LEFT, Y(most), width - LEFT - RIGHT, 2 * most * high); pen.clip();
       if (image) {
         const { along_mm, across_mm, samples } = f.straight, half = 0.5 * samples[1] * across_mm;
@@ -298,7 +300,7 @@
     pen.fillStyle = ink; pen.textAlign = "center";
     for (let s = Math.ceil(from / step) * step; s <= from + length + 1e-9; s += step) { pen.strokeStyle = line; pen.lineWidth = 1; trail(pen, [[X(s), bottom], [X(s), bottom + 4]]); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
     pen.fillText("arc length along the traced wire, mm", LEFT + (width - LEFT - RIGHT) / 2, bottom + 33);
-    pen.textAlign = "left"; pen.fillText(`offset across the traced wire, \u00d7 ${Number((high / px).toPrecision(2))}`, LEFT, 13);
+    pen.textAlign = "left"; pen.fillText(`offset across the traced wire${high > 1.2 * px ? `, \u00d7 ${Number((high / px).toPrecision(2))}` : ""}`, LEFT, 13);
     if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; trail(pen, [[X(cursor.s), TOP], [X(cursor.s), bottom]]); }
   };
   const across = () => {
@@ -388,7 +390,7 @@
     if (wanted && index.has(wanted[1])) { go(index.get(wanted[1])); $("viewer").scrollIntoView(); }
   };
   addEventListener("hashchange", asLinked);
-  addEventListener("beforeprint", paint);
+  for (const [when, printed] of [["beforeprint", true], ["afterprint", false]]) addEventListener(when, () => { paper = printed; paint(); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   new ResizeObserver(draw).observe(document.querySelector(".viewer .views"));
   asLinked();

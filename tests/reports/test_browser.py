@@ -15,6 +15,7 @@ import pytest
 
 from reports.case_files import find_cases
 from reports.html import render_case, render_index
+from tests.reports.fake_pages import write_pages
 from tests.reports.fake_results import FakeCase, write_run
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: run `make browser`")
@@ -40,6 +41,13 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
         render_case(folder)
     render_index(out)
     return out
+
+
+@pytest.fixture(scope="module")
+def pages(run: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Every kind of page."""
+    cases = [run / "cases" / case.name / "report.html" for case in CASES[1:]]
+    return [run / "index.html", *cases, *write_pages(run, tmp_path_factory.mktemp("pages"))]
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +88,10 @@ def copied(run: Path, case: str, target: Path) -> Path:
 
 
 def painted(page: Any, canvas: str) -> int:
-    """How many pixels of a canvas are not empty."""
+    """How many pixels of a canvas have another colour than its first one."""
     count = """(name) => { const c = document.querySelector(name);
-        const seen = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
-        return seen.filter((v, i) => i % 4 === 3 && v).length }"""
+        const seen = new Uint32Array(c.getContext("2d").getImageData(0, 0, c.width, c.height).data.buffer);
+        return seen.filter((v) => v !== seen[0]).length }"""
     return int(page.evaluate(count, canvas))
 
 
@@ -100,7 +108,7 @@ def test_the_viewer_of_a_copied_case_goes_by_keys(run: Path, tmp_path: Path, ope
     page.wait_for_timeout(150)
     assert page.inner_text("#frame-text").startswith("frame 2 (3 of 6)")
     assert float(mark.evaluate("line => line.style.left")[:-1]) > float(before[:-1]) + 5
-    for canvas in ("canvas[data-axis='0']", "canvas[data-axis='2']", "#wires", "#straight"):
+    for canvas in ("canvas[data-axis='0']", "canvas[data-axis='2']", "#wires", "#straight", "#across"):
         assert painted(page, canvas) > 500, canvas
     page.focus("#wires")
     turned = page.evaluate("document.getElementById('wires').toDataURL()")
@@ -118,6 +126,32 @@ def test_the_place_on_the_wire_and_the_zoom_drive_all_views(run: Path, tmp_path:
     page.wait_for_timeout(150)
     assert all(a != b for a, b in zip(before, page.evaluate(pictures), strict=True))
     assert "mm from the entry, 0." in page.inner_text("#place-text")
+
+
+def test_a_twentieth_of_a_millimetre_is_seen_on_the_strips(run: Path, tmp_path: Path, opened: Opener) -> None:
+    page = opened(copied(run, "good", tmp_path))
+    page.focus("#frame")
+    for key in ("Home", "End"):
+        page.keyboard.press(key)
+        page.wait_for_timeout(150)
+        page.evaluate("""() => { const c = document.getElementById('straight').getContext('2d'), found = [];
+            const write = c.fillText.bind(c);
+            c.fillText = (text, ...place) => { found.push([text, ...place]); write(text, ...place); };
+            window.strips = found; document.getElementById('place').dispatchEvent(new Event('input')); }""")
+        page.wait_for_timeout(150)
+        said = page.evaluate("window.strips")
+        top, bottom = next(one for one in said if one[0].startswith("+")), next(one for one in said if one[0] == "0 mm")
+        pixels_per_mm = (bottom[2] - top[2]) / float(top[0].removesuffix(" mm"))
+        assert 0.05 * pixels_per_mm >= 2.0, said
+
+
+def test_scans_stay_and_curves_turn_on_a_dark_page(run: Path, opened: Opener) -> None:
+    page = opened(run / "cases" / "good" / "report.html", color_scheme="dark")
+    filters = page.evaluate("""() => Object.fromEntries([...document.querySelectorAll('.plot img')].map(
+        (i) => [i.getAttribute('src').replace(/.*\\//, ''), getComputedStyle(i).filter]))""")
+    assert "#night" in filters["error_by_depth.png"]
+    # what is bright there means something
+    assert filters["projections.png"] == filters["error_along_wire.png"] == "none"
 
 
 def test_worst_frames_of_the_run_open_in_the_viewer(run: Path, opened: Opener) -> None:
@@ -158,17 +192,17 @@ def test_tables_sort_filter_and_copy(run: Path, opened: Opener) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("viewport", [WIDE, NARROW], ids=["1280", "390"])
-def test_axe_finds_nothing_serious(run: Path, opened: Opener, viewport: Any, scheme: str) -> None:
+def test_axe_finds_nothing_serious(pages: list[Path], opened: Opener, viewport: Any, scheme: str) -> None:
     found = importlib.util.find_spec("axe_core_python")
     if found is None or found.origin is None:
         pytest.skip("axe-core-python is not installed: run `make browser`")
-    for path in (run / "index.html", *(run / "cases" / case.name / "report.html" for case in CASES[1:])):
+    for path in pages:
         page = opened(path, viewport, color_scheme=scheme)
         page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
         page.add_script_tag(path=str(Path(found.origin).with_name("axe.min.js")))
         violations = page.evaluate("axe.run()")["violations"]
         bad = [v for v in violations if v["impact"] in ("serious", "critical")]
-        assert not bad, [(v["id"], v["help"], [n["html"][:160] for n in v["nodes"][:3]]) for v in bad]
+        assert not bad, [(path.name, v["id"], v["help"], [n["html"][:160] for n in v["nodes"][:3]]) for v in bad]
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from PIL import Image
 
 WIDTH = 900
-COLOURS = 256  # a palette keeps a picture below 250 kB
 TARGET = Path(__file__).resolve().parents[2] / "reports" / "pictures"
 
 
@@ -26,11 +25,10 @@ def rows_of(picture: Image.Image, least_gap: int = 8) -> list[int]:
 
 
 def save(picture: Image.Image, name: str) -> None:
-    """Scaled to README's width, with a palette."""
+    """Scaled to README's width, in all its colours: a palette takes those of thin wires."""
     height = round(picture.height * WIDTH / picture.width)
-    small = picture.resize((WIDTH, height), Image.Resampling.LANCZOS).quantize(COLOURS)
     TARGET.mkdir(parents=True, exist_ok=True)
-    small.save(TARGET / name, optimize=True)
+    picture.resize((WIDTH, height), Image.Resampling.LANCZOS).save(TARGET / name, optimize=True)
 
 
 def last_row(sheet: Image.Image) -> Image.Image:

@@ -1,0 +1,67 @@
+"""The pages beside those of a run, from invented numbers: two runs, simulators, a calibration, a benchmark."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.cli import main
+from pipeline.run.simulators import write_comparison
+from reports import tables
+from reports.bench import render_bench
+from reports.calibration import render_calibration
+from reports.schema import ERRORS
+from reports.simulators import render_simulators
+from tests.pipeline.test_simulators import even, write_tree
+from tests.reports.test_bench import fake_bench
+
+
+def write_pages(run: Path, folder: Path) -> list[Path]:
+    """Write them into a folder; ``run`` is a run's output."""
+    return [_diff(run, folder), _simulators(folder / "score"), _calibration(folder / "cal"), _bench(folder / "bench")]
+
+
+def _diff(run: Path, folder: Path) -> Path:
+    worse = shutil.copytree(run, folder / "worse")
+    for path in worse.glob("cases/*/errors.csv"):
+        rows = tables.read(path, ERRORS)
+        tables.write(path, ERRORS, rows.assign(rms_mm=3.0 * rows["rms_mm"]))
+    assert main(["diff", str(run), str(worse), "--html", str(folder / "diff.html")]) == 1
+    return folder / "diff.html"
+
+
+def _simulators(folder: Path) -> Path:
+    made = {name: write_tree(folder / name, even(level)) for name, level in (("soft", 0.3), ("wireval", 0.2))}
+    write_comparison(folder, made)
+    return render_simulators(folder)
+
+
+def _calibration(folder: Path) -> Path:
+    folder.mkdir()
+    told = {"why": "known to 1.5 only", "advice": "a sharper bend", "what": "a factor", "prior_sd": 1.5, "used": 1.0}
+    told |= {"prior": 1.0, "bounds": [0.01, 100.0], "logarithmic": True}
+    estimates = [{"name": n, "value": 1.1, "sd": s, "seen": s < 1, **told} for n, s in (("taper", 0.1), ("wall", 1.5))]
+    profile = [[0.5, 8.0], [0.9, 2.0], [1.4, 2.0], [4.0, 9.0]]
+    frames = [{"case": "a", "frame": n, "before_mm": 0.2, "after_mm": 0.1, "weight": 1.0} for n in range(4)]
+    record = {
+        "estimates": estimates,
+        "correlation": {"names": ["taper", "wall"], "values": np.eye(2).tolist()},
+        "profiles": {"taper": profile, "wall": profile},
+        "frames": frames,
+        "starts": [[0.5, 57.0]],
+        "scale": 1.0,
+        "used": [{"case": "a"}],
+        "notes": ["a: nothing is known of the wall"],
+        "provenance": {"wireval": "0.1.0"},
+    }
+    (folder / "calibration.json").write_text(json.dumps(record), encoding="utf-8")
+    return render_calibration(folder)
+
+
+def _bench(folder: Path) -> Path:
+    folder.mkdir()
+    rows, stress = fake_bench(folder)
+    return render_bench(rows, folder, stress, note="Machine: invented.")
