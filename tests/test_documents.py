@@ -139,3 +139,9 @@ def test_a_result_fits_its_schema(desk: Path) -> None:
     jsonschema.validate(result, reference_pages.result_schema())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(result | {"schema": 2}, reference_pages.result_schema())
+
+
+def test_the_site_has_every_page() -> None:
+    """`make docs` would refuse one that is not in the contents, but it runs by itself."""
+    nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert [label(p) for p in DOCS.rglob("*.md") if f": {p.relative_to(DOCS)}\n" not in nav] == []

@@ -341,7 +341,9 @@ def aside(clamp: Clamp) -> Clamp:
     return replace(clamp, entry_mm=clamp.entry_mm + np.array([6.0, 6.0, 0.0]))
 
 
-def test_an_unexpected_error_costs_one_case(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unexpected_error_costs_one_case(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     both = two_cases(study, tmp_path / "study")
 
     def burst(job: object) -> None:
@@ -353,7 +355,11 @@ def test_an_unexpected_error_costs_one_case(study: Path, tmp_path: Path, monkeyp
         run_case(job)  # type: ignore[arg-type]
 
     monkeypatch.setattr("pipeline.run.launch.run_case", burst)
+    monkeypatch.setattr("sys.argv", ["/bin/wireval", "run", "study", "-o", "out"])
     assert run(both, tmp_path / "out") == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == "next: do what the message says, then wireval run study -o out --only second"
+    assert "wireval run study -o out --only second" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]
     assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text(encoding="utf-8")

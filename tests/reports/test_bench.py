@@ -126,3 +126,13 @@ def test_a_stress_study_alone_shows_how_well_its_scenes_ended(tmp_path: Path) ->
     assert "Over all scenes, by outcome" in text
     assert "1099" in text
     assert "All rows" not in text
+
+
+def test_broken_promises_come_first_and_are_counted_among_those_with_an_aim(tmp_path: Path) -> None:
+    rows, stress = fake_bench(tmp_path)
+    told = [("kept", "at most 2", True), ("reported", "", None), ("broken", "at most 1", False)]
+    claims = pd.DataFrame([{"claim": c, "value": 1.5, "unit": "1", "aim": aim, "met": met} for c, aim, met in told])
+    claims.to_csv(tmp_path / "claims.csv", index=False)
+    page = bench.render_bench(rows, tmp_path / "out", stress, tmp_path / "claims.csv").read_text(encoding="utf-8")
+    assert "1 of 2 promises" in page
+    assert page.index(">broken<") < page.index(">kept<") < page.index(">reported<")

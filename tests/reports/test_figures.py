@@ -270,3 +270,9 @@ def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Pat
     assert np.any(np.all(pixels == (np.array(to_rgba(TRACED)[:3]) * 255).round(), axis=-1))
     assert np.abs(pixels.astype(int) - exact).max() <= 24
     assert sizes[1] < 0.6 * sizes[0]
+
+
+def test_what_is_bright_by_its_value_is_known_as_such(tmp_path: Path) -> None:
+    case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
+    graded = {name for name, draw in CASE_FIGURES.items() if (drawing := draw(case)) is not None and drawing.graded}
+    assert graded == {"projections", "error_along_wire", "contact_along_wire"}

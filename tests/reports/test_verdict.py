@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 
-from reports.verdict import next_command, verdict, worst_frames
+from reports.verdict import next_command, typed, verdict, worst_frames
 
 
 @pytest.mark.parametrize(
@@ -43,3 +45,9 @@ def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo()
     assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c"
     assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c"
     assert "--only" not in next_command(map(str, range(20)))
+
+
+def test_the_command_of_a_folder_is_read_from_its_provenance(tmp_path: Path) -> None:
+    assert typed(tmp_path) == ()
+    (tmp_path / "provenance.json").write_text('{"argv": ["wireval", "run", "m.toml", "-o", "out"]}', encoding="utf-8")
+    assert next_command(["c"], typed(tmp_path)) == "wireval run m.toml -o out --only c"

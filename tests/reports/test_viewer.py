@@ -69,5 +69,26 @@ def test_pictures_are_upright_and_shrink_to_the_budget(tmp_path: Path, monkeypat
     assert np.corrcoef(image[0].astype(float), mip[:, -1].astype(float))[0, 1] > 0.8
 
 
+def test_the_scan_along_the_wire_goes_from_file_to_page(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=3, failed=(1,)),))
+    case = read_case(out / "cases" / "c")
+    arrays, data = case.read_frame(2), viewer.viewer_data(case)
+    assert data is not None
+    assert arrays.straightened is not None
+    values, along, across, normal = arrays.straightened
+    shown = data["frames"][2]["straight"]
+    assert data["frames"][1]["straight"] is None
+    assert [shown["along_mm"], shown["across_mm"]] == [along, across]
+    assert shown["normal"] == pytest.approx(normal, abs=1e-6)
+    assert shown["samples"] == values.shape[:2]
+    sizes = [Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).size for uri in shown["slabs"]]
+    assert sizes == [values.shape[:2]] * 2
+    across_picture = Image.open(io.BytesIO(base64.b64decode(shown["across"].partition(",")[2])))
+    assert across_picture.size == (values.shape[2], shown["planes"] * values.shape[1])
+    # the last plane, seen along the wire: up is the first direction, right the second
+    last = np.asarray(across_picture)[-values.shape[1] :].astype(float)
+    assert np.corrcoef(last.ravel(), values[-1][::-1].astype(float).ravel())[0, 1] > 0.9
+
+
 def test_a_case_without_frames_has_no_viewer(tmp_path: Path) -> None:
     assert viewer.viewer_data(read_case(tmp_path)) is None
