@@ -23,6 +23,7 @@ _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
 _LEAST_WIDTH = 0.3  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
+_WIDE = 104  # characters of 9 points
 _LINE = 0.0165  # of the page's height, for type of 9 points
 
 
@@ -34,7 +35,7 @@ class _Page:
         self.at = _TOP
         self.text(title, size=14, weight="bold")
 
-    def text(self, text: str, size: float = 9, width: int = 104, colour: str = "black", **look: Any) -> None:
+    def text(self, text: str, size: float = 9, width: int = _WIDE, colour: str = "black", **look: Any) -> None:
         """A paragraph, broken at ``width`` characters of 9 points; what does not fit the page is left out."""
         lines = textwrap.wrap(text, round(width * 9 / size)) or [""]
         step = _LINE * size / 9
@@ -48,7 +49,8 @@ class _Page:
     def picture(self, path: Path, entry: Mapping[str, str], most: float) -> None:
         """A figure with its title and caption, at full width or as high as ``most`` of the page and as its rest."""
         image = imread(path)
-        room = min(most, self.at - _BOTTOM - 5 * _LINE)
+        caption = len(textwrap.wrap(entry["read"], _WIDE * 9 // 8))
+        room = min(most, self.at - _BOTTOM - (caption + 5) * _LINE)  # title, caption, and a line or two below
         wide = _RIGHT - _LEFT
         high = wide * image.shape[0] / image.shape[1] * _A4_INCH[0] / _A4_INCH[1]
         shrink = min(1.0, room / high)
@@ -101,7 +103,10 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
     page = _Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
-    page.text(f"{len(summary)} cases, {ok} of {planned} frames have a result. {verdict(row)}", size=11)
+    page.text(
+        f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {verdict(row)}",
+        size=11,
+    )
     if len(failures):
         page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
         said = failures[["case", "frame", "status", "message"]].head(_MOST_FAILURES)
@@ -160,7 +165,10 @@ def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
         page.text(f"… and {len(summary) - _MOST_CASES} more in summary.csv")
     page.text("Settings that are not defaults", size=10.5, weight="bold")
     chosen = [row for row in _content.settings(run.get("config", {})) if row[2] != "default"]
-    page.table([("setting", "value", "from"), *chosen[:_MOST_SETTINGS]], (0.3, 0.34, 0.2))
+    if chosen:
+        page.table([("setting", "value", "from"), *chosen[:_MOST_SETTINGS]], (0.3, 0.34, 0.2))
+    else:
+        page.text("None: every setting is its default.")
     known = dict(_content.flatten(run.get("provenance", {})))
     names = [name for name in ("wireval", "git_commit", "python") if name in known]
     page.text("; ".join(f"{name} {known[name]}" for name in names), size=8)

@@ -29,7 +29,7 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     said = (
         ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
         ("planned frames",),
-        ("worst case: poor", "Error against insertion depth"),
+        ("worst case: poor", "Error against insertion depth", "stands among the assumptions", "Worst frames by p95_mm"),
     )
     for page, words in zip(pages, (*said, ("solver.segment_mm", "frames_failed")), strict=True):
         assert not [word for word in words if word not in page], page
