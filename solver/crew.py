@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels import data, records
-from solver._kernels.lane_block import LANE, SEAT, SHAPES, Block
-from solver._kernels.lane_decide import NEW
-from solver._kernels.lane_insertion import Plan, advance_together
-from solver._kernels.lane_relax import POOL
-from solver._kernels.lanes import WIDTH, room
+from solver._kernels.lanes.block import LANE, SEAT, SHAPES, Block
+from solver._kernels.lanes.decide import NEW
+from solver._kernels.lanes.insertion import Plan, advance_together
+from solver._kernels.lanes.relax import POOL
+from solver._kernels.lanes.vectors import WIDTH, room
 from solver.insertion import Insertion
 from solver.solution import Solution, Status
 from solver.workspace import SNAPS_KEPT, Workspace

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from solver import skips
-from solver._kernels.lane_insertion import advance_together
-from solver._kernels.lanes import WIDTH
+from solver._kernels.lanes.insertion import advance_together
+from solver._kernels.lanes.vectors import WIDTH
 from solver._kernels.minimise import NEWTON
 from solver.crew import Crew, Job, go_alone
 from solver.doors import Found, instance, whole

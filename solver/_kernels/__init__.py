@@ -15,9 +15,6 @@ septum           whether the wire left its lumen        snaps            energy 
 saddle           the way off a saddle                   trial            a share of the step, and the energy there
 records          what the kernels note
 
-Several wires side by side, in the processor's vectors, with the same formulas:
-lanes            numbers of eight wires as one type     bare             arrays without reference counts
-lane_block       eight wires in memory                  lane_newton      sweep and gradient
-lane_trial       trial states and their energies        lane_decide      what a lane does next
-lane_relax       one round of all lanes                 lane_insertion   from depth to depth
+lanes            several wires side by side, in the processor's vectors, by the same formulas
+bare             arrays without reference counts
 """

@@ -36,7 +36,7 @@ from solver._kernels.algebra import (
 from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.friction import friction_derivatives, lever_of
-from solver._kernels.lanes import anywhere, select, select3
+from solver._kernels.lanes.vectors import anywhere, select, select3
 from solver._kernels.rotation import jacobian_curvature
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from solver._kernels.algebra import Six, Three, apply, conjugate
 from solver._kernels.data import Field
 from solver._kernels.flags import entry_point, inlined, kernel
-from solver._kernels.lanes import four, quad, weighted
+from solver._kernels.lanes.vectors import four, quad, weighted
 
 Four = tuple[float, float, float, float]
 Cell = tuple[int, int, int, float, float, float]

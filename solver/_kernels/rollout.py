@@ -20,7 +20,7 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import Chain, Problem, State
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lanes import anywhere, select
+from solver._kernels.lanes.vectors import anywhere, select
 from solver._kernels.rotation import turn
 
 

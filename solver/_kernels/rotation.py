@@ -8,7 +8,7 @@ import math
 
 from solver._kernels.algebra import Nine, Six, Three, cross, mix
 from solver._kernels.flags import inlined
-from solver._kernels.lanes import anywhere, select
+from solver._kernels.lanes.vectors import anywhere, select
 
 # Below this q a seven-term series is exact to 1e-17 and costs 5 ns; above it sin and cos cost 20 ns.
 SERIES_LIMIT = 0.25

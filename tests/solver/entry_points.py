@@ -6,9 +6,10 @@ from typing import Any
 
 import numba
 
-from solver._kernels import closed_form, energy, lane_field, newton, rollout, rotation, start
+from solver._kernels import closed_form, energy, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
-from solver._kernels.lanes import in_lanes
+from solver._kernels.lanes import field as lane_field
+from solver._kernels.lanes.vectors import in_lanes
 
 entry_point = numba.njit(**FAST)
 

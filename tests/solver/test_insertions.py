@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from solver import GuideWire, Insertion, Insertions, Solution, VesselWall, skips
-from solver._kernels.lane_relax import POOL
-from solver._kernels.lanes import WIDTH, room
+from solver._kernels.lanes.relax import POOL
+from solver._kernels.lanes.vectors import WIDTH, room
 from solver.crew import Job, first_points
 from solver.insertions import kind_of
 from tests.solver.entry_points import look_up_eight

@@ -13,7 +13,7 @@ from solver._kernels.crossing import free_fraction
 from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
 from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state
-from solver._kernels.lane_block import (
+from solver._kernels.lanes.block import (
     ACCEPTED,
     ACTIVE,
     CLEAR,
@@ -31,7 +31,7 @@ from solver._kernels.lane_block import (
     put_in,
     take_out,
 )
-from solver._kernels.lane_decide import (
+from solver._kernels.lanes.decide import (
     ALONE,
     DONE,
     FORETOLD,
@@ -49,10 +49,10 @@ from solver._kernels.lane_decide import (
     shorten,
     take,
 )
-from solver._kernels.lane_newton import costate, sweep
-from solver._kernels.lane_start import Desk
-from solver._kernels.lane_trial import accept, rollout, wall_energy
-from solver._kernels.lanes import WIDTH
+from solver._kernels.lanes.newton import costate, sweep
+from solver._kernels.lanes.start import Desk
+from solver._kernels.lanes.trial import accept, rollout, wall_energy
+from solver._kernels.lanes.vectors import WIDTH
 from solver._kernels.newton import costate as costate_alone
 
 POOL = 32
@@ -66,8 +66,8 @@ loses an eighth of one."""
 class Team(NamedTuple):
     """Wires side by side.
 
-    wires : POOL handles.     lanes, nows, counts : (POOL + 1,) records of them, ``lane_block.LANE``, ``DESCENT`` and
-    ``COUNTERS`` of ``records``; the last is that of no wire.     seats : (WIDTH,) records ``lane_block.SEAT``.
+    wires : POOL handles.     lanes, nows, counts : (POOL + 1,) records of them, ``block.LANE``, ``DESCENT`` and
+    ``COUNTERS`` of ``records``; the last is that of no wire.     seats : (WIDTH,) records ``block.SEAT``.
     first : (size + 2,) first look-up point of each node.     desk : room for the look-ups of one wire.
     """
 

@@ -14,11 +14,11 @@ from solver._kernels.energy import energy_of, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
-from solver._kernels.lane_block import Block
-from solver._kernels.lane_decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
-from solver._kernels.lane_relax import POOL, Team, do_round, hand_over, take_over
-from solver._kernels.lane_start import Desk, chosen_start
-from solver._kernels.lanes import WIDTH, in_lanes
+from solver._kernels.lanes.block import Block
+from solver._kernels.lanes.decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
+from solver._kernels.lanes.relax import POOL, Team, do_round, hand_over, take_over
+from solver._kernels.lanes.start import Desk, chosen_start
+from solver._kernels.lanes.vectors import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
 from solver._kernels.newton_method import rests
 

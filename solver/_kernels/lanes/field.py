@@ -13,7 +13,7 @@ from solver._kernels.algebra import Six, Three
 from solver._kernels.data import Field
 from solver._kernels.field import Four, across, bends, cubic, indices, per_mm, slopes
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lanes import LANES, WIDTH, arrays, extend, greater, lesser, select, typing, untyped
+from solver._kernels.lanes.vectors import LANES, WIDTH, arrays, extend, greater, lesser, select, typing, untyped
 
 Layer = tuple[Four, Four, Four]
 

@@ -7,7 +7,7 @@ from solver._kernels import wall_law
 from solver._kernels.algebra import Three, dot, load3, load9, minus, store3, store9, times
 from solver._kernels.data import CURRENT, TRIAL, Field
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lane_block import (
+from solver._kernels.lanes.block import (
     ACCEPTED,
     ACTIVE,
     ALONG,
@@ -27,9 +27,9 @@ from solver._kernels.lane_block import (
     WEIGHT,
     Block,
 )
-from solver._kernels.lane_field import look_first, look_up
-from solver._kernels.lane_newton import turn_of
-from solver._kernels.lanes import WIDTH, anywhere, bits, greater, select, select3, size, spread
+from solver._kernels.lanes.field import look_first, look_up
+from solver._kernels.lanes.newton import turn_of
+from solver._kernels.lanes.vectors import WIDTH, anywhere, bits, greater, select, select3, size, spread
 from solver._kernels.rollout import limited, relative
 
 

@@ -1,6 +1,6 @@
 """What a lane does next: the decisions of ``newton_method.iterate``, one at a time, on nothing but its records.
 
-me, now, counters : records of ``lane_block.LANE``, ``records.DESCENT`` and ``records.COUNTERS``.     number :
+me, now, counters : records of ``block.LANE``, ``records.DESCENT`` and ``records.COUNTERS``.     number :
 ``Block.number``, in which the lane's column is read.
 """
 
@@ -11,7 +11,7 @@ from solver import _tolerances as tol
 from solver._kernels.data import CONVERGED
 from solver._kernels.energy import FLOOR
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lane_block import (
+from solver._kernels.lanes.block import (
     ACCEPTED,
     BENDING,
     DECREMENT,

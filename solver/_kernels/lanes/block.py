@@ -54,7 +54,7 @@ class Block(NamedTuple):
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
     load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of
     points to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
-    eight that are.     found : (11,), see ``lane_field.look_up``.     number : see ``NUMBERS``.
+    eight that are.     found : (11,), see ``field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -93,7 +93,7 @@ LANE = record(
 depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     stiffest, scale, noise : see
 ``energy.scale_of``.     fraction : of Newton's step to try.     decrement : the fall that its gains foretell.
 before : energy that the iteration began with.     bending, wall, load : energies of the current state.
-limit, iterations : of this depth.     phase : see ``lane_relax``.     goal : index of the depth that it is on its way
+limit, iterations : of this depth.     phase : see ``relax``.     goal : index of the depth that it is on its way
 to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.
 outcome : how its relaxation ended.
 """

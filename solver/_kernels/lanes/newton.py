@@ -33,7 +33,7 @@ from solver._kernels.algebra import (
 from solver._kernels.blocks import least_bending, lever, without_negative
 from solver._kernels.data import CURRENT
 from solver._kernels.flags import inlined, kernel
-from solver._kernels.lane_block import (
+from solver._kernels.lanes.block import (
     ALONG,
     DAMPING,
     DECREMENT,
@@ -46,7 +46,7 @@ from solver._kernels.lane_block import (
     WEIGHT,
     Block,
 )
-from solver._kernels.lanes import anywhere, greater, select, select3, size, spread
+from solver._kernels.lanes.vectors import anywhere, greater, select, select3, size, spread
 from solver._kernels.newton import Value
 from solver._kernels.rotation import bent, from_rest, jacobian, jacobian_curvature
 

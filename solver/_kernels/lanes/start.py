@@ -10,8 +10,8 @@ from solver._kernels.algebra import dot, load3, minus, store3
 from solver._kernels.data import Problem
 from solver._kernels.energy import bending_energy, energy_of, load_energy, placed
 from solver._kernels.flags import kernel
-from solver._kernels.lane_field import look_first, look_up
-from solver._kernels.lanes import WIDTH
+from solver._kernels.lanes.field import look_first, look_up
+from solver._kernels.lanes.vectors import WIDTH
 from solver._kernels.start import chosen
 
 
