@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT := reports/out
 SEED ?= 101
-CALIBRATED ?= 100 101 102
+CALIBRATED ?= 200 201 202
 export OMP_NUM_THREADS := 1
 
 validate: setup

@@ -95,7 +95,7 @@ def ways(seed: int) -> list[Way]:
     found = [
         Way("c-helix", "calibration", helix, helix.tubes[0], 4.0, _depths(10, 54, 9, 18, 5), 90.0),
         Way("c-bend", "calibration", bend, bend.tubes[0], 4.0, _depths(12, 44, 8, 18, 4), -40.0),
-        Way("c-soft", "calibration", curve, curve.tubes[0], 4.0, _depths(12, 50, 9, 20, 4), 30.0, SOFT),
+        Way("c-soft", "calibration", curve, curve.tubes[0], 4.0, _depths(12, 50, 20, 20, 9), 30.0, SOFT),
     ]
     siphon = circle_of_willis(rng, WillisPlan(aneurysm="none"))
     carotid = Anatomy((siphon.tube("right.ICA"),))
