@@ -92,13 +92,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     Raises ValueError, naming the file, where a result file is damaged; absent files leave out what they would have
     shown.
     """
-    case, entries = read_case(case_dir), declared("case")
-
-    def part(number: int) -> dict[str, Any]:
-        # the viewer first: it takes longest
-        return _section("case", entries[number - 1], case, case_dir, embed) if number else {"of": viewer_data(case)}
-
-    viewer, *sections = each(part, 1 + len(entries))
+    case = read_case(case_dir)
     result, errors = case.result, case.errors
     failures = _case_failures(case)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
@@ -110,7 +104,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name]),
-        **_viewer(viewer["of"]),
+        **_drawn(case, embed, each),
         **{key: result.get(key, "") for key in ("role", "group")},
         "failures": failures,
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
@@ -118,7 +112,6 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "points": (case_dir / "points.csv.gz").exists(),
         # of projections the assumptions say whether wires were shifted
         "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
-        "sections": [section for section in sections if section],
         "frames": frames if len(errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
         "physics": list(flatten({key: result.get(key, {}) for key in PHYSICS})),
@@ -130,10 +123,17 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     return write_page("case.html.j2", page, case_dir / "report.html")
 
 
-def _viewer(viewer: dict[str, Any] | None) -> dict[str, Any]:
-    """What the page needs for its viewer, where it has one."""
-    curves = {name for frame in viewer["frames"] for name in frame["curves"]} if viewer else ()
-    return {"viewer": viewer, "curves": curves}
+def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
+    """What is drawn on a case's page: the viewer, first since it takes longest, and the sections."""
+    entries = declared("case")
+
+    def part(number: int) -> dict[str, Any]:
+        return _section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
+
+    viewer, *sections = each(part, 1 + len(entries))
+    frames = viewer["of"]["frames"] if viewer["of"] else ()
+    curves = {name for frame in frames for name in frame["curves"]}
+    return {"viewer": viewer["of"], "curves": curves, "sections": [section for section in sections if section]}
 
 
 def render_index(out_dir: Path, embed: bool = False) -> Path:

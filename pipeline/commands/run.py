@@ -41,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
-    add("--no-cache", action="store_true", help="neither read nor write the stage store")
+    add(
+        "--no-cache",
+        action="store_true",
+        help="neither read nor write the stage store; inputs are hashed for provenance",
+    )
     add_verbosity(parser)
 
 
