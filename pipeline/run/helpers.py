@@ -13,8 +13,9 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from multiprocessing import connection
-from multiprocessing.process import BaseProcess
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Generic, TypeVar
@@ -34,6 +35,12 @@ LOOK_S = 0.002
 class _LostError(Exception):
     """A helper has ended before its work was done."""
 
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        if code < 0:  # else it has met an error, which will be met here
+            name = signal.Signals(-code).name
+            sys.stderr.write(f"a process that helped was ended by {name} (out of memory?): done without its help\n")
+
 
 def nothing() -> None:
     """What is to be done first where nothing is."""
@@ -47,11 +54,13 @@ def shared(
     A part may ask for the results of earlier ones. first : done by this process before it takes part, and only where
     there are helpers.     inherited : large objects that results refer to, which every fork has: they are not sent.
     """
-    with TemporaryDirectory(prefix="wireval-") as folder:
-        parts = _Parts(work, count, Path(folder), inherited)
-        if min(cores, count) > 1:
+    parts = _Parts(work, count, inherited)
+    if min(cores, count) > 1:
+        with suppress(OSError), TemporaryDirectory(prefix="wireval-") as folder:
+            parts.folder = Path(folder)
             parts.share_out(cores - 1, first)
-        return parts.in_order()
+            parts.collect()
+    return parts.in_order()
 
 
 class _Packer(pickle.Pickler):
@@ -82,10 +91,12 @@ class _Unpacker(pickle.Unpickler):
 class _Parts(Generic[R]):
     """The parts of a job, each taken once; their results, here or as files that every process sees."""
 
-    def __init__(self, work: Work[R], count: int, folder: Path, inherited: Sequence[object]) -> None:
-        self.work, self.count, self.folder, self.inherited = work, count, folder, inherited
+    folder: Path
+
+    def __init__(self, work: Work[R], count: int, inherited: Sequence[object]) -> None:
+        self.work, self.count, self.inherited = work, count, inherited
         self.own: dict[int, R] = {}
-        self.helpers: list[BaseProcess] = []
+        self.helpers: list[ForkProcess] = []
 
     def share_out(self, helpers: int, first: Callable[[], object]) -> None:
         """Do all parts with so many helpers; what a lost one leaves is left out."""
@@ -98,8 +109,9 @@ class _Parts(Generic[R]):
             with warnings.catch_warnings():  # Python 3.12 warns of threads; no lock of theirs is taken by a helper
                 warnings.simplefilter("ignore", DeprecationWarning)
                 for _ in range(min(helpers, self.count)):
-                    self.helpers.append(context.Process(target=self._help, args=(turns,)))
-                    self.helpers[-1].start()
+                    helper = context.Process(target=self._help, args=(turns,))
+                    helper.start()
+                    self.helpers.append(helper)
             first()
             while taken := os.read(turns, 4):
                 number = int.from_bytes(taken, sys.byteorder)
@@ -114,19 +126,25 @@ class _Parts(Generic[R]):
                 helper.kill()
                 helper.join()
 
+    def collect(self) -> None:
+        """Read what others have brought."""
+        for number in range(self.count):
+            self._known(number)
+
     def in_order(self) -> list[R]:
         """All results; a part that nobody has brought is done now."""
         done: list[R] = []
         for number in range(self.count):
-            known = self._known(number)
+            known = self.own.get(number)
             done.append(self.work(number, done.__getitem__) if known is None else known)
         return done
 
     def result(self, number: int) -> R:
         """The result of a part, once it is there."""
         while (known := self._known(number)) is None:
-            if any(helper.exitcode for helper in self.helpers):
-                raise _LostError
+            for helper in self.helpers:
+                if helper.exitcode:
+                    raise _LostError(helper.exitcode)
             time.sleep(LOOK_S)
         return known
 
@@ -159,10 +177,10 @@ class _Parts(Generic[R]):
 
     def _wait(self) -> None:
         """Wait for the helpers; _LostError as soon as one of them fails: another may wait for its part."""
-        waiting: dict[object, BaseProcess] = {helper.sentinel: helper for helper in self.helpers}
+        waiting: dict[object, ForkProcess] = {helper.sentinel: helper for helper in self.helpers}
         while waiting:
             for sentinel in connection.wait([helper.sentinel for helper in waiting.values()]):
                 helper = waiting.pop(sentinel)
                 helper.join()
                 if helper.exitcode:
-                    raise _LostError
+                    raise _LostError(helper.exitcode)

@@ -61,9 +61,13 @@ def test_what_is_to_be_done_first_is_done_here_and_only_where_somebody_helps_mea
     assert done == [os.getpid()]
 
 
-@pytest.mark.parametrize("end", [lambda: os.kill(os.getpid(), signal.SIGKILL), lambda: os._exit(3)])
-def test_what_a_lost_helper_leaves_is_done_here(end: Any) -> None:
-    """Also where somebody waits for its part."""
+def killed() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("end", [killed, lambda: os._exit(3)])
+def test_what_a_lost_helper_leaves_is_done_here(end: Any, capfd: pytest.CaptureFixture[str]) -> None:
+    """Also where somebody waits for its part; a signal is told."""
     here = os.getpid()
 
     def deadly(number: int, earlier: Earlier[int]) -> int:
@@ -73,6 +77,17 @@ def test_what_a_lost_helper_leaves_is_done_here(end: Any) -> None:
         return number + (earlier(number - 1) if number else 0)
 
     assert shared(deadly, 12, 3) == list(np.cumsum(range(12)))
+    assert ("ended by SIGKILL" in capfd.readouterr().err) == (end is killed)
+
+
+def test_without_room_for_results_or_another_process_it_is_done_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise OSError("no more of these")
+
+    for name in ("os.fork", "pipeline.run.helpers.TemporaryDirectory", "os.memfd_create"):
+        with monkeypatch.context() as patch:
+            patch.setattr(name, refused)
+            assert {process for _, process in shared(who, 3, 2)} == {os.getpid()}, name
 
 
 def test_the_error_is_that_of_the_first_part_that_has_one_wherever_it_was_met() -> None:
