@@ -155,9 +155,10 @@ interrupt: setup
 scale: setup
 	$(BIN)/python -m tests.studies.scale
 
-# 100 random changes of product lines, each against the tests: the share that is noticed (hours)
+# 100 random changes of product lines, each against the tests that execute them: the share that is noticed (hours)
 mutants: setup
-	$(BIN)/python -m tests.studies.mutants --seed $(SEED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target $(OUT)/coverage coverage
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

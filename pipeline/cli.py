@@ -12,6 +12,7 @@ from pathlib import Path
 
 import shtab
 
+from pipeline import one_thread
 from pipeline.commands import VERBS, complain, unwritable
 from pipeline.status import InputError, StageError, did_you_mean
 from reports.atomic import WriteError
@@ -99,6 +100,8 @@ def _ended_by_signal() -> Iterator[None]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     args = argparse.Namespace()
+    if argv is None:  # a process of our own, in which nothing has computed yet
+        one_thread()
     try:
         args = parsed(sys.argv[1:] if argv is None else argv)
         if args.version:

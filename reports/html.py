@@ -1,9 +1,9 @@
 """The pages: one per case, one for the run. Built from files on disk, so they can be rebuilt at any time."""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 from urllib.parse import quote
 
 import jinja2
@@ -20,6 +20,20 @@ from reports.tables import read_if_there
 from reports.verdict import next_command, typed, verdict, worst_frames
 from reports.viewer import viewer_data
 
+R = TypeVar("R")
+
+
+class Each(Protocol):
+    """Does a work for every number below a count: here one after the other, or shared out among processes."""
+
+    def __call__(self, work: Callable[[int], R], count: int) -> list[R]:
+        """Their results, in order; none of them may be None."""
+
+
+def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
+    """One after the other."""
+    return [work(number) for number in range(count)]
+
 
 def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[str, Any]]:
     """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
@@ -28,22 +42,23 @@ def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[
     themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
     gone is removed, so that nobody finds it in the folder.
     """
-    sections = []
-    for entry in declared(page):
-        path = folder / "figures" / f"{entry['figure']}.png"
-        drawing = figures_of(page)[entry["figure"]](data)
-        if drawing is None:
-            path.unlink(missing_ok=True)
-            path.with_suffix(".csv").unlink(missing_ok=True)
-            continue
-        save(drawing, path)
-        width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
-        source = _link(path, folder, "image/png", embed)
-        numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
-        shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-        shown["graded"] = drawing.graded
-        sections.append({**entry, **shown})
-    return sections
+    return list(filter(None, (_section(page, entry, data, folder, embed) for entry in declared(page))))
+
+
+def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed: bool) -> dict[str, Any]:
+    """One figure, drawn and described; empty without data."""
+    path = folder / "figures" / f"{entry['figure']}.png"
+    drawing = figures_of(page)[entry["figure"]](data)
+    if drawing is None:
+        path.unlink(missing_ok=True)
+        path.with_suffix(".csv").unlink(missing_ok=True)
+        return {}
+    save(drawing, path)
+    width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
+    source = _link(path, folder, "image/png", embed)
+    numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
+    shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
+    return {**entry, **shown, "graded": drawing.graded}
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
@@ -71,15 +86,14 @@ _OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
 results give the same; one with failures repeats the command."""
 
 
-def render_case(case_dir: Path, embed: bool = False) -> Path:
+def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw figures/*.png with their CSV and write report.html of one case; returns its path.
 
-    embed : put pictures and numbers into the page, for a single file to send. Raises ValueError, naming the
-    file, where a result file is damaged; absent files leave out what they would have shown.
+    embed : put pictures and numbers into the page, for a single file to send.     each : who draws the figures.
+    Raises ValueError, naming the file, where a result file is damaged; absent files leave out what they would have
+    shown.
     """
     case = read_case(case_dir)
-    sections = draw_sections("case", case, case_dir, embed)
-    viewer = viewer_data(case)
     result, errors = case.result, case.errors
     failures = _case_failures(case)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
@@ -91,8 +105,7 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
-        "viewer": viewer,
-        "curves": {name for frame in viewer["frames"] for name in frame["curves"]} if viewer else (),
+        **_drawn(case, embed, each),
         **{key: result.get(key, "") for key in ("role", "group")},
         "failures": failures,
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
@@ -100,7 +113,6 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "points": (case_dir / "points.csv.gz").exists(),
         # of projections the assumptions say whether wires were shifted
         "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
-        "sections": sections,
         "frames": frames if len(errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
         "physics": list(flatten({key: result.get(key, {}) for key in PHYSICS})),
@@ -110,6 +122,19 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
         "version": _version([result]),
     }
     return write_page("case.html.j2", page, case_dir / "report.html")
+
+
+def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
+    """What is drawn on a case's page: the viewer, first since it takes longest, and the sections."""
+    entries = declared("case")
+
+    def part(number: int) -> dict[str, Any]:
+        return _section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
+
+    viewer, *sections = each(part, 1 + len(entries))
+    frames = viewer["of"]["frames"] if viewer["of"] else ()
+    curves = {name for frame in frames for name in frame["curves"]}
+    return {"viewer": viewer["of"], "curves": curves, "sections": [section for section in sections if section]}
 
 
 def render_index(out_dir: Path, embed: bool = False) -> Path:

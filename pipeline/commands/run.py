@@ -23,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_manifest(parser)
     add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
     add_settings(parser)
-    add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add(
+        "-j", "--jobs", type=int, default=1, metavar="N", help="cores: cases at once, then frames of a case (default 1)"
+    )
     add("--case-timeout", type=float, default=math.inf, metavar="S", help="seconds that a case may take")
     add("--case-memory", type=float, default=math.inf, metavar="MIB", help="MiB of memory that a case may take")
     add("--shard", default="", metavar="I/N", help="only the I-th of N parts of the cases; merge with cp -r")
@@ -39,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
-    add("--no-cache", action="store_true", help="neither read nor write the stage store")
+    add(
+        "--no-cache",
+        action="store_true",
+        help="neither read nor write the stage store; inputs are hashed for provenance",
+    )
     add_verbosity(parser)
 
 

@@ -72,6 +72,10 @@ class Clues:
         """The vessel's axis and its branches around the traced wires."""
         return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
+    def known_ways(self) -> None:
+        """Find what all frames share, once, before they are shared out."""
+        _ = self.way, self.shortest, self.hard_wall
+
     @cached_property
     def straight_wire(self) -> GuideWire:
         """A wire that only wants to be straight."""

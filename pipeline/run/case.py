@@ -3,6 +3,7 @@
 import functools
 import os
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -12,11 +13,12 @@ from pipeline.compare.metrics import METRICS
 from pipeline.compare.nulls import NULLS
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
+from pipeline.run.helpers import shared
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import code_of, digest
+from pipeline.run.store import code_of, digest, file_hash
 from pipeline.run.view import write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
@@ -42,6 +44,7 @@ class Job:
     quiet: bool = False
     verbose: bool = False
     pictures: bool = True
+    cores: int = 1
 
     @property
     def folder(self) -> Path:
@@ -94,6 +97,10 @@ def _why_again(job: Job, key: str) -> str | None:
 
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
+    if job.cores > 1:
+        with ThreadPoolExecutor(job.cores) as readers:  # files are hashed outside of the interpreter
+            paths = {source.path for source in (*job.case.frames, job.case.reference) if source is not None}
+            list(readers.map(file_hash, (path for path in paths if path.exists())))
     key = job.key
     progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     with held(job.folder, progress.warn):
@@ -109,14 +116,16 @@ def run_case(job: Job) -> None:
 
 
 def _compute(job: Job, key: str, progress: CaseProgress) -> None:
-    if job.until in ("simulate", "compare", "report"):
+    simulates = job.until in ("simulate", "compare", "report")
+    if simulates:
         load_kernels(progress)
     clock = perf_counter()
     log = Log(progress)
-    known = run_stages(Context(job.case, job.settings.config, Store(job.cache, progress.warn), log), job.until)
+    run = Context(job.case, job.settings.config, Store(job.cache, progress.warn), log, job.cores, simulates)
+    known = run_stages(run, job.until)
     _write(job, known, log, key, clock)
     if job.wants_pages:
-        draw(job.folder, job.wants_pages)
+        draw(job.folder, job.wants_pages, job.cores)
     progress.write(f"done in {perf_counter() - clock:.2f} s")
 
 
@@ -128,16 +137,16 @@ def _heal(job: Job, progress: CaseProgress) -> None:
     if known.pages != job.wants_pages and (job.embed or not known.pages):
         wrong = "they are of another kind" if known.pages else "the run before ended first"
     if job.wants_pages and wrong:
-        draw(job.folder, job.wants_pages)
+        draw(job.folder, job.wants_pages, job.cores)
         progress("compare", 1, 1, f"unchanged since the last run, kept; its pages were drawn again: {wrong}")
     else:
         progress("compare", 1, 1, "unchanged since the last run, kept")
 
 
-def draw(folder: Path, pages: ledger.Pages) -> None:
+def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     """Draw the pages of a case anew, and record them."""
     shutil.rmtree(folder / "figures", ignore_errors=True)
-    render_case(folder, embed=pages == "embedded")
+    render_case(folder, embed=pages == "embedded", each=lambda work, count: shared(lambda i, _: work(i), count, cores))
     ledger.record_pages(folder, pages)
 
 
@@ -154,7 +163,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
             tables.write(job.folder / table.file, table, rows)
     outputs.write_frames(job.folder / ledger.FRAMES, known)
     if job.pictures:
-        write_view(job.folder / "view", known)
+        write_view(job.folder / "view", known, job.cores)
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})

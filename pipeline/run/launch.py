@@ -6,6 +6,7 @@ agreement that no parameter moves is suspicious.
 """
 
 import json
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -153,10 +154,20 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     return totals, render_index(out, embed=plan.template.embed)
 
 
+def cores_each(plan: Plan, jobs: int) -> int:
+    """How many cores a case may take: cases first, and what is left over is shared among them.
+
+    A limit of memory is that of one process, and a cluster's workers have a core each.
+    """
+    one = plan.address or plan.limits.memory_mib < math.inf
+    return 1 if one else max(1, plan.workers // max(1, jobs))
+
+
 def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     """Run jobs; a case that could not be finished gets a result that says so. Raises WriteError, which ends the run."""
     watch = Watch(jobs, silent=plan.template.quiet, lines=plan.template.verbose)
-    quiet = [replace(job, quiet=True) for job in jobs] if watch.bar else jobs
+    cores = cores_each(plan, len(jobs))
+    quiet = [replace(job, quiet=job.quiet or watch.bar, cores=cores) for job in jobs]
     outcomes = run_all(quiet, run_case, plan.workers, plan.address, plan.limits)
     with watch.shown(), closing(outcomes):
         for outcome in outcomes:

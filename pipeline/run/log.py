@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, TextIO
+from typing import Any, Literal, TextIO
 
 import numpy as np
 
@@ -63,6 +63,30 @@ class Log:
             total[name] = total.get(name, 0.0) + float(value)
         for name, value in (levels or {}).items():
             self._levels[stage].setdefault(name, []).append(float(value))
+
+    def part(self) -> "Log":
+        """An empty log for a part of the case that may be done in another process, to be added afterwards."""
+        return Log(self.progress)
+
+    def add(self, part: "Log") -> None:
+        """Add the log of a part. Parts are added in their order, wherever they were done."""
+        for stage, seconds in part.seconds.items():
+            self.seconds[stage] += seconds
+        for key, seconds in part.frame_seconds.items():
+            self.frame_seconds[key] = self.frame_seconds.get(key, 0.0) + seconds
+        for stage, times in part.reused.items():
+            self.reused[stage] = self.reused.get(stage, 0) + times
+        self.assumptions += part.assumptions
+        self.warnings += part.warnings
+        self.chosen |= part.chosen
+        for stage in STAGES:
+            self.count(stage, part._counts[stage])
+            for name, values in part._levels[stage].items():
+                self._levels[stage].setdefault(name, []).extend(values)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but who is told of progress: that is the same one on the other side."""
+        return vars(self) | {"progress": None}
 
     @property
     def counters(self) -> dict[str, dict[str, float | dict[str, float]]]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.model import Array, Lumen, arc_length
+from pipeline.run.helpers import shared
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from reports import colours, export
@@ -22,12 +23,17 @@ _LEAST = 1e-3
 """Least distance, in voxels, of a voxel's centre from the surface beyond the grid's edge: no triangle without area."""
 
 
-def write_view(folder: Path, known: Known) -> None:
+def write_view(folder: Path, known: Known, cores: int = 1) -> None:
     """The lumen and every frame's wires, each in a file; then what opens them together."""
-    if known.lumen is not None:
-        _write_lumen(folder, known.lumen)
-    for frame in known.frames:
-        _write_wires(folder, frame)
+
+    def one(number: int, _earlier: object) -> bool:
+        if number:
+            _write_wires(folder, known.frames[number - 1])
+        elif known.lumen is not None:
+            _write_lumen(folder, known.lumen)
+        return True
+
+    shared(one, 1 + len(known.frames), cores)
     for kind in ("traced", "simulated", "true"):
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]

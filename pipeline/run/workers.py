@@ -17,11 +17,11 @@ from multiprocessing import connection, forkserver
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from pipeline import THREADS, one_thread
 from pipeline.run.outcome import LOST, Outcome, guarded
 
 J = TypeVar("J")
 R = TypeVar("R")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS")
 PRELOADED = "pipeline.run.case"
 """Imported once (1.5 s) by the server that workers are forked from."""
 LOOK_S = 0.1
@@ -130,7 +130,7 @@ def resident_mib(process: int | None) -> float:
 def _start_server() -> None:
     """Start the process that workers are forked from. They take one core each: N times N threads slow each other."""
     before = {name: os.environ.get(name) for name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    one_thread()
     try:
         multiprocessing.get_context("forkserver").set_forkserver_preload([PRELOADED])
         forkserver.ensure_running()

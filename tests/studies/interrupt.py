@@ -1,8 +1,8 @@
 """Runs that are killed and resumed, against one that was not: ``make interrupt``.
 
 Half of the runs are ended at a random time, half as soon as a random file of the output is there; by SIGINT, SIGTERM
-or SIGKILL to the main process alone, with one worker or two, with and without a stage store. The same command again
-must leave the tree of the run that was never interrupted, file by file, timing files apart.
+or SIGKILL to the main process alone, with one worker, two, or four with a helper each, with and without a stage store.
+The same command again must leave the tree of the run that was never interrupted, file by file, timing files apart.
 """
 
 from __future__ import annotations
@@ -85,9 +85,12 @@ def parents() -> dict[int, int]:
 
 
 def workers_of(process: int) -> set[int]:
-    """The workers of a run: children of the process that they are forked from, which is a child of the run's."""
+    """The workers of a run, children of the process that they are forked from, which is a child of the run's; and
+    their helpers.
+    """
     known = parents()
-    return {worker for worker, parent in known.items() if known.get(parent) == process}
+    found = {worker for worker, parent in known.items() if known.get(parent) == process}
+    return found | {helper for helper, parent in known.items() if parent in found}
 
 
 def outlived(workers: set[int]) -> float:
@@ -140,7 +143,7 @@ def trials(count: int, seed: int, files: list[str], lasts_s: dict[int, float]) -
     return [
         Trial(
             number,
-            workers := draw.choice((1, 2)),
+            workers := draw.choice((1, 2, 8)),
             draw.random() < 0.5,
             draw.choice(list(SIGNALS)),
             draw.uniform(0.0, lasts_s[workers]),
@@ -161,7 +164,7 @@ def main() -> int:
         manifest = study(root / "study")
         case._kernels_loaded()
         reference, lasts_s = root / "reference", {}
-        for workers in (2, 1):
+        for workers in (8, 2, 1):
             shutil.rmtree(reference, ignore_errors=True)
             clock = time.monotonic()
             if ended(started(words_of(manifest, reference, workers, store=False))):

@@ -1,8 +1,8 @@
 """How a run scales: ``make scale``. Every figure is a ratio of times measured in turn in the same minutes.
 
-Many small cases with a sweep on two workers against one, beside what a busy loop gains from a second process; the same
-command again against the first time; what a case takes beside its stages; memory from the first case to the last; the
-time until a worker answers.
+One large case on two cores against one. Many small cases with a sweep on two workers against one, beside what a busy
+loop gains from a second process; the same command again against the first time; what a case takes beside its stages;
+memory from the first case to the last; the time until a worker answers.
 """
 
 from __future__ import annotations
@@ -79,13 +79,42 @@ def worker_s() -> float:
     return time.perf_counter() - clock
 
 
+def one_case(root: Path, frames: int, size: int, pairs: int) -> tuple[list[float], list[float]]:
+    """How much faster one case is on two cores than on one, and a busy loop in two processes, pair by pair."""
+    words = ["synth", "circle-of-willis", "-o", str(root / "big"), "--frames", str(frames), "--size", str(size)]
+    said([*words, "--seed", "101"])
+    words = ["run", str(root / "big" / "manifest.toml"), "-o", str(root / "out"), "--no-cache", "--fresh", "-j"]
+    gains, loops = [], []
+    for _ in range(pairs):
+        one, two = said([*words, "1"]), said([*words, "2"])
+        gains.append(one / two)
+        loops.append(busy_s(1) / busy_s(2))
+    return gains, loops
+
+
 def main() -> int:
     """Print a line a figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--points", type=int, default=6)
     parser.add_argument("--pairs", type=int, default=3)
+    parser.add_argument("--frames", type=int, default=30, help="of the one case")
+    parser.add_argument("--size", type=int, default=256, help="of its scans, voxels")
+    parser.add_argument("--one-case", action="store_true", help="that row alone")
     given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        gains, loops = one_case(Path(name), given.frames, given.size, given.pairs)
+    print(
+        f"one case of {given.frames} frames of {given.size}^3, {given.pairs} pairs, -j 2 against -j 1: {spread(gains)}"
+    )
+    print(f"a busy loop in two processes: {spread(loops)}", flush=True)
+    if not given.one_case:
+        many_cases(given)
+    return 0
+
+
+def many_cases(given: argparse.Namespace) -> None:
+    """Many small ones, with a sweep."""
     values = ",".join(f"{0.5 + 0.25 * i:g}" for i in range(given.points))
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
@@ -114,7 +143,6 @@ def main() -> int:
         peaks = times["peak_memory_MiB"]
         print(f"peak memory after the first case {peaks.iloc[0]:.0f} MiB, after the last {peaks.iloc[-1]:.0f} MiB")
         print(f"a worker answers after {worker_s():.2f} s")
-    return 0
 
 
 def spread(values: list[float]) -> str:

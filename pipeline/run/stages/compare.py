@@ -1,11 +1,13 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
+from pipeline.run.helpers import shared
+from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.entries import four_entries
 from pipeline.run.stages.known import Context, Frame, Known
@@ -21,23 +23,38 @@ def compare_frames(run: Context, known: Known) -> Known:
             return replace(known, frames=compare_in_views(run, known))
     with run.log.timed("compare"):
         clues = _clues(run, known)
-        simulated = simulated_rivals(run, known) if clues else {}
-    frames, before = [], _trusted_before(known.frames)
-    after = [*_trusted_before(known.frames[::-1])][::-1]
-    for frame, previous, following in zip(known.frames, before, after, strict=True):
-        with run.log.timed("compare", frame.index):
-            tip = frame.curve.points_mm[-1] if frame.curve is not None and frame.traced else None
-            seen = Seen(previous, following, tip, simulated.get(frame.index, {}))
-            done = _compared(run, known, frame, clues, seen)
-            if frame.truth_mm is not None:
-                truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
-                done = replace(done, truth=truth)
-            frames.append(done)
-    known = replace(known, frames=tuple(frames))
+        simulated = simulated_rivals(run, known, clues.known_ways) if clues else {}
+        if clues:
+            clues.known_ways()
+    known = replace(known, frames=_all_compared(run, known, clues, simulated))
     if clues is not None and run.config.compare.simulated_nulls:
         with run.log.timed("compare"):
             known = replace(known, entries=four_entries(run, known, clues.way))
     return budgeted(run, known)
+
+
+def _all_compared(
+    run: Context, known: Known, clues: Clues | None, simulated: Mapping[int, Mapping[str, Array]]
+) -> tuple[Frame, ...]:
+    """The frames with their errors. simulated : by frame, the wires of simulators that lack something."""
+    before = [*_trusted_before(known.frames)]
+    after = [*_trusted_before(known.frames[::-1])][::-1]
+
+    def one(number: int, _earlier: object) -> tuple[Frame, Log]:
+        part, frame = run.part(), known.frames[number]
+        with part.log.timed("compare", frame.index):
+            tip = frame.curve.points_mm[-1] if frame.curve is not None and frame.traced else None
+            seen = Seen(before[number], after[number], tip, simulated.get(frame.index, {}))
+            done = _compared(part, known, frame, clues, seen)
+            if frame.truth_mm is not None:
+                truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
+                done = replace(done, truth=truth)
+        return done, part.log
+
+    parts = shared(one, len(known.frames), run.cores, inherited=(known.lumen, clues and clues.way))
+    for _, log in parts:
+        run.log.add(log)
+    return tuple(frame for frame, _ in parts)
 
 
 def _clues(run: Context, known: Known) -> Clues | None:

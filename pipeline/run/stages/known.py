@@ -15,6 +15,7 @@ from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.cache import Store
 from pipeline.run.log import Log, Stage
+from pipeline.run.stages.before import ASKS, Before, is_asks
 from pipeline.run.store import key_of
 from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
@@ -119,12 +120,21 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """A case, its settings, the store of earlier results and the log."""
+    """A case, its settings, the store of earlier results and the log.
+
+    cores : that the case may take.     simulates : it will be simulated after it is traced.
+    """
 
     case: Case
     config: Config
     store: Store
     log: Log
+    cores: int = 1
+    simulates: bool = False
+
+    def part(self) -> "Context":
+        """The same for a part of the case that may be done in another process."""
+        return replace(self, log=self.log.part(), cores=1)
 
     def load(self, crop: Crop, frame: int | None = None) -> Volume:
         """Read a box of a scan."""
@@ -139,18 +149,27 @@ class Context:
         function: Callable[..., Result],
         *inputs: object,
         of_frame: int | None = None,
+        previous: Before | None = None,
         **named: object,
     ) -> Result:
         """``function(*inputs, **named)``, or what the store has of it: its key is made from the very inputs.
 
-        A crop among the inputs stands for its volume, which is read only where it is needed.
+        A crop among the inputs stands for its volume, which is read only where it is needed. previous : an input that
+        belongs to the key only where the function has asked for it.
         """
         key = key_of(function, inputs, named) if self.store.root else ""
         kept = self.store.get(stage, key)
+        if previous is not None and is_asks(kept):
+            key = key_of(function, inputs, named, previous.curve)
+            kept = self.store.get(stage, key)
         if kept is None:
             volumes = [self.load(item, of_frame) if isinstance(item, Crop) else item for item in inputs]
+            asked = previous is None or previous.asked
             with self.log.timed(stage, of_frame):
-                result = function(*volumes, **named)
+                result = function(*volumes, **named, **({} if previous is None else {"previous": previous}))
+            if self.store.root and previous is not None and previous.asked and not asked:
+                self.store.put(stage, key, ASKS)
+                key = key_of(function, inputs, named, previous.curve)
             self.store.put(stage, key, result)
         else:
             result = cast(Result, kept)

@@ -4,13 +4,14 @@ Both have everything else of the simulated wire, the clamp and the depths too. O
 mean, at equal arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array
+from pipeline.run.helpers import nothing, shared
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import insertion_of, simulate
 from pipeline.simulate.config import SimulateConfig
@@ -18,14 +19,17 @@ from pipeline.simulate.config import SimulateConfig
 ROLLS = 12
 
 
-def simulated_rivals(run: Context, known: Known) -> dict[int, dict[str, Array]]:
-    """By frame and by name, the wires (n, 3) of both; a frame that was not simulated has none."""
+def simulated_rivals(run: Context, known: Known, first: Callable[[], object] = nothing) -> dict[int, dict[str, Array]]:
+    """By frame and by name, the wires (n, 3) of both; a frame that was not simulated has none.
+
+    first : what can be done while helpers simulate.
+    """
     frames = [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
     if not run.config.compare.simulated_nulls or not frames or not np.isfinite(known.segment_mm):
         return {}
     plain = run.config.simulate
-    straight = _wires(run, known, frames, replace(plain, rest_curvature_scale=0.0), 0.0)
-    turned = [_wires(run, known, frames, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
+    ways = [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]
+    straight, *turned = shared(lambda i, _: _wires(run, known, frames, *ways[i]), len(ways), run.cores, first)
     found: dict[int, dict[str, Array]] = {}
     for i, frame in enumerate(frames):
         arc = samples(frame.depth_mm, run.config.compare.sample_mm)

@@ -1,6 +1,8 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,9 +12,13 @@ from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
+from pipeline.run.helpers import Earlier, nothing, shared
+from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
+from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.straightened import straightened
+from pipeline.simulate import wall_of
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import of_length, trace
@@ -26,18 +32,13 @@ def trace_frames(run: Context, known: Known) -> Known:
     if not known.scans.frames:
         pairs = zip(known.frames, given, strict=True) if given else ()
         return replace(known, frames=tuple(_as_given(run, *pair) for pair in pairs) or known.frames)
-    work = _Tracing(run, known, own_curves=bool(given))
-    frames: list[Frame] = []
-    for frame, header in zip(known.frames, known.scans.frames, strict=True):
-        previous = next((f.curve for f in reversed(frames) if f.curve is not None and len(f.curve.points_mm)), None)
-        try:
-            done = work.look(frame, header, previous, given[frame.index] if given else None)
-        except StageError as error:
-            done = frame.failed("load", error)
-        else:
-            length = 0.0 if done.curve is None else done.curve.length_mm
-            run.log.progress("trace", frame.index + 1, len(known.frames), f"{done.status} {length:.1f} mm")
-        frames.append(done)
+    work = _Tracing(run, known, given)
+    # a second and more with 256^3 voxels, while the helpers trace
+    wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.simulates else nothing
+    parts = shared(work.part, len(known.frames), run.cores, wall)
+    for part in parts:
+        run.log.add(part.log)
+    frames = [part.frame for part in parts]
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
@@ -45,31 +46,52 @@ def trace_frames(run: Context, known: Known) -> Known:
     return replace(known, frames=tuple(frames))
 
 
+class _Part(NamedTuple):
+    """What becomes of one frame. window : the grey values that are shown of it; None where it could not be read."""
+
+    frame: Frame
+    window: tuple[float, float] | None
+    log: Log
+
+
 class _Tracing:
     """What all frames share: the box around the lumen, the wire-free scan there, and where the phantom belongs."""
 
-    def __init__(self, run: Context, known: Known, *, own_curves: bool) -> None:
+    def __init__(self, run: Context, known: Known, given: list[Curve]) -> None:
         assert known.scans is not None
         assert known.lumen is not None
         self.run, self.lumen, self.load, settings = run, known.lumen, run.config.load, run.config.trace
+        self.frames, self.headers, self.given = known.frames, known.scans.frames, given
         self.corners = corners_mm(self.lumen.distance)
         self.box = known.scans.frames[0].box_of(self.corners)
         empty = known.scans.reference
         self.reference = None if empty is None else run.load(Crop(empty, self.box, self.load))
-        self.window: tuple[float, float] | None = None
         with run.log.timed("trace"):
             self.alignment: Alignment = alignment_of(
                 self.lumen,
                 self.reference,
                 settings.register_skip_voxels,
                 switched_on=settings.register == "auto",
-                own_curves=own_curves,
+                own_curves=bool(given),
             )
 
-    def look(self, frame: Frame, header: Header, previous: Curve | None, given: Curve | None) -> Frame:
-        """One frame read, put in place and traced; LoadError where it cannot be read."""
-        log, settings = self.run.log, self.run.config.trace
-        volume = self.run.load(Crop(header, self.box, self.load), frame.index)
+    def part(self, number: int, earlier: Earlier[_Part]) -> _Part:
+        """One frame, which failed where it cannot be read."""
+        run, frame = self.run.part(), self.frames[number]
+        try:
+            done, window = self.look(run, frame, self.headers[number], earlier)
+        except StageError as error:
+            return _Part(frame.failed("load", error), None, run.log)
+        length = 0.0 if done.curve is None else done.curve.length_mm
+        run.log.progress("trace", number + 1, len(self.frames), f"{done.status} {length:.1f} mm")
+        return _Part(done, window, run.log)
+
+    def look(
+        self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
+    ) -> tuple[Frame, tuple[float, float]]:
+        """One frame read, put in place and traced, and its grey window; LoadError where it cannot be read."""
+        log, settings = run.log, run.config.trace
+        volume = run.load(Crop(header, self.box, self.load), frame.index)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
@@ -78,25 +100,25 @@ class _Tracing:
         with log.timed("trace", frame.index):
             here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
-        self.window = self.window or grey_window(shown)
-        pictures = projections(shown, self.window)
-        done = replace(frame, registration=registration, projections=pictures)
-        if given is not None:
-            return _along(_as_given(self.run, done, given), shown, self.window)
-        curve = self.run.stored(
+        before = (earlier(k) for k in range(frame.index))
+        window = next((part.window for part in before if part.window), None) or grey_window(shown)
+        done = replace(frame, registration=registration, projections=projections(shown, window))
+        if self.given:
+            return _along(_as_given(run, done, self.given[frame.index]), shown, window), window
+        curve = run.stored(
             "trace",
             trace,
             here,
             self.lumen,
-            self.run.case.entry_mm,
-            self.run.case.entry_direction,
+            run.case.entry_mm,
+            run.case.entry_direction,
             of_frame=frame.index,
             reference=self.reference,
-            previous=previous,
+            previous=Before(lambda: _last_curve(frame.index, earlier)),
             expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
             config=settings,
         )
-        return _along(_traced(done, curve), shown, self.window)
+        return _along(_traced(done, curve), shown, window), window
 
 
 def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
@@ -104,6 +126,12 @@ def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
     if frame.curve is None or not frame.traced:
         return frame
     return replace(frame, straightened=straightened(shown, frame.curve.points_mm, window))
+
+
+def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
+    """The curve of the last frame before this one that has any."""
+    curves = (earlier(k).frame.curve for k in reversed(range(number)))
+    return next((curve for curve in curves if curve is not None and len(curve.points_mm)), NOTHING)
 
 
 def _traced(frame: Frame, curve: Curve) -> Frame:

@@ -1,0 +1,186 @@
+"""One case on several cores: parts of it are done by this process and by others that are forked from it.
+
+What a fork inherits need not be sent: the lumen, the scan without wire, compiled kernels. Helpers save time and do
+nothing else: what they do not bring, since one of them died or met an error, is done here, where the error belongs.
+Results do not depend on how many there are.
+"""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from multiprocessing import connection
+from multiprocessing.context import ForkProcess
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, Generic, TypeVar
+
+import numpy as np
+
+from pipeline.run.workers import end_with_parent
+
+R = TypeVar("R")
+Earlier = Callable[[int], R]
+"""The result of a part before this one; waited for where it is not there yet."""
+Work = Callable[[int, Earlier[R]], R]
+LOOK_S = 0.002
+"""How often is looked whether a part has come that is waited for."""
+
+
+class _LostError(Exception):
+    """A helper has ended before its work was done."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        if code < 0:  # else it has met an error, which will be met here
+            name = signal.Signals(-code).name
+            sys.stderr.write(f"a process that helped was ended by {name} (out of memory?): done without its help\n")
+
+
+def nothing() -> None:
+    """What is to be done first where nothing is."""
+
+
+def shared(
+    work: Work[R], count: int, cores: int, first: Callable[[], object] = nothing, inherited: Sequence[object] = ()
+) -> list[R]:
+    """``[work(i, earlier) for i in range(count)]``, shared out in this order; no result may be None.
+
+    A part may ask for the results of earlier ones. first : done by this process before it takes part, and only where
+    there are helpers.     inherited : large objects that results refer to, which every fork has: they are not sent.
+    """
+    parts = _Parts(work, count, inherited)
+    if min(cores, count) > 1:
+        with suppress(OSError), TemporaryDirectory(prefix="wireval-") as folder:
+            parts.folder = Path(folder)
+            parts.share_out(cores - 1, first)
+            parts.collect()
+    return parts.in_order()
+
+
+class _Packer(pickle.Pickler):
+    """Pickles with a number in place of what the other side has itself."""
+
+    def __init__(self, file: IO[bytes], inherited: Sequence[object]) -> None:
+        # read-only arrays come back read-only from the newest protocol alone
+        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
+        self.numbers = {id(item): number for number, item in enumerate(inherited)}
+
+    def persistent_id(self, item: object) -> int | None:
+        """The place of an inherited object; None for all others, which are packed."""
+        return self.numbers.get(id(item))
+
+
+class _Unpacker(pickle.Unpickler):
+    """The reverse."""
+
+    def __init__(self, file: IO[bytes], inherited: Sequence[object]) -> None:
+        super().__init__(file)
+        self.inherited = inherited
+
+    def persistent_load(self, number: int) -> object:
+        """The object of this process that stands at this place."""
+        return self.inherited[number]
+
+
+class _Parts(Generic[R]):
+    """The parts of a job, each taken once; their results, here or as files that every process sees."""
+
+    folder: Path
+
+    def __init__(self, work: Work[R], count: int, inherited: Sequence[object]) -> None:
+        self.work, self.count, self.inherited = work, count, inherited
+        self.own: dict[int, R] = {}
+        self.helpers: list[ForkProcess] = []
+
+    def share_out(self, helpers: int, first: Callable[[], object]) -> None:
+        """Do all parts with so many helpers; what a lost one leaves is left out."""
+        # all read their next number from one open file, whose place they share
+        turns = os.memfd_create("turns")
+        os.write(turns, np.arange(self.count, dtype=np.int32).tobytes())
+        os.lseek(turns, 0, os.SEEK_SET)
+        context = multiprocessing.get_context("fork")
+        try:
+            with warnings.catch_warnings():  # Python 3.12 warns of threads; no lock of theirs is taken by a helper
+                warnings.simplefilter("ignore", DeprecationWarning)
+                for _ in range(min(helpers, self.count)):
+                    helper = context.Process(target=self._help, args=(turns,))
+                    helper.start()
+                    self.helpers.append(helper)
+            first()
+            while taken := os.read(turns, 4):
+                number = int.from_bytes(taken, sys.byteorder)
+                self._keep(number, self.work(number, self.result))
+            self._wait()
+        except Exception:
+            # _LostError, or a part's own: going through them in their order shows the first one
+            pass
+        finally:
+            os.close(turns)
+            for helper in self.helpers:
+                helper.kill()
+                helper.join()
+
+    def collect(self) -> None:
+        """Read what others have brought."""
+        for number in range(self.count):
+            self._known(number)
+
+    def in_order(self) -> list[R]:
+        """All results; a part that nobody has brought is done now."""
+        done: list[R] = []
+        for number in range(self.count):
+            known = self.own.get(number)
+            done.append(self.work(number, done.__getitem__) if known is None else known)
+        return done
+
+    def result(self, number: int) -> R:
+        """The result of a part, once it is there."""
+        while (known := self._known(number)) is None:
+            for helper in self.helpers:
+                if helper.exitcode:
+                    raise _LostError(helper.exitcode)
+            time.sleep(LOOK_S)
+        return known
+
+    def _known(self, number: int) -> R | None:
+        path = self.folder / str(number)
+        if number not in self.own and path.exists():
+            with path.open("rb") as file:
+                self.own[number] = _Unpacker(file, self.inherited).load()
+        return self.own.get(number)
+
+    def _keep(self, number: int, result: R) -> None:
+        self.own[number] = result
+        temporary = self.folder / f".{number}"
+        with temporary.open("wb") as file:
+            _Packer(file, self.inherited).dump(result)
+        temporary.rename(self.folder / str(number))
+
+    def _help(self, turns: int) -> None:
+        """Do parts in a process of its own, until none is left or one fails."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; this one is ended by its parent
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        end_with_parent()
+        self.helpers = []
+        try:
+            while taken := os.read(turns, 4):
+                number = int.from_bytes(taken, sys.byteorder)
+                self._keep(number, self.work(number, self.result))
+        except Exception:
+            sys.exit(1)
+
+    def _wait(self) -> None:
+        """Wait for the helpers; _LostError as soon as one of them fails: another may wait for its part."""
+        waiting: dict[object, ForkProcess] = {helper.sentinel: helper for helper in self.helpers}
+        while waiting:
+            for sentinel in connection.wait([helper.sentinel for helper in waiting.values()]):
+                helper = waiting.pop(sentinel)
+                helper.join()
+                if helper.exitcode:
+                    raise _LostError(helper.exitcode)
