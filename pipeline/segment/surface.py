@@ -168,11 +168,11 @@ class SignedDistance:
 
     values : float32, mm, negative inside, on the site's grid; ``outer_mm`` wherever the wall is further away outside.
 
-    level : the grey taken as the wall.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
+    levels : at half of them is the wall.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
     """
 
     values: NDArray[np.float32]
-    level: float
+    levels: GreyLevels
     blur_mm: float
     counters: Counters
 
@@ -200,7 +200,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
         visits += propagate(box, voxels[stray], wall.foot, outer_mm)
     values = signed(box, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
     counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits)}
-    return SignedDistance(values, levels.half, blur, counters)
+    return SignedDistance(values, levels, blur, counters)
 
 
 def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
@@ -220,4 +220,4 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
     steepness = levels.contrast / (np.sqrt(2 * np.pi) * found.blur_mm)
     values = found.values
     values += np.float32((again.half - levels.half) / steepness)
-    return SignedDistance(values, again.half, found.blur_mm, found.counters)
+    return SignedDistance(values, again, found.blur_mm, found.counters)

@@ -29,12 +29,12 @@ from data_synthetic.rod.truth import converged_truth
 from pipeline.arrays.polyline import to_length
 from pipeline.load import Scans
 from pipeline.model import Array, Curve, Lumen, arc_length
+from pipeline.run.cache import Store
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, Known
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.simulate import simulate_frames
-from pipeline.run.store import Store
 from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.settings import Config
 from solver import Grid
@@ -110,6 +110,7 @@ rest_curvature_per_mm = {np.array(curvature).tolist()}
 [[case]]
 id = "drawn"
 lumen = "given.stl"
+traces = {json.dumps(["given.csv"] * len(depths))}
 entry_mm = {(setup.entry_mm + ENTRY_MM * z[7:10]).tolist()}
 entry_direction = {tilt.tolist()}
 material_axis = {np.array(setup.material_axis).tolist()}
