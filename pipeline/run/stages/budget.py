@@ -30,8 +30,9 @@ from pipeline.simulate import altered
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 from pipeline.simulate.resolution import lengths_mm
 
-PER_LUMEN, PER_LUMEN_ALONE = 8, 2
-"""Members that share a draw of the lumen's surface: as many as go side by side; few where it alone is looked at."""
+LUMENS, SIDE_BY_SIDE = 50, 8
+"""Draws of the lumen's surface at least, one for each member where there are fewer: it is most of the spread, and 48
+members in 6 lumens told half of it in one frame of six. Members in a lumen at most: as many as go side by side."""
 AT_REST = 0.9
 DISTAL = 20
 """Points of a wire's end, at the usual 0.5 mm its last 10 mm."""
@@ -46,7 +47,7 @@ def budgeted(run: Context, known: Known) -> Known:
     with run.log.timed("compare"):
         work = _Work(run, known, frames)
         try:
-            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members, PER_LUMEN))
+            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members))
             found = dict(zip(work.numbers, budgets, strict=True))
             rows = work.by_source(found) if settings.members_alone else []
         except ValueError as error:  # an input was drawn that the solver refuses
@@ -140,8 +141,9 @@ class _Work:
         count = self.run.config.budget.members
         return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}"
 
-    def budgets(self, sigmas: Sigmas, count: int, per_lumen: int) -> list[Budget | None]:
+    def budgets(self, sigmas: Sigmas, count: int) -> list[Budget | None]:
         """The budget of each frame by an ensemble."""
+        per_lumen = min(max(count // LUMENS, 1), SIDE_BY_SIDE)
         members = drawn(self.nominal, sigmas, count, per_lumen, self.run.config.budget.seed)
         ensemble = replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
         return [frame_budget(wires, seen) for wires, seen in zip(ensemble, self.seen, strict=True)]
@@ -165,8 +167,7 @@ class _Work:
 
     def _alone(self, source: str, calm: Sequence[int]) -> dict[str, Any]:
         """The row of one input."""
-        few = PER_LUMEN_ALONE if source == "lumen" else PER_LUMEN
-        budgets = self.budgets(alone(self.sigmas, source), self.run.config.budget.members_alone, few)
+        budgets = self.budgets(alone(self.sigmas, source), self.run.config.budget.members_alone)
         return _row(source, self.sigmas.said[source], [b.input_mm for i in calm if (b := budgets[i]) is not None])
 
 
