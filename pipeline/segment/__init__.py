@@ -41,5 +41,6 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     return Lumen(
         distance, wall.levels.half, warning(touching) + brighter(wall.levels),
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
-        {"noise": region.levels.noise, "blur_mm": wall.blur_mm, "scanner_blur_mm": blur},
+        {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
+         "scanner_blur_mm": blur},
     )  # fmt: skip

@@ -175,7 +175,8 @@ def _around(scan: Grid, index: Index) -> NDArray[np.float64]:
     """Mean grey (n,) of the 3^3 voxels around voxels (n, 3): a single one is too noisy to be called bright."""
     last = np.array(scan.shape) - 1
     steps = np.indices((3, 3, 3)).reshape(3, -1).T - 1
-    return np.mean([scan.values[tuple(np.clip(index + step, 0, last).T)] for step in steps], axis=0, dtype=np.float64)
+    grey = [scan.values[tuple(np.clip(index + step, 0, last).T)] for step in steps]
+    return np.asarray(np.mean(grey, axis=0, dtype=np.float64))
 
 
 def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> float:
@@ -193,9 +194,9 @@ def brighter(levels: GreyLevels) -> tuple[str, ...]:
     if not levels.foreign:
         return ()
     return (
-        f"segment: {100 * levels.foreign:.0f} % of the deepest voxels are more than {BRIGHTER:g} times as bright as the "
-        "vessel at its seed: bone or metal hangs together with it; its wall's level was taken from the rest, and where "
-        "they touch it has no wall: look at the picture, scan with smaller voxels, subtract the bone, or give the "
+        f"segment: {100 * levels.foreign:.0f} % of the deepest voxels are more than {BRIGHTER:g} times as bright as "
+        "the vessel at its seed: bone or metal hangs together with it; the wall's level is taken from the rest; where "
+        "they touch there is no wall: look at the picture, scan with smaller voxels, subtract the bone, or give the "
         "lumen as a file (manifest key lumen)",
     )
 
