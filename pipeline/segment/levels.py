@@ -36,8 +36,8 @@ Index = NDArray[np.int64]
 class GreyLevels:
     """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing.
 
-    seed, at_seed : the voxel beside which they were taken first, and the grey inside there.     foreign : share of the
-    deepest part that is too bright for the vessel.
+    seed, at_seed : the voxel beside which they were taken first, and the grey inside there.     brightest, foreign :
+    the grey up to which the vessel is believed, and the share of the deepest part that is brighter, where there is any.
     """
 
     inside: float
@@ -45,6 +45,7 @@ class GreyLevels:
     noise: float
     seed: tuple[int, ...] | None = None
     at_seed: float = float("nan")
+    brightest: float = float("inf")
     foreign: float = 0.0
 
     @property
@@ -58,7 +59,7 @@ class GreyLevels:
         return 0.5 * (self.inside + self.outside)
 
 
-def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
+def boxgrey_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
     """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
     half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
     a, b, c = (
@@ -106,14 +107,14 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
 
     Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
     """
-    box = box_around(grid, index, BOX_MM, LEAST_BOX)
+    box = boxgrey_around(grid, index, BOX_MM, LEAST_BOX)
     raw = np.asarray(grid.values[box], np.float32)
     grey = raw
     for axis in range(3):
         grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
     start = np.array([s.start for s in box])
     # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
-    near = box_around(grid, index, 0.0, 1)
+    near = boxgrey_around(grid, index, 0.0, 1)
     inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
     around = grey[inner]
     seed = float(np.median(around))
@@ -148,13 +149,13 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     depth, core = _deepest(off_wall)
     limit = _brightest(distance, corner, levels, blur_mm)
     some = core[:: max(1, len(core) // 500)]
-    foreign = float(np.mean(_around(scan, np.argwhere(inside)[some] + corner) > limit))
+    foreign = float(np.mean(grey_around(scan, np.argwhere(inside)[some] + corner) > limit))
     if foreign > BRIGHT_SHARE:
         some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
-        some = some[_around(scan, np.argwhere(inside)[some] + corner) <= limit]
+        some = some[grey_around(scan, np.argwhere(inside)[some] + corner) <= limit]
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
-        levels = replace(levels, foreign=foreign)
+        levels = replace(levels, brightest=limit, foreign=foreign)
     if depth > THICK * blur_mm:
         return replace(levels, inside=_median(grey[core], levels.inside))
     core = core[:: max(1, len(core) // 500)]
@@ -171,7 +172,7 @@ def _deepest(off_wall: NDArray[Any]) -> tuple[float, Index]:
     return depth, np.flatnonzero(off_wall > 0.7 * depth)
 
 
-def _around(scan: Grid, index: Index) -> NDArray[np.float64]:
+def grey_around(scan: Grid, index: Index) -> NDArray[np.float64]:
     """Mean grey (n,) of the 3^3 voxels around voxels (n, 3): a single one is too noisy to be called bright."""
     last = np.array(scan.shape) - 1
     steps = np.indices((3, 3, 3)).reshape(3, -1).T - 1
@@ -183,7 +184,7 @@ def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float
     """The grey up to which the vessel is believed: that at the seed, its blur taken off, and BRIGHTER of it."""
     if levels.seed is None:
         return float("inf")
-    depth = -float(distance.values[box_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
+    depth = -float(distance.values[boxgrey_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
     # grey at the seed was smoothed by 1-2-1, of variance 1/2
     share = 1.0 - np.exp(-0.5 * depth**2 / (blur_mm**2 + 0.5 * float(np.mean(distance.spacing_mm)) ** 2))
     return levels.outside + BRIGHTER * (levels.at_seed - levels.outside) / max(float(share), 0.4)

@@ -17,7 +17,7 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
-from pipeline.segment.levels import GreyLevels, Index, failed, plateau, scanner_blur
+from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
 from solver.grid import Array, Grid
 
 LAYERS = 4
@@ -33,6 +33,8 @@ SURFACE_ROUNDS = 3
 NOISE_LEFT = 0.29
 """Share of a voxel's noise that moves the wall, after smoothing: with 0.6 to 0.2 mm voxels, noise of 0.03 to 0.21 of
 the contrast, the wall is off by 0.06 to 0.22 voxels (standard deviation), of which 0.07 is no noise's."""
+INWARDS = 2.5
+"""How far from the wall grey is its plateau's, voxels."""
 THINNEST = 1.2
 """Radius over blur below which a blurred cylinder no longer reaches half its contrast (1.177), with a margin."""
 
@@ -141,6 +143,15 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
     return voxels, feet(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
 
 
+def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArray[np.bool_]:
+    """Whether what lies INWARDS of surface voxels (flat, of the box) is the vessel: bone's wall is steeper."""
+    if not np.isfinite(levels.brightest):
+        return np.ones(len(voxels), bool)
+    index = np.stack(np.unravel_index(voxels, site.state.shape), axis=1) - PAD + site.corner
+    inwards = np.rint(index - INWARDS * normal).astype(np.int64)
+    return np.asarray(grey_around(site.volume, inwards) <= levels.brightest)
+
+
 def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, voxel: float) -> Wall:
     """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood.
 
@@ -199,7 +210,10 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
         raise failed(got, "a surface", do)
     seen = voxels[good]
     owner.reshape(-1)[seen] = np.flatnonzero(good) + 1
-    blur = blur_of_wall(wall.steepness[good], wall.curvature[good], levels.contrast)
+    own = good.copy()
+    own[good] = _own(site, levels, seen, wall.normal[good])
+    own = own if own.any() else good
+    blur = blur_of_wall(wall.steepness[own], wall.curvature[own], levels.contrast)
     wall = _corrected(wall, voxels, owner, blur, float(spacing.min()))
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = propagate(box, seen, wall.foot, outer_mm)
@@ -220,7 +234,9 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
         own = scanner_blur(found.blur_mm, site.taps, voxel)
         again = plateau(site.volume, site.grid.with_values(found.values), levels, own)
         thin = -float(found.values.min()) < 4 * found.blur_mm
-        if abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast:
+        near = abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast
+        # bone that has just been seen is in this surface's blur
+        if near and bool(again.foreign) == bool(levels.foreign):
             break
         levels = again
         del found  # before the next takes its place in memory
