@@ -9,8 +9,9 @@ import numpy as np
 from pipeline.model import Array, Clamp, Wire
 from pipeline.simulate.config import SimulateConfig
 
-LUMEN_VOXELS, LUMEN_BIAS_VOXELS = 0.12, 0.05
-"""Standard deviation of the lumen's surface, place by place (measured: 0.11), and of what is common to all."""
+LUMEN_VOXELS, LUMEN_NOISE_VOXELS, LUMEN_BIAS_VOXELS = 0.07, 0.1, 0.05
+"""Standard deviation of the lumen's surface: place by place without noise (measured with 0.2 to 0.6 mm voxels), by
+noise where the lumen is no scan's, which says its own, and of what is common to all (measured: 0.03 at most)."""
 INSERTION_MM = 0.5
 """Of a depth that is read from a scale on the wire's shaft."""
 TIP_VOXELS = 0.25
@@ -21,6 +22,10 @@ REST_CURVATURE, TAPER, WALL_STIFFNESS = 0.05, 0.1, 0.5
 UNITS = {"roll_deg": " degrees", "lumen_mm": " mm", "lumen_bias_mm": " mm", "friction": ""}
 FRICTION = 0.3
 """Relative to the coefficient that is stated: where none is, none is drawn, and what friction does is model error."""
+
+LUMENS, SIDE_BY_SIDE = 50, 8
+"""Draws of the lumen's surface at least, one for each member where there are fewer: it is most of the spread, and 48
+members in 6 lumens told half of it in one frame of six. Members in a lumen at most: as many as go side by side."""
 
 SOURCES = (
     *("clamp", "depth", "roll", "lumen", "lumen_bias"),
@@ -79,17 +84,24 @@ class Member(NamedTuple):
 
 
 def sigmas_of(
-    stated: Mapping[str, float | None], nominal: Nominal, wire: Wire, depth_mm: Array, voxel_mm: float
+    stated: Mapping[str, float | None],
+    nominal: Nominal,
+    wire: Wire,
+    depth_mm: Array,
+    voxel_mm: float,
+    noise_mm: float | None = None,
 ) -> Sigmas:
     """The standard deviations of a case: what is stated, else the defaults.
 
-    stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (frames,) of the depths.
+    stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (frames,) of the depths.     noise_mm : of the
+    lumen's surface by the scan's noise.
     """
+    noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
     friction, curved = nominal.config.friction or 0.0, bool(np.any(wire.rest_curvature_per_mm))
     defaults = {
         # a wire that is straight at rest may be rolled at will
         "roll_deg": ROLL_DEG * curved,
-        "lumen_mm": LUMEN_VOXELS * voxel_mm,
+        "lumen_mm": float(np.hypot(LUMEN_VOXELS * voxel_mm, noise)),
         "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
         "rest_curvature": REST_CURVATURE * curved,
         "taper": TAPER * isinstance(wire.bending_stiffness_N_mm2, list),
@@ -114,6 +126,11 @@ def sigmas_of(
 def _source(name: str) -> str:
     """A key of ``Uncertainty`` as a source: without its unit."""
     return name.removesuffix("_mm").removesuffix("_deg")
+
+
+def members_per_lumen(count: int) -> int:
+    """How many of ``count`` members share a lumen."""
+    return min(max(count // LUMENS, 1), SIDE_BY_SIDE)
 
 
 def drawn(nominal: Nominal, sigmas: Sigmas, count: int, per_lumen: int, seed: int = 0) -> list[Member]:

@@ -8,7 +8,7 @@ from pipeline.model import Lumen, Volume
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
-from pipeline.segment.levels import scanner_blur
+from pipeline.segment.levels import brighter, scanner_blur
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
 from solver.grid import read_only
@@ -39,7 +39,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
     distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
-        distance, wall.level, warning(touching),
+        distance, wall.levels.half, warning(touching) + brighter(wall.levels),
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
-        {"noise": region.levels.noise, "blur_mm": wall.blur_mm, "scanner_blur_mm": blur},
+        {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
+         "scanner_blur_mm": blur},
     )  # fmt: skip

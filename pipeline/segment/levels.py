@@ -3,7 +3,7 @@
 A method is a function like :func:`fuzzy.fuzzy_region`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,15 +22,31 @@ LEAST_BOX = 8
 """Its least half width in voxels."""
 THICK = 5.0
 """Depth over blur from which grey in the middle is the plateau."""
+BRIGHTER = 1.25
+"""Contrast over the seed's from which grey is not the vessel's but bone's or metal's: bone that hangs together with a
+lumen of 0.6 mm voxels, 1.3 times as bright, was taken for its plateau, and the wall was 0.43 voxels too narrow."""
+BRIGHT_SHARE = 0.1
+"""Share of the deepest voxels that may be so bright before they are left out."""
+
+
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class GreyLevels:
-    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing."""
+    """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing.
+
+    seed, at_seed : the voxel beside which they were taken first, and the grey inside there.     brightest, foreign :
+    the grey up to which the vessel is believed, and the share of the deepest part that is brighter, where there is any.
+    """
 
     inside: float
     outside: float
     noise: float
+    seed: tuple[int, ...] | None = None
+    at_seed: float = float("nan")
+    brightest: float = float("inf")
+    foreign: float = 0.0
 
     @property
     def contrast(self) -> float:
@@ -43,7 +59,7 @@ class GreyLevels:
         return 0.5 * (self.inside + self.outside)
 
 
-def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
+def boxgrey_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
     """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
     half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
     a, b, c = (
@@ -91,14 +107,14 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
 
     Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
     """
-    box = box_around(grid, index, BOX_MM, LEAST_BOX)
+    box = boxgrey_around(grid, index, BOX_MM, LEAST_BOX)
     raw = np.asarray(grid.values[box], np.float32)
     grey = raw
     for axis in range(3):
         grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
     start = np.array([s.start for s in box])
     # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
-    near = box_around(grid, index, 0.0, 1)
+    near = boxgrey_around(grid, index, 0.0, 1)
     inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
     around = grey[inner]
     seed = float(np.median(around))
@@ -106,7 +122,8 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
     at = tuple(int(b) + s.start for b, s in zip(best, inner, strict=True))
     inside, outside, region = _two_levels(grey, seed, at)
     noise = _noise(raw - grey, region)
-    return GreyLevels(inside, outside, noise), start + np.array(at)
+    found = start + np.array(at)
+    return GreyLevels(inside, outside, noise, tuple(found.tolist()), inside), found
 
 
 def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
@@ -120,7 +137,8 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     """The levels again, from the deepest part of the whole segmented vessel.
 
     distance : signed, on a box of the scan.  blur_mm : the scanner's.  A tube no thicker than its blur never reaches
-    its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2).
+    its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2). What is too bright for
+    the vessel does not count.
     """
     inside = distance.values < 0
     if not np.isfinite(blur_mm) or not inside.any():
@@ -128,19 +146,60 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     corner = np.rint(scan.to_index(distance.origin_mm)).astype(int)
     window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
     off_wall, grey = -distance.values[inside], scan.values[window][inside]
-    depth = float(np.percentile(off_wall, 99))
-    core = np.flatnonzero(off_wall > 0.7 * depth)
+    depth, core = _deepest(off_wall)
+    limit = _brightest(distance, corner, levels, blur_mm)
+    some = core[:: max(1, len(core) // 500)]
+    foreign = float(np.mean(grey_around(scan, np.argwhere(inside)[some] + corner) > limit))
+    if foreign > BRIGHT_SHARE:
+        some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
+        some = some[grey_around(scan, np.argwhere(inside)[some] + corner) <= limit]
+        off_wall, grey = off_wall[some], grey[some]
+        depth, core = _deepest(off_wall)
+        levels = replace(levels, brightest=limit, foreign=foreign)
     if depth > THICK * blur_mm:
-        return GreyLevels(_median(grey[core], levels.inside), levels.outside, levels.noise)
+        return replace(levels, inside=_median(grey[core], levels.inside))
     core = core[:: max(1, len(core) // 500)]
     radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
     off_axis = np.maximum(radius - off_wall[core], 0.0)
     share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
     peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
-    return GreyLevels(levels.outside + peak, levels.outside, levels.noise)
+    return replace(levels, inside=levels.outside + peak)
 
 
-Index = NDArray[np.int64]
+def _deepest(off_wall: NDArray[Any]) -> tuple[float, Index]:
+    """How deep a vessel is, and which of its voxels lie so."""
+    depth = float(np.percentile(off_wall, 99))
+    return depth, np.flatnonzero(off_wall > 0.7 * depth)
+
+
+def grey_around(scan: Grid, index: Index) -> NDArray[np.float64]:
+    """Mean grey (n,) of the 3^3 voxels around voxels (n, 3): a single one is too noisy to be called bright."""
+    last = np.array(scan.shape) - 1
+    steps = np.indices((3, 3, 3)).reshape(3, -1).T - 1
+    grey = [scan.values[tuple(np.clip(index + step, 0, last).T)] for step in steps]
+    return np.asarray(np.mean(grey, axis=0, dtype=np.float64))
+
+
+def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> float:
+    """The grey up to which the vessel is believed: that at the seed, its blur taken off, and BRIGHTER of it."""
+    if levels.seed is None:
+        return float("inf")
+    depth = -float(distance.values[boxgrey_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
+    # grey at the seed was smoothed by 1-2-1, of variance 1/2
+    share = 1.0 - np.exp(-0.5 * depth**2 / (blur_mm**2 + 0.5 * float(np.mean(distance.spacing_mm)) ** 2))
+    return levels.outside + BRIGHTER * (levels.at_seed - levels.outside) / max(float(share), 0.4)
+
+
+def brighter(levels: GreyLevels) -> tuple[str, ...]:
+    """One sentence for the report where the vessel hangs together with something brighter, or none."""
+    if not levels.foreign:
+        return ()
+    return (
+        f"segment: {100 * levels.foreign:.0f} % of the deepest voxels are more than {BRIGHTER:g} times as bright as "
+        "the vessel at its seed: bone or metal hangs together with it; the wall's level is taken from the rest; where "
+        "they touch there is no wall: look at the picture, scan with smaller voxels, subtract the bone, or give the "
+        "lumen as a file (manifest key lumen)",
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from pipeline.budget import SOURCES, Nominal, Seen, alone, drawn, frame_budget, releases, sigmas_of
-from pipeline.budget.inputs import FRICTION, ROLL_DEG, Sigmas
+from pipeline.budget.inputs import FRICTION, ROLL_DEG, Sigmas, members_per_lumen
 from pipeline.budget.shapes import Shapes, energy_score_mm, parted, shapes_of
 from pipeline.budget.surface import offset_field
 from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
@@ -66,6 +66,21 @@ def test_draws_have_the_stated_spread_and_are_the_same_alone() -> None:
             if source == "clamp":
                 assert np.array_equal(whole.clamp.direction, own.clamp.direction)
                 assert (own.roll_deg[0], own.config.taper_scale, own.narrower_mm) == (0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(("members", "lumens"), [(24, 24), (48, 48), (100, 50), (200, 50), (1000, 125)])
+def test_the_spread_rests_on_many_lumens(members: int, lumens: int) -> None:
+    """It is most of it: with 8 members in each, 48 of them drew 6 lumens."""
+    start = nominal()
+    found = drawn(start, sigmas(start), members, members_per_lumen(members))
+    assert len({m.lumen for m in found}) == lumens
+
+
+def test_a_noisy_scan_has_a_lumen_that_is_less_known() -> None:
+    start = nominal()
+    quiet, noisy = (sigmas_of({}, start, WIRE, np.full(2, 0.1), 0.2, noise_mm=mm).lumen for mm in (0.0, 0.04))
+    assert (quiet, noisy) == pytest.approx((0.014, np.hypot(0.014, 0.04)))
+    assert sigmas(start).lumen == pytest.approx(0.12 * 0.3, rel=0.02), "a lumen that is no scan's"
 
 
 def test_a_clamp_moved_along_the_wire_leaves_a_traced_tip_where_it_is_seen() -> None:

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from pipeline.model import Volume
@@ -44,6 +45,32 @@ def test_wall_of_a_blurred_tube_is_where_it_was_drawn(radius, noise, bar):
     error = wall_error(lumen, curve, radius)
     assert len(error) > 3000
     assert np.sqrt(np.mean(error**2)) < bar
+
+
+@pytest.mark.parametrize("noise", [0.0, 90.0])
+def test_bone_that_touches_is_not_what_the_vessel_is_as_bright_as(noise):
+    """It is deeper than the vessel: its grey was taken for the plateau, and the wall lay 0.2 voxels too far in."""
+    curve, origin, clean = tube(2.0)
+    at = np.argwhere(np.ones(clean.shape, bool)) * VOXEL + origin
+    outwards = curve[200] * [1.0, 1.0, 0.0] / 8.0
+    bone = np.linalg.norm(at - (curve[200] + 6.7 * outwards), axis=1).reshape(clean.shape) - 5.0
+    beside = np.maximum(clean, phantoms.BACKGROUND + 1200.0 * phantoms.partial_volume(bone, VOXEL))
+    seen = [Volume(phantoms.scan(grey, 0.8, noise, seed=1), [VOXEL] * 3, origin) for grey in (clean, beside)]
+    alone, touched = (segment(volume, curve[[500]]) for volume in seen)
+    assert not any("bone" in warning for warning in alone.warnings)
+    assert any("bone or metal hangs together" in warning for warning in touched.warnings)
+    assert touched.wall_level == pytest.approx(alone.wall_level, abs=0.03 * 900.0)
+
+
+@pytest.mark.parametrize("noise", [80.0, 200.0])
+def test_how_far_noise_moves_the_wall_is_said(noise):
+    """Noise that is correlated as a scanner's: white noise moves the wall half as far."""
+    curve, origin, clean = tube(2.0)
+    rough = gaussian_filter(np.random.default_rng(1).standard_normal(clean.shape), 0.5)
+    grey = phantoms.scan(clean, 0.8, 0.0, seed=1) + noise * rough / rough.std()
+    lumen = segment(Volume(grey, [VOXEL] * 3, origin), curve[[200]])
+    low, high = np.percentile(wall_error(lumen, curve, 2.0), [16, 84])  # a speck of noise beside the tube is no wall
+    assert lumen.levels["wall_noise_mm"] / VOXEL == pytest.approx(0.5 * (high - low), rel=0.35)
 
 
 def test_memory_order_and_pose_do_not_change_the_lumen():

@@ -56,7 +56,7 @@ def test_what_is_measured_is_never_summed():
     frame, reference, lumen = scans(8)
     curve = trace(frame, lumen, *vessel()[4:], reference=reference)
     assert {"cnr", "blur_mm", "noise", "residual_rms", "inflation", "inflation_tip", "knot_mm"} == set(curve.levels)
-    assert {"noise", "blur_mm", "scanner_blur_mm"} == set(lumen.levels)
+    assert {"noise", "blur_mm", "scanner_blur_mm", "wall_noise_mm"} == set(lumen.levels)
     log = Log(lambda *_: None)
     for _ in range(3):
         log.count("trace", curve.counters, curve.levels)

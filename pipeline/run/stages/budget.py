@@ -21,7 +21,7 @@ from pipeline.budget import (
     replayed,
 )
 from pipeline.budget.frame import FEWEST
-from pipeline.budget.inputs import INSERTION_MM, TIP_VOXELS, sigmas_of
+from pipeline.budget.inputs import INSERTION_MM, TIP_VOXELS, members_per_lumen, sigmas_of
 from pipeline.budget.verdict import ROUND
 from pipeline.compare.metrics import rms, scored
 from pipeline.model import Array, arc_length
@@ -30,8 +30,6 @@ from pipeline.simulate import altered
 from pipeline.simulate.evidence import UNKNOWN_VOXELS
 from pipeline.simulate.resolution import lengths_mm
 
-PER_LUMEN, PER_LUMEN_ALONE = 8, 2
-"""Members that share a draw of the lumen's surface: as many as go side by side; few where it alone is looked at."""
 AT_REST = 0.9
 DISTAL = 20
 """Points of a wire's end, at the usual 0.5 mm its last 10 mm."""
@@ -44,9 +42,9 @@ def budgeted(run: Context, known: Known) -> Known:
     if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):
         return known
     with run.log.timed("compare"):
-        work = _Work(run, known, frames)
+        work = Work(run, known, frames)
         try:
-            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members, PER_LUMEN))
+            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members))
             found = dict(zip(work.numbers, budgets, strict=True))
             rows = work.by_source(found) if settings.members_alone else []
         except ValueError as error:  # an input was drawn that the solver refuses
@@ -78,7 +76,7 @@ def _with_releases(frames: Sequence[Frame], budgets: Sequence[Budget | None]) ->
     return [None if b is None else replace(b, released=word) for b, word in zip(budgets, told, strict=True)]
 
 
-class _Work:
+class Work:
     """What all ensembles of a case share."""
 
     def __init__(self, run: Context, known: Known, frames: Sequence[Frame]) -> None:
@@ -92,7 +90,8 @@ class _Work:
         traced = config.simulate.depth == "traced" and all(f.traced for f in frames)
         self.nominal = Nominal(known.clamp, depth, roll, replace(config.simulate, friction=friction), traced)
         stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
-        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(), self.voxel)
+        noise = known.lumen.levels.get("wall_noise_mm")
+        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(), self.voxel, noise)
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
@@ -119,10 +118,10 @@ class _Work:
         if errors is None or frame.curve is None:
             arc = scored(samples(frame.depth_mm, settings.sample_mm), settings.skip_mm)
             return Seen(arc, at_arc(frame.simulated.joints_mm, arc))
-        own = self._trace_mm(frame) ** 2 + self._segments_mm(frame) ** 2
+        own = self.trace_mm(frame) ** 2 + self._segments_mm(frame) ** 2
         return Seen(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own)
 
-    def _trace_mm(self, frame: Frame) -> Array:
+    def trace_mm(self, frame: Frame) -> Array:
         """Standard deviation (n,) of the trace along each axis across it, where a frame was compared."""
         curve, errors = frame.curve, frame.comparison
         if curve is None or errors is None:
@@ -140,11 +139,16 @@ class _Work:
         count = self.run.config.budget.members
         return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}"
 
-    def budgets(self, sigmas: Sigmas, count: int, per_lumen: int) -> list[Budget | None]:
+    def budgets(self, sigmas: Sigmas, count: int) -> list[Budget | None]:
         """The budget of each frame by an ensemble."""
-        members = drawn(self.nominal, sigmas, count, per_lumen, self.run.config.budget.seed)
-        ensemble = replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
+        ensemble = self.ensemble(sigmas, count)
         return [frame_budget(wires, seen) for wires, seen in zip(ensemble, self.seen, strict=True)]
+
+    def ensemble(self, sigmas: Sigmas, count: int) -> list[Array]:
+        """The wires (members, n, 3) of each frame."""
+        seed = self.run.config.budget.seed
+        members = drawn(self.nominal, sigmas, count, members_per_lumen(count), seed)
+        return replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
 
     def by_source(self, found: Mapping[int, Budget | None]) -> list[dict[str, Any]]:
         """Rows of budget.csv: u of every input by itself, of all, of segments and trace, and the error beside them.
@@ -157,7 +161,7 @@ class _Work:
         ends = (
             ("inputs", "all of these", [b.input_mm for b in budgets if b]),
             ("segments", "half of num_mm", [np.full(1, ROUND * self._segments_mm(frame)) for frame in frames]),
-            ("trace", "its own", [ROUND * self._trace_mm(frame) for frame in frames]),
+            ("trace", "its own", [ROUND * self.trace_mm(frame) for frame in frames]),
             ("u_val", "inputs, segments, trace", [b.whole_mm for b in budgets if b and b.whole_mm is not None]),
             ("error", "simulated to traced", [f.comparison.error_mm for f in frames if f.comparison is not None]),
         )
@@ -165,8 +169,7 @@ class _Work:
 
     def _alone(self, source: str, calm: Sequence[int]) -> dict[str, Any]:
         """The row of one input."""
-        few = PER_LUMEN_ALONE if source == "lumen" else PER_LUMEN
-        budgets = self.budgets(alone(self.sigmas, source), self.run.config.budget.members_alone, few)
+        budgets = self.budgets(alone(self.sigmas, source), self.run.config.budget.members_alone)
         return _row(source, self.sigmas.said[source], [b.input_mm for i in calm if (b := budgets[i]) is not None])
 
 
