@@ -21,6 +21,7 @@ from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.region import HALO_VOXELS, SearchRegion, background_of, region_of, voxels_of, wall_blur
+from solver.grid import Grid
 
 BLUR_VOXELS = 0.8
 """The scanner's blur over the smallest voxel, from which the shape of the blur in thick slices is taken."""
@@ -37,14 +38,19 @@ SMOOTH_BLOCKS = 1.25
 LEAST_SHARE = 0.02
 """Share of the voxels of a full block below which the smoothed blocks say nothing and the level is left alone."""
 
+LEAST_LEVEL = 200
+"""Voxels from which the median of a level is taken."""
+SAME_GAIN = 0.02
+"""Difference of two scans' contrast, as a share of it, that is left alone: the wire's own share of the lumen is less."""
+
 
 @dataclass(frozen=True, eq=False)
 class Subtraction:
     """Grey above the background (float32, on the region's box, valid on ``region.runs``) and its noise.
 
-    noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract.
-    wall_blur_mm : the scanner's.  Points and directions are in kernel coordinates: index along the box's axes times
-    ``spacing``.
+    noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract, or
+    one of another contrast.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's axes.
+    Points and directions are in kernel coordinates: index along the box's axes times ``spacing``.
     """
 
     region: SearchRegion
@@ -52,6 +58,7 @@ class Subtraction:
     noise: float
     modelled: bool
     wall_blur_mm: float
+    scan: Grid
     counters: dict[str, float] = field(default_factory=dict)
     levels: dict[str, float] = field(default_factory=dict)
 
@@ -107,6 +114,27 @@ class Subtraction:
         return np.asarray(box.values[tuple(index.T)])
 
 
+def matched(grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion) -> float:
+    """The contrast of the frame over that of the background, which is taken away from ``grey`` where it is not 1.
+
+    Contrast medium is never twice the same. What a wire adds to the lumen moves no median.
+    """
+    at = tuple(voxels_of(region.runs[:: max(1, len(region.runs) // 2000)]).T)
+    distance, voxel = region.box.values[at], float(np.min(region.box.spacing_mm))
+    deep, out = distance < -voxel, distance > 2 * voxel
+    if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
+        return 1.0
+    rest, empty = grey[at], background[at].astype(float)
+    contrast = float(np.median(empty[deep]) - np.median(empty[out]))
+    more = float(np.median(rest[deep]) - np.median(rest[out]))
+    if contrast < spread(rest[out]) or abs(more) < SAME_GAIN * contrast:
+        return 1.0
+    at, gain = tuple(voxels_of(region.runs).T), 1.0 + more / contrast
+    low = float(np.median(empty[out]))
+    grey[at] -= np.float32(np.median(rest[out])) + np.float32(gain - 1.0) * (background[at] - np.float32(low))
+    return gain
+
+
 def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
@@ -114,11 +142,13 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     background = background_of(grid, reference, region, lumen, axes)
     grey = sparse_zeros(region.box.shape, np.float32)
     subtract(grid.values, background, region.corner, region.runs, grey)
+    gain = 1.0 if reference is None else matched(grey, background, region)
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
-    return Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, counters, {"noise": noise})
+    modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
+    return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, counters, levels)
 
 
 def _smooth(sums: Array, counts: Array) -> Array:

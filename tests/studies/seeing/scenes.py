@@ -117,8 +117,8 @@ def plain_alone(rng, seed):
 
 @case("no wire, contrast x 1.15 to 1.6")
 def brighter(rng, seed):
-    d = Draft(rng)
-    d.shown, d.gain = False, (1.3, 1.15, 1.6, 0.7)[seed % 4]
+    d = Draft(rng, radius=rng.uniform(0.7, 1.2), wire_radius=0.15) if seed % 2 else Draft(rng)
+    d.shown, d.gain = False, (1.3, 1.15, 1.6, 1.3, 0.7)[seed % 5]
     return d.scan((8, 16, 24)[seed % 3])
 
 
@@ -131,7 +131,7 @@ def nothing(rng, seed):
 
 @case("wire, contrast x 0.7 to 1.4")
 def gain(rng, seed):
-    d = Draft(rng)
+    d = Draft(rng, radius=rng.uniform(0.8, 2.0), wire_radius=0.18)
     d.gain = (0.8, 1.3, 0.7, 1.4)[seed % 4]
     return d.scan((8, 16)[seed // 4 % 2])
 
