@@ -12,7 +12,7 @@ from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, prolonged, warm
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
 from pipeline.trace.noise import inflation
@@ -28,6 +28,8 @@ WIDE_VOXELS = 1.2
 """Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
 WIDE_SIGMAS = 4.0
 """and the height at which they start there: noise gives some, which are too short to matter."""
+MOST_PIECES = 4
+"""Times that wire is looked for beyond the tip."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
 
@@ -127,7 +129,17 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
         found += _read_off(image, cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry)
         if previous is not None and len(previous.points_mm):
             found += _read_off(image, warm(image, entry, previous, config.ridge_voxels, gap), entry)
-    return _best(image, found, entry, config) if found else None
+    return _prolonged(image, _best(image, found, entry, config), entry) if found else None
+
+
+def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candidate:
+    """The candidate with all that goes on beyond its tip."""
+    for _ in range(MOST_PIECES):
+        more = _read_off(image, prolonged(image, best.attempt, entry.direction), entry)
+        if not more:
+            break
+        best = more[0]
+    return best
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -158,7 +170,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     sigma = across * best.sigma
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {
-        "pieces": float(attempt.pieces), "bridges": float(attempt.path.bridges), "leftover_mm": attempt.leftover_mm,
+        "pieces": float(len(attempt.pieces)), "bridges": float(attempt.path.bridges), "leftover_mm": attempt.leftover_mm,
         "iterations": float(tube.iterations), "from_previous": float(attempt.from_previous),
         "faint_mm": verdict.faint_mm, "double_mm": verdict.double_mm,
     }  # fmt: skip

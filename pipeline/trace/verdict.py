@@ -13,6 +13,7 @@ from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.link import extended, resampled
+from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 LEAST_CNR = 2.5
@@ -101,12 +102,25 @@ def _ends_there(image: Subtraction, points: Array) -> bool:
     return behind > 0.5 * usual and ahead < TIP_AHEAD * usual
 
 
+def seen_steps(steps: Steps, share: Array) -> NDArray[np.bool_]:
+    """Points, at shares (n,) of the length, of a dimmer part of the wire that reaches one of its ends.
+
+    What is dim between two bright parts is a gap; what is dim up to an end is a shaft beside a coil, or a plastic tip.
+    """
+    piece = np.searchsorted(steps.edges, share)
+    dim = (steps.levels > LEAST_LEVEL) & (steps.levels < 2.0 * FAINT)
+    last = len(dim) - 1
+    from_start, to_end = np.logical_and.accumulate(dim), np.logical_and.accumulate(dim[::-1])[::-1]
+    return np.asarray((from_start | to_end)[piece] & (last > 0))
+
+
 def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float) -> Verdict:
     """The verdict on a curve, points (n, 3) local."""
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
-    faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM)
+    known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
+    faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     double = share > max(DOUBLE, 1.0 + 4.0 * noise)
     outside = _outside(image, points)
     faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
