@@ -78,6 +78,11 @@ class Subtraction:
         """Smallest of ``spacing``, mm."""
         return float(self.spacing.min())
 
+    @property
+    def thick_slices(self) -> bool:
+        """Whether slices are so much thicker than pixels that a round wire does not look it."""
+        return bool(np.max(self.spacing) > 1.5 * self.voxel)
+
     def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""
         return np.ascontiguousarray(self.region.box.to_index(points_mm) * self.spacing)

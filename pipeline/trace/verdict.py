@@ -14,6 +14,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
+from pipeline.trace.section import fills_vessel, out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 LEAST_CNR = 2.5
@@ -33,8 +34,17 @@ LEFTOVER_MM = 4.0
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
-MOST_DOUBLE_MM = 3.0
-"""Length of line too bright for one strand (a crossing is 1 mm) from which a frame alone does not decide."""
+MOST_DOUBLE = 2.6
+"""Share from which it is no two strands but a brighter wire."""
+IN_CONTACT = 0.035
+"""How far out of round (second harmonic over peak) two strands in contact are at the least; a round wire, with the wall
+beside it, is below 0.03."""
+OBLONG = 0.12
+"""and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
+EDGE_VOXELS = 3.0
+"""Distance from the scan's end within which a tip is none."""
+MOST_DOUBLE_MM = 2.0
+"""Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
 """Share of the curve that may lie over two voxels outside the lumen."""
 TIP_VOXELS = 4.0
@@ -121,9 +131,39 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
     known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
-    double = share > max(DOUBLE, 1.0 + 4.0 * noise)
+    oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
+    double = _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
-    faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
+    lengths = [float(np.count_nonzero(m)) * step for m in (faint, double, oblong > OBLONG + 5.0 * doubtful)]
+    first = _first_objection(image, attempt, points, (share, noise, outside), (*lengths, length_mm))
+    return Verdict(*first, bridged | faint | double | outside, *lengths[:2])
+
+
+def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
+    """Points (n,) where two strands may lie on one crest: too bright, and not round, or nobody can tell.
+
+    Two strands are no more than twice as bright as one; a coil of platinum is three to ten times, and round.
+    """
+    too_bright = (share > bright) & (share < MOST_DOUBLE)
+    own = noise / np.maximum(share, 1.0)
+    return np.asarray(too_bright & ((oblong > IN_CONTACT + 2.0 * own) | (own > 0.25 * IN_CONTACT)))
+
+
+def _at_edge(image: Subtraction, point: Array) -> bool:
+    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
+    index = point / image.spacing + image.region.corner
+    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
+
+
+def _first_objection(
+    image: Subtraction,
+    attempt: Attempt,
+    points: Array,
+    seen: tuple[Array, float, NDArray[np.bool_]],
+    lengths: tuple[float, float, float, float],
+) -> tuple[FrameStatus, str]:
+    """Status and note of the first thing that speaks against a curve (n, 3); OK where nothing does."""
+    (share, noise, outside), (faint_mm, double_mm, oblong_mm, length_mm) = seen, lengths
     left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
@@ -131,6 +171,9 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
          f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
          "scan with more dose or give the frame before"),
+        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
+         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
+         "leave this frame out, or scan a larger field"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
          f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
@@ -143,9 +186,14 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
         (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
          f"{double_mm:.1f} mm of line too bright for one strand", f"{MOST_DOUBLE_MM} mm at most",
          "give the curve of the frame before, which tells strands in contact apart"),
+        (oblong_mm > MOST_DOUBLE_MM and not prior and not image.thick_slices, FrameStatus.TRACE_AMBIGUOUS,
+         f"{oblong_mm:.1f} mm of line whose cross-section is not round", f"{MOST_DOUBLE_MM} mm at most",
+         "look for a second strand beside it, or for motion during the scan"),
+        (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
+         "a line as thick as its vessel", "a wire, which is thinner",
+         "check that the frame shows a wire, and that the reference has the frame's contrast"),
     )  # fmt: skip
-    first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
-    return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
+    return next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
 
 
 def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> NDArray[np.bool_]:
