@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
-from pipeline.arrays.jets import smooth_voxels
+from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, prolonged, warm
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
+from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import Tube, point_sigmas

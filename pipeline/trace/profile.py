@@ -29,8 +29,10 @@ STEP_COST = 1.5
 """What a further step must save: the square of a threefold change of brightness over three samples."""
 LEAST_LEVEL = 0.1
 """Share of the usual grey from which something is wire: a plastic tip has 0.15, streaks a few hundredths."""
-CREST_NOISE = 0.26
-"""What is left of white noise where grey is read in a blur of 0.7 voxel."""
+INDEPENDENT_VOXELS = 1.7
+"""Length of wire over which the noise of crest grey is one."""
+SURE = 6.0
+"""Standard deviations by which a fainter piece stands out of the noise, all of it taken together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,7 @@ def _is_even(share: Array, noise: float, voxels: float) -> bool:
     """Whether a profile (n,) before its end has no steps. noise : of one sample.  voxels : from one to the next."""
     width = max(1, round(BAND_VOXELS / voxels))
     mean = np.convolve(share, np.ones(width) / width, "valid")
-    room = STEP_SIGMAS * noise * np.sqrt(1.7 / BAND_VOXELS)
+    room = STEP_SIGMAS * noise * np.sqrt(INDEPENDENT_VOXELS / BAND_VOXELS)
     low, high = UNEVEN[0] - max(0.0, room - 0.35), UNEVEN[1] + max(0.0, room - 0.5)
     return bool(len(mean) == 0 or (mean.min() > low and mean.max() < high))
 
@@ -123,14 +125,14 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
     blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
     own = max(4, len(line) - round(AHEAD_VOXELS / 0.25))
     usual = max(float(np.median(grey[:own])), 1e-9)
-    noise = CREST_NOISE * image.noise / usual
+    noise = image.noise_in(CREST_VOXELS) / usual
     tail = arc >= arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
     edges = np.zeros(0)
     if not _is_even(grey[: max(1, own - 8)] / usual, noise, 0.25):
         edges = _edges(grey / usual, arc, noise, blur, h)
         if len(edges):
             level = _levels(grey / usual, arc, edges, blur)[0]
-            seen = level > max(LEAST_LEVEL, STEP_SIGMAS * noise * 0.5)
+            seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
             last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
             start = edges[last - 1] + 0.5 * blur if last else arc[0]
             stop = edges[last] + 3.0 * blur if last < len(edges) else arc[-1]
@@ -142,6 +144,12 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
         return np.asarray(line), EVEN
     level = _levels(grey[arc <= end + 2 * blur] / usual, arc[arc <= end + 2 * blur], np.append(edges, end), blur)[0][:-1]
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
+
+
+def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:
+    """Which pieces, of so many voxels, are wire and no noise."""
+    independent = np.maximum(1.0, voxels / INDEPENDENT_VOXELS)
+    return np.asarray(level > np.maximum(LEAST_LEVEL, SURE * noise / np.sqrt(independent)))
 
 
 def _edges(share: Array, arc: Array, noise: float, blur: float, h: float) -> Array:

@@ -7,16 +7,14 @@ for two that are 2.7 voxels apart; in contact it is 0.06, twice as bright.
 import numpy as np
 
 from pipeline.model import Array
-from pipeline.trace.profile import CREST_NOISE
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.profile import INDEPENDENT_VOXELS
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 ANGLES = 12
 RING_BLURS = 1.4
 """Radius of the ring in blurs of the line: where two strands differ most from one that is as wide."""
 OVER_MM = 3.0
 """Length over which it is averaged: shorter, a crossing shows."""
-INDEPENDENT_VOXELS = 1.7
-"""Length of wire over which the noise of crest grey is one."""
 
 
 def carried(tangents: Array) -> tuple[Array, Array]:
@@ -48,7 +46,7 @@ def out_of_round(image: Subtraction, points: Array, sigma: float) -> tuple[Array
     usual = float(np.median(axis))
     smooth = np.abs(np.convolve(harmonic, window, "same")) / np.maximum(axis, 0.3 * usual)
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
-    noise = CREST_NOISE * image.noise * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
+    noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
     return np.asarray(smooth, float), float(noise)
 
 

@@ -15,7 +15,7 @@ from scipy import ndimage
 from scipy.special import ndtr
 
 from pipeline.arrays.grids import in_memory_order, spread
-from pipeline.arrays.jets import Blurred, values_at
+from pipeline.arrays.jets import Blurred, gaussian_taps, smooth_voxels, values_at
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
@@ -61,6 +61,7 @@ class Subtraction:
     scan: Grid
     counters: dict[str, float] = field(default_factory=dict)
     levels: dict[str, float] = field(default_factory=dict)
+    noises: dict[float, float] = field(default_factory=dict)
 
     @cached_property
     def spacing(self) -> Array:
@@ -82,6 +83,13 @@ class Subtraction:
     def thick_slices(self) -> bool:
         """Whether slices are so much thicker than pixels that a round wire does not look it."""
         return bool(np.max(self.spacing) > 1.5 * self.voxel)
+
+    def noise_in(self, blur_voxels: float) -> float:
+        """Standard deviation of the noise in grey blurred by so many voxels, as correlated as it is."""
+        if blur_voxels not in self.noises:
+            sample = smooth_voxels(self.grey, gaussian_taps(blur_voxels), self.region.within[::8])
+            self.noises[blur_voxels] = max(spread(sample), 1e-6)
+        return self.noises[blur_voxels]
 
     def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""
@@ -189,4 +197,4 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     rest = grey - share * level
     out[at] = rest
     noise = spread(rest[clear]) if np.count_nonzero(clear) > 100 else image.noise
-    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise})
+    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise}, noises={})

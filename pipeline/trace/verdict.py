@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
@@ -30,7 +31,7 @@ FAINT = 0.35
 """Share of the usual crest grey below which there is no wire to be seen: a gap."""
 DOUBLE = 1.6
 """Share above which two strands lie on one crest."""
-LEFTOVER_MM = 4.0
+LEFTOVER_MM = 2.5
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
@@ -43,6 +44,8 @@ OBLONG = 0.12
 """and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
 EDGE_VOXELS = 3.0
 """Distance from the scan's end within which a tip is none."""
+BESIDE_VOXELS = 2.2
+"""Two strands of one curve nearer than this share their crest."""
 MOST_DOUBLE_MM = 2.0
 """Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
@@ -80,16 +83,25 @@ def _averaged(values: Array, width: int) -> Array:
 
 
 def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, float]:
-    """Grey on the curve (n,) over its median along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
+    """Grey on the curve (n,) over its usual height along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
 
     The blur in which grey is read leaves 0.36 of the noise, the mean the rest.
     """
     grey = image.along(points)
-    usual = float(np.median(grey))
+    usual = _usual(grey, attempt.tube.steps)
     share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
     gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
     return share, 0.4 * gain / attempt.cnr(image) / float(np.sqrt(count))
+
+
+def _usual(grey: Array, steps: Steps) -> float:
+    """The usual crest grey (n,): its median, over the longest piece where there are steps."""
+    if len(steps.levels) == 1:
+        return float(np.median(grey))
+    piece = np.searchsorted(steps.edges, np.linspace(0.0, 1.0, len(grey)))
+    length = np.bincount(piece, minlength=len(steps.levels)) * (steps.levels > LEAST_LEVEL * steps.levels.max())
+    return float(np.median(grey[piece == int(np.argmax(length))]))
 
 
 def _outside(image: Subtraction, points: Array) -> NDArray[np.bool_]:
@@ -118,7 +130,8 @@ def seen_steps(steps: Steps, share: Array) -> NDArray[np.bool_]:
     What is dim between two bright parts is a gap; what is dim up to an end is a shaft beside a coil, or a plastic tip.
     """
     piece = np.searchsorted(steps.edges, share)
-    dim = (steps.levels > LEAST_LEVEL) & (steps.levels < 2.0 * FAINT)
+    levels = steps.levels / max(float(np.max(steps.levels)), 1e-9)
+    dim = (levels > 0.6 * LEAST_LEVEL) & (levels < 2.0 * FAINT)
     last = len(dim) - 1
     from_start, to_end = np.logical_and.accumulate(dim), np.logical_and.accumulate(dim[::-1])[::-1]
     return np.asarray((from_start | to_end)[piece] & (last > 0))
@@ -132,21 +145,34 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
-    double = _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+    double = _beside_itself(points, step, image.voxel)
+    if not image.thick_slices:
+        double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
-    lengths = [float(np.count_nonzero(m)) * step for m in (faint, double, oblong > OBLONG + 5.0 * doubtful)]
+    lengths = [float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double)]
     first = _first_objection(image, attempt, points, (share, noise, outside), (*lengths, length_mm))
-    return Verdict(*first, bridged | faint | double | outside, *lengths[:2])
+    return Verdict(*first, bridged | faint | double | outside, *lengths)
 
 
 def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
-    """Points (n,) where two strands may lie on one crest: too bright, and not round, or nobody can tell.
+    """Points (n,) where two strands may lie on one crest: not round, or too bright where nobody can tell.
 
-    Two strands are no more than twice as bright as one; a coil of platinum is three to ten times, and round.
+    The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
+    bright is no two strands but a coil of platinum.
     """
-    too_bright = (share > bright) & (share < MOST_DOUBLE)
     own = noise / np.maximum(share, 1.0)
-    return np.asarray(too_bright & ((oblong > IN_CONTACT + 2.0 * own) | (own > 0.25 * IN_CONTACT)))
+    least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
+    hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
+    return np.asarray(hidden | (oblong > least + 3.0 * own))
+
+
+def _beside_itself(points: Array, step: float, voxel: float) -> NDArray[np.bool_]:
+    """Points (n,) within BESIDE_VOXELS of a stretch of the curve that is further along it than that can be."""
+    apart = round(3.0 * BESIDE_VOXELS * voxel / max(step, 1e-9))
+    pairs = cKDTree(points).query_pairs(BESIDE_VOXELS * voxel, output_type="ndarray")
+    out = np.zeros(len(points), bool)
+    out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
+    return out
 
 
 def _at_edge(image: Subtraction, point: Array) -> bool:
@@ -160,10 +186,10 @@ def _first_objection(
     attempt: Attempt,
     points: Array,
     seen: tuple[Array, float, NDArray[np.bool_]],
-    lengths: tuple[float, float, float, float],
+    lengths: tuple[float, float, float],
 ) -> tuple[FrameStatus, str]:
     """Status and note of the first thing that speaks against a curve (n, 3); OK where nothing does."""
-    (share, noise, outside), (faint_mm, double_mm, oblong_mm, length_mm) = seen, lengths
+    (share, noise, outside), (faint_mm, double_mm, length_mm) = seen, lengths
     left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
@@ -171,24 +197,21 @@ def _first_objection(
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
          f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
          "scan with more dose or give the frame before"),
-        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
-         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
-         "leave this frame out, or scan a larger field"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
          f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
-        (left_mm > max(LEFTOVER_MM, 0.1 * length_mm), FrameStatus.TRACE_AMBIGUOUS,
+        (left_mm > LEFTOVER_MM, FrameStatus.TRACE_AMBIGUOUS,
          f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
          "look for a second device or a wrong turn at a crossing"),
         (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
          f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
          "look at the picture"),
         (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
-         f"{double_mm:.1f} mm of line too bright for one strand", f"{MOST_DOUBLE_MM} mm at most",
-         "give the curve of the frame before, which tells strands in contact apart"),
-        (oblong_mm > MOST_DOUBLE_MM and not prior and not image.thick_slices, FrameStatus.TRACE_AMBIGUOUS,
-         f"{oblong_mm:.1f} mm of line whose cross-section is not round", f"{MOST_DOUBLE_MM} mm at most",
-         "look for a second strand beside it, or for motion during the scan"),
+         f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
+         "give the curve of the frame before, which tells strands in contact apart, or look for a second wire"),
+        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
+         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
+         "leave this frame out, or scan a larger field"),
         (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
          "a line as thick as its vessel", "a wire, which is thinner",
          "check that the frame shows a wire, and that the reference has the frame's contrast"),

@@ -25,7 +25,8 @@ def case(name):
 class Scene:
     """Scans, the true wire from entry to tip (None: there is none), what the manifest says, and the true vessel.
 
-    voxel : smallest edge, mm.  gaps : arcs (mm from the entry) that the scan does not show.
+    voxel : smallest edge, mm.  tip_cnr : of the
+    wire's last piece.  gaps : arcs (mm from the entry) that the scan does not show.
     """
 
     frame: Volume
@@ -37,6 +38,7 @@ class Scene:
     radius: np.ndarray
     voxel: float
     cnr: float
+    tip_cnr: float
     gaps: tuple = ()
 
 
@@ -87,7 +89,8 @@ class Draft:
         shift *= 0.5 * lattice.spacing.min() / np.linalg.norm(shift)
         return Scene(
             frame, still if reference else None, self.path[n:] if self.shown else None, self.path[n] + shift,
-            towards / np.linalg.norm(towards), self.axis, self.radius, float(lattice.spacing.min()), cnr, gaps,
+            towards / np.linalg.norm(towards), self.axis, self.radius, float(lattice.spacing.min()), cnr,
+            cnr * min(1.0, float(self.opacity[-1])), gaps,
         )  # fmt: skip
 
 

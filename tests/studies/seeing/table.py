@@ -22,8 +22,8 @@ from tests.studies.seeing import render
 from tests.studies.seeing.scenes import CASES
 
 MEAN, WORST, TIP, BRIDGED = 0.35, 2.0, 1.5, 4.0
-"""Voxels: mean and largest error of points that are not flagged, of the tip, and largest of flagged points. A wire
-that is fainter than six noises may miss its tip by twice as much."""
+"""Voxels: mean and largest error of points that are not flagged, of the tip, and largest of flagged points; the
+mean of a wire fainter than six noises may be twice that."""
 MISSING = 0.05
 """Share of the vessel's axis outside the lumen that nobody may pass over in silence."""
 
@@ -54,7 +54,7 @@ def on_wire(curve, scene):
     off = fine.query(points)[0] / h
     length = render.arc_of(true)[-1]
     tip = np.linalg.norm(points[-1] - true[-1]) / h
-    allowed = TIP * (2 if scene.cnr < 6 else 1)
+    allowed = max(TIP, 4.4 / scene.tip_cnr)  # four standard deviations of the best there is
     seen = cKDTree(render.even(points, 0.05) if len(points) > 4 else points).query(true)[0] < 2.5 * h
     arc = render.arc_of(true)
     for a, b in scene.gaps:
