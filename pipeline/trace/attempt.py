@@ -50,7 +50,7 @@ class Attempt:
     """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain.
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
-    behind_mm : length of the line before the path's first point, beyond the entry.
+    behind_mm : length of the line before the path's first point, beyond the entry.  goes_on : past its tip, faintly.
     """
 
     tube: Tube
@@ -60,6 +60,7 @@ class Attempt:
     known: Array
     from_previous: bool = False
     behind_mm: float = 0.0
+    goes_on: bool = False
 
     @property
     def cut(self) -> bool:
@@ -153,18 +154,22 @@ def _attempt(
 
 
 def prolonged(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt | None:
-    """The attempt with what goes on beyond its tip; None where nothing does, or the fit does not reach it."""
+    """The attempt with what goes on beyond its tip; None where nothing does.
+
+    The same attempt, marked as going on, where something is seen that no fit reaches.
+    """
     path = beyond(image, attempt.tube, dense(attempt.tube, 0.5 * image.voxel))
-    tube = None if path is None else _fitted(image, path.points, attempt.cut, direction)
-    if path is None or tube is None or _length(tube) < _length(attempt.tube) + 3.0 * image.voxel:
+    if path is None:
         return None
+    tube = _fitted(image, path.points, attempt.cut, direction)
+    if tube is None or _length(tube) < _length(attempt.tube) + 3.0 * image.voxel:
+        return replace(attempt, goes_on=True)
     gaps = attempt.path.points[attempt.path.bridged]
     points = np.concatenate([gaps, path.points])
     path = Path(points, np.concatenate([np.ones(len(gaps), bool), path.bridged]), attempt.path.bridges + path.bridges)
     known = np.concatenate([attempt.known, path.points])
-    return replace(
-        attempt, tube=tube, path=path, known=known, leftover_mm=_leftover(image, tube, attempt.pieces, known)
-    )
+    left_mm = _leftover(image, tube, attempt.pieces, known)
+    return replace(attempt, tube=tube, path=path, known=known, leftover_mm=left_mm)
 
 
 def _from_entry(path: Path, entry: EntryPose) -> Path:

@@ -81,6 +81,8 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * image.voxel)
     points = attempt.tube.at(u)
     length = float(arc_length(image.world(points))[-1])
+    if entry.expected_mm is not None:
+        attempt = replace(attempt, behind_mm=min(attempt.behind_mm, length))
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 
@@ -139,6 +141,8 @@ def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candida
         if not more:
             break
         best = more[0]
+        if best.attempt.goes_on:
+            break
     return best
 
 

@@ -13,8 +13,9 @@ from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.trace.crests import Tracklet, find_crests
 from pipeline.trace.link import Path, hermite
+from pipeline.trace.profile import INDEPENDENT_VOXELS
 from pipeline.trace.region import SearchRegion
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 
 REACH_MM = 9.0
@@ -29,8 +30,16 @@ SURE = 5.0
 """Significance of a piece's mean grey from which it is no noise: it was chosen among a hundred."""
 CONE = 0.6
 """Least cosine between the wire's end and the way to what goes on from it (53 degrees)."""
-FAINTEST = 0.03
-"""Share of the wire's peak below which its own streaks lie; the wide blur leaves a third of a plastic tip's 0.15."""
+FAINTEST = 0.06
+"""Share of the wire's peak below which its own streaks lie; blur leaves two thirds of a plastic tip's 0.15."""
+RAY_MM = 3.0
+"""Length of a straight piece along which grey is averaged: a bend of 15 mm radius leaves it by a voxel."""
+RAY_STEP = 0.1
+"""Angle (rad) from one to the next: a voxel at its end."""
+RAY_SURE = 5.0
+"""Standard deviations of its mean from which the brightest of a hundred is no noise."""
+MOST_RAYS = 12
+"""Pieces followed at most."""
 BESIDE_VOXELS = 2.0
 """A piece nearer to the wire than this is what the fit left of it."""
 LEADS_ON = 0.3
@@ -73,28 +82,74 @@ def _onward(piece: Tracklet, tip: Array, heading: Array) -> Tracklet | None:
     return run if size < REACH_MM and (touching or straight) else None
 
 
+def _cone(heading: Array) -> Array:
+    """Directions (n, 3) up to CONE off a heading, a tenth of a radian apart."""
+    side = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
+    side /= np.linalg.norm(side)
+    other = np.cross(heading, side)
+    widest = float(np.arccos(CONE))
+    rings = [heading[None]]
+    for angle in np.arange(RAY_STEP, widest, RAY_STEP):
+        phi = np.arange(0.0, 2 * np.pi, RAY_STEP / np.sin(angle))[:, None]
+        rings.append(np.cos(angle) * heading + np.sin(angle) * (np.cos(phi) * side + np.sin(phi) * other))
+    return np.concatenate(rings)
+
+
+def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
+    """The end (3,) of the straight piece of RAY_MM from a point along which grey stands out most; None where none does."""
+    h = image.voxel
+    s = np.arange(1.5 * h, RAY_MM, h)
+    directions = _cone(heading)
+    grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1).mean(axis=0)
+    best = int(np.argmax(grey))
+    noise = image.noise_in(CREST_VOXELS) * np.sqrt(INDEPENDENT_VOXELS / len(s))
+    return start + s[-1] * directions[best] if grey[best] > max(least, RAY_SURE * noise) else None
+
+
+def _walked(image: Subtraction, line: Array, least: float) -> Array:
+    """Points (n, 3) beyond the tip, from one straight piece to the next, as long as they stand out."""
+    found = [line[-1]]
+    heading = tip_tangent(line, TANGENT_MM)
+    while len(found) < MOST_RAYS:
+        end = _ray(image, found[-1], heading, least)
+        if end is None:
+            break
+        heading = (end - found[-1]) / np.linalg.norm(end - found[-1])
+        found.append(end)
+    return np.array(found[1:]).reshape(-1, 3)
+
+
+def _from_crests(image: Subtraction, line: Array, faintest: float) -> Tracklet | None:
+    """The nearest piece of crest in the box around the tip that leads on from it."""
+    tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
+    reach, at = np.ceil(REACH_MM / image.spacing), np.rint(tip / image.spacing)
+    near = _near(image.region, at - reach, at + reach)
+    if len(near.runs) == 0:
+        return None
+    noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(line)
+    pieces = find_crests(replace(image, region=near), WIDE_VOXELS, SIGMAS)
+    good = [p for p in pieces if p.grey > 0.5 * faintest and _stands_out(p, noise, image.voxel)]
+    found = (_onward(p, tip, heading) for p in good)
+    runs = [r for r in found if r is not None and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * image.voxel) > 0.5]
+    return min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip))) if runs else None
+
+
 def beyond(image: Subtraction, tube: Tube, line: Array) -> Path | None:
     """The wire's line (n, 3) continued along what goes on from its tip; None where nothing does."""
     h = image.voxel
     tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
-    reach = np.ceil(REACH_MM / image.spacing)
-    at = np.rint(tip / image.spacing)
-    near = _near(image.region, at - reach, at + reach)
-    if len(near.runs) == 0:
+    faintest = FAINTEST * tube.peak * float(tube.steps.levels[-1])
+    with image.showing(tube.voxels, tube.rest):
+        run = _from_crests(image, line, faintest)
+        if run is None:
+            walked = _walked(image, line, faintest)
+    if run is not None:
+        gap = hermite(tip, heading, run.points[0], run.tangents[0], 0.5 * h)
+        more, empty = np.concatenate([gap, run.points]), len(gap) if len(gap) * h > 2.0 * TOUCHING_MM else 0
+    elif len(walked):
+        more, empty = walked, 0
+    else:
         return None
-    local = replace(image, region=near)
-    with local.showing(tube.voxels, tube.rest):
-        pieces = find_crests(local, WIDE_VOXELS, SIGMAS)
-    noise = image.noise_in(WIDE_VOXELS)
-    least = FAINTEST * tube.peak * float(tube.steps.levels[-1])
-    found = [_onward(p, tip, heading) for p in pieces if p.grey > least and _stands_out(p, noise, h)]
-    tree = cKDTree(line)
-    runs = [r for r in found if r is not None and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * h) > 0.5]
-    if not runs:
-        return None
-    run = min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip)))
-    gap = hermite(tip, heading, run.points[0], run.tangents[0], 0.5 * h)
-    whole = np.concatenate([line, gap, run.points])
-    bridged = np.zeros(len(whole), bool)
-    bridged[len(line) : len(line) + len(gap)] = len(gap) * h > 2.0 * TOUCHING_MM
-    return Path(whole, bridged, int(bridged.any()))
+    bridged = np.zeros(len(line) + len(more), bool)
+    bridged[len(line) : len(line) + empty] = True
+    return Path(np.concatenate([line, more]), bridged, int(empty > 0))
