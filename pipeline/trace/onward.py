@@ -9,6 +9,7 @@ import numpy as np
 
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.jets import Blurred, values_at
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.trace.crests import Tracklet, find_crests
@@ -38,6 +39,12 @@ RAY_STEP = 0.1
 """Angle (rad) from one to the next: a voxel at its end."""
 RAY_SURE = 5.0
 """Standard deviations of its mean from which the brightest of a hundred is no noise."""
+OUTSIDE_CONE = 0.85
+"""Least cosine between the wire's end and the way on which the lumen may have ended too early."""
+OUTSIDE_VOXELS = 1.5
+"""Distance from the wall from which its blur is none."""
+BRIGHT = 0.5
+"""Share of the vessel's contrast from which something outside the lumen is no tissue."""
 MOST_RAYS = 12
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
@@ -104,6 +111,29 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
     best = int(np.argmax(grey))
     noise = image.noise_in(CREST_VOXELS) * np.sqrt(INDEPENDENT_VOXELS / len(s))
     return start + s[-1] * directions[best] if grey[best] > max(least, RAY_SURE * noise) else None
+
+
+def seen_outside(image: Subtraction, line: Array) -> bool:
+    """Whether the scan shows something as bright as the vessel, or brighter, just beyond the tip and outside the lumen.
+
+    Then it is the lumen that ends there, not the wire. Read in the scan itself, as nothing else is known out there.
+    """
+    h, tip = image.voxel, line[-1]
+    heading = tip_tangent(line, TANGENT_MM)
+    s = np.arange(1.0, RAY_MM, h)
+    directions = _cone(heading)
+    directions = directions[directions @ heading > OUTSIDE_CONE]
+    points = (tip + s[:, None, None] * directions).reshape(-1, 3)
+    depth = image.depth_at(points).reshape(len(s), -1)
+    out = np.mean(depth > OUTSIDE_VOXELS * h, axis=0) > 0.5
+    if not out.any():
+        return False
+    index = points / image.spacing + image.region.corner
+    field = Blurred(image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min()))
+    grey = values_at(field, index * image.scan.spacing_mm).reshape(len(s), -1)
+    inside, outside = image.wall_greys
+    far = np.where(depth > OUTSIDE_VOXELS * h, grey, np.inf).min(axis=0)
+    return bool(np.any(far[out] > outside + BRIGHT * (inside - outside)))
 
 
 def _walked(image: Subtraction, line: Array, least: float) -> Array:

@@ -84,6 +84,16 @@ class Subtraction:
         """Whether slices are so much thicker than pixels that a round wire does not look it."""
         return bool(np.max(self.spacing) > 1.5 * self.voxel)
 
+    @cached_property
+    def wall_greys(self) -> tuple[float, float]:
+        """Median grey of the frame well inside the lumen and just outside it."""
+        at = voxels_of(self.region.runs[:: max(1, len(self.region.runs) // 2000)])
+        grey, distance = self.scan.values[tuple((at + self.region.corner).T)], self.region.box.values[tuple(at.T)]
+        h = float(np.min(self.region.box.spacing_mm))
+        deep, out = distance < -h, distance > 2 * h
+        inside = float(np.median(grey[deep if deep.any() else distance < h]))
+        return inside, float(np.median(grey[out])) if out.any() else inside
+
     def noise_in(self, blur_voxels: float) -> float:
         """Standard deviation of the noise in grey blurred by so many voxels, as correlated as it is."""
         if blur_voxels not in self.noises:

@@ -14,6 +14,7 @@ from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.link import extended, resampled
+from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.section import fills_vessel, out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
@@ -175,6 +176,11 @@ def _beside_itself(points: Array, step: float, voxel: float) -> NDArray[np.bool_
     return out
 
 
+def _named(image: Subtraction, point: Array) -> str:
+    """A place in LPS mm, for a message."""
+    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
+
+
 def _at_edge(image: Subtraction, point: Array) -> bool:
     """Whether a point lies within EDGE_VOXELS of the end of the scan."""
     index = point / image.spacing + image.region.corner
@@ -212,6 +218,9 @@ def _first_objection(
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
          "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
+        (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
+         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it", "a lumen that holds the tip",
+         "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
         (attempt.behind_mm > length_mm, FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
          "turn entry_direction round, or state insertion_mm if this is right"),
