@@ -23,7 +23,7 @@ LEAST = 12
 EVEN = 0.82
 """Share of the contrast that all blocks reach in a vessel that is filled evenly."""
 LOWEST, HIGHEST = 0.25, 1.1
-"""Shares of the contrast between which a level is believed: what is brighter is bone or metal, what is darker tissue."""
+"""Shares of the contrast between which a level is believed: brighter is bone or metal, darker is tissue."""
 SMOOTH = 0.7
 """Gaussian over blocks."""
 CARRIED_BLOCKS = 2
@@ -59,7 +59,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     block = np.ravel_multi_index(tuple((core // BLOCK).T), shape)
     order = np.lexsort((grey, block))
     block, grey = block[order], grey[order]
-    name, first, count = np.unique(block, return_index=True, return_counts=True)
+    name, first, count = (np.asarray(a) for a in np.unique(block, return_index=True, return_counts=True))
     good = count >= LEAST
     level = np.clip(grey[first + count // 2], LOWEST, HIGHEST)[good]
     if not good.any():
@@ -78,7 +78,7 @@ def filling(grid: Grid, region: Region) -> Filling:
 def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
     """The grid as if the vessel were full everywhere."""
     shape = np.minimum(np.array(found.share.shape) * BLOCK, np.array(grid.shape) - found.corner)
-    axes = [(np.arange(n) + 0.5) / BLOCK - 0.5 for n in shape]
+    axes = [(np.arange(int(n)) + 0.5) / BLOCK - 0.5 for n in shape]
     share: NDArray[np.float64] = found.share
     for axis, at in enumerate(axes):
         low = np.clip(np.floor(at).astype(int), 0, share.shape[axis] - 1)
@@ -117,6 +117,6 @@ def warning(least: float) -> tuple[str, ...]:
     if least >= EVEN:
         return ()
     return (
-        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its wall was "
-        "taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
+        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its "
+        "wall was taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
     )

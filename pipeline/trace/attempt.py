@@ -51,6 +51,7 @@ class Attempt:
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, beyond the entry.  goes_on : past its tip, faintly.
+    confirmed : by the length that the manifest states.
     """
 
     tube: Tube
@@ -61,6 +62,7 @@ class Attempt:
     from_previous: bool = False
     behind_mm: float = 0.0
     goes_on: bool = False
+    confirmed: bool = False
 
     @property
     def cut(self) -> bool:

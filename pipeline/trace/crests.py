@@ -5,7 +5,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
 from pipeline.arrays.jets import Blurred, gaussian_taps, smooth_voxels

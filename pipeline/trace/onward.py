@@ -6,7 +6,6 @@ Looked for in what the fit leaves, in a box around the tip alone, at a lower hei
 from dataclasses import replace
 
 import numpy as np
-
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.jets import Blurred, values_at
@@ -25,6 +24,10 @@ WIDE_VOXELS = 1.2
 """Blur in which it is looked for."""
 SIGMAS = 3.7
 """Height at which it starts, in standard deviations of the smoothed noise."""
+SURE_APART = 9.0
+"""The same for a piece behind a gap, which any noise within the reach might be."""
+APART_TIMES = 4.0
+"""How much brighter than the faintest a piece behind a gap must be: a quarter of the wire at least."""
 SHORTEST_VOXELS = 5.0
 """Shorter pieces are noise."""
 SURE = 5.0
@@ -69,9 +72,17 @@ def _near(region: SearchRegion, corner: Array, high: Array) -> SearchRegion:
 
 def _stands_out(piece: Tracklet, noise: float, voxel: float) -> bool:
     """Whether a piece is long and bright enough not to be noise."""
-    independent = piece.length / (2.0 * WIDE_VOXELS * voxel)
-    height = float(np.mean(piece.values)) / noise
-    return piece.length > SHORTEST_VOXELS * voxel and height * np.sqrt(independent) > SURE
+    return piece.length > SHORTEST_VOXELS * voxel and _height(piece, noise, voxel) > SURE
+
+
+def _height(piece: Tracklet, noise: float, voxel: float) -> float:
+    """A piece's mean grey in standard deviations of that mean."""
+    return float(np.mean(piece.values)) / noise * float(np.sqrt(piece.length / (2.0 * WIDE_VOXELS * voxel)))
+
+
+def _apart(run: Tracklet, tip: Array) -> bool:
+    """Whether a gap lies before a piece."""
+    return float(np.linalg.norm(run.points[0] - tip)) > TOUCHING_MM
 
 
 def _onward(piece: Tracklet, tip: Array, heading: Array) -> Tracklet | None:
@@ -103,7 +114,7 @@ def _cone(heading: Array) -> Array:
 
 
 def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
-    """The end (3,) of the straight piece of RAY_MM from a point along which grey stands out most; None where none does."""
+    """The end (3,) of the straight piece of RAY_MM from a point along which grey stands out most; None for none."""
     h = image.voxel
     s = np.arange(1.5 * h, RAY_MM, h)
     directions = _cone(heading)
@@ -129,7 +140,9 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
     if not out.any():
         return False
     index = points / image.spacing + image.region.corner
-    field = Blurred(image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min()))
+    field = Blurred(
+        image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min())
+    )
     grey = values_at(field, index * image.scan.spacing_mm).reshape(len(s), -1)
     inside, outside = image.wall_greys
     far = np.where(depth > OUTSIDE_VOXELS * h, grey, np.inf).min(axis=0)
@@ -158,9 +171,15 @@ def _from_crests(image: Subtraction, line: Array, faintest: float) -> Tracklet |
         return None
     noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(line)
     pieces = find_crests(replace(image, region=near), WIDE_VOXELS, SIGMAS)
-    good = [p for p in pieces if p.grey > 0.5 * faintest and _stands_out(p, noise, image.voxel)]
-    found = (_onward(p, tip, heading) for p in good)
-    runs = [r for r in found if r is not None and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * image.voxel) > 0.5]
+    found = ((p, _onward(p, tip, heading)) for p in pieces if _stands_out(p, noise, image.voxel))
+    runs = [
+        r
+        for p, r in found
+        if r is not None
+        and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * image.voxel) > 0.5
+        and p.grey > 0.5 * faintest * (APART_TIMES if _apart(r, tip) else 1.0)
+        and (_height(p, noise, image.voxel) > SURE_APART or not _apart(r, tip))
+    ]
     return min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip))) if runs else None
 
 

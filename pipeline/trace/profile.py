@@ -24,7 +24,7 @@ UNEVEN = (0.55, 1.6)
 STEP_SIGMAS = 5.0
 """The same in standard deviations of that mean."""
 LINEAR = 0.15
-"""Share of the usual grey above which brightness is compared by its logarithm: a step from 0.2 to 1 is one from 1 to 5."""
+"""Share of the usual grey above which brightness is compared by its logarithm: 0.2 to 1 is a step as 1 to 5."""
 STEP_COST = 1.5
 """What a further step must save: the square of a threefold change of brightness over three samples."""
 LEAST_LEVEL = 0.1
@@ -37,7 +37,7 @@ SURE = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Brightness (m,) as shares of the usual one, between edges (m - 1,) in shares of the wire's length, from its entry."""
+    """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start."""
 
     edges: Array
     levels: Array
@@ -64,7 +64,7 @@ def step_position(profile: Array, arc: Array, sigma: float) -> float:
 
 
 def _segments(value: Array, cost: float) -> NDArray[np.int64]:
-    """First samples of the constant pieces that fit ``value`` (n,) best, each of them costing ``cost`` (Potts model)."""
+    """First samples of the constant pieces that fit ``value`` (n,) best, each at a ``cost`` (Potts model)."""
     n = len(value)
     total, square = (np.concatenate([[0.0], np.cumsum(v)]) for v in (value, value**2))
     best, first = np.zeros(n + 1), np.zeros(n + 1, np.int64)
@@ -142,7 +142,9 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
     line, edges = line[arc <= end], edges[edges < end - h]
     if not len(edges):
         return np.asarray(line), EVEN
-    level = _levels(grey[arc <= end + 2 * blur] / usual, arc[arc <= end + 2 * blur], np.append(edges, end), blur)[0][:-1]
+    level = _levels(grey[arc <= end + 2 * blur] / usual, arc[arc <= end + 2 * blur], np.append(edges, end), blur)[0][
+        :-1
+    ]
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
 
 

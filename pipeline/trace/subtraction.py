@@ -38,10 +38,12 @@ SMOOTH_BLOCKS = 1.25
 LEAST_SHARE = 0.02
 """Share of the voxels of a full block below which the smoothed blocks say nothing and the level is left alone."""
 
+UNEVEN = 0.82
+"""Share of the vessel's contrast that it has everywhere if it is filled evenly."""
 LEAST_LEVEL = 200
 """Voxels from which the median of a level is taken."""
 SAME_GAIN = 0.02
-"""Difference of two scans' contrast, as a share of it, that is left alone: the wire's own share of the lumen is less."""
+"""Difference of two scans' contrast, as a share of it, that is left alone: a wire in the lumen makes less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,8 @@ class Subtraction:
     """Grey above the background (float32, on the region's box, valid on ``region.runs``) and its noise.
 
     noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract, or
-    one of another contrast.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's axes.
+    one of another contrast.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's axes.  uneven :
+    the lumen's contrast changes so much along it that no wire is found before that is taken away.
     Points and directions are in kernel coordinates: index along the box's axes times ``spacing``.
     """
 
@@ -59,6 +62,7 @@ class Subtraction:
     modelled: bool
     wall_blur_mm: float
     scan: Grid
+    uneven: bool = False
     counters: dict[str, float] = field(default_factory=dict)
     levels: dict[str, float] = field(default_factory=dict)
     noises: dict[float, float] = field(default_factory=dict)
@@ -93,6 +97,12 @@ class Subtraction:
         deep, out = distance < -h, distance > 2 * h
         inside = float(np.median(grey[deep if deep.any() else distance < h]))
         return inside, float(np.median(grey[out])) if out.any() else inside
+
+    @property
+    def slices_apart(self) -> float:
+        """Largest over smallest voxel edge of the scan."""
+        size = self.region.box.spacing_mm
+        return float(np.max(size) / np.min(size))
 
     def noise_in(self, blur_voxels: float) -> float:
         """Standard deviation of the noise in grey blurred by so many voxels, as correlated as it is."""
@@ -171,7 +181,8 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
-    return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, counters, levels)
+    uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
+    return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
 
 
 def _smooth(sums: Array, counts: Array) -> Array:

@@ -47,6 +47,9 @@ EDGE_VOXELS = 3.0
 """Distance from the scan's end within which a tip is none."""
 BESIDE_VOXELS = 2.2
 """Two strands of one curve nearer than this share their crest."""
+MOST_APART = 3.0
+"""Slice distance over pixel size from which a curve needs its length confirmed: of 12 wires in slices of 2 mm and
+pixels of 0.5 mm, 8 were more than a pixel off or short."""
 MOST_DOUBLE_MM = 2.0
 """Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
@@ -150,9 +153,9 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     if not image.thick_slices:
         double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
-    lengths = [float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double)]
-    first = _first_objection(image, attempt, points, (share, noise, outside), (*lengths, length_mm))
-    return Verdict(*first, bridged | faint | double | outside, *lengths)
+    faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
+    first = _first_objection(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
+    return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
 def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
@@ -219,11 +222,16 @@ def _first_objection(
          "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
         (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
-         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it", "a lumen that holds the tip",
+         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
+         "a lumen that holds the tip",
          "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
-        (attempt.behind_mm > length_mm, FrameStatus.TRACE_WRONG_WAY,
+        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
          "turn entry_direction round, or state insertion_mm if this is right"),
+        (image.slices_apart >= MOST_APART and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
+         f"slices {image.slices_apart:.1f} times as far apart as pixels",
+         f"less than {MOST_APART} times, or insertion_mm",
+         "state insertion_mm: in such slices a wire's ends are lost by more than its uncertainty says"),
         (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
          f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
          "leave this frame out, or scan a larger field"),

@@ -23,7 +23,7 @@ class Samples(NamedTuple):
     """Fixed sampling of a uniform cubic B-spline, n samples.
 
     measure : quadrature weight in u.  first : of the four control points; value, slope : (n, 4) their weights and d/du.
-    tint_first, tint_share : linear interpolation of the amplitude nodes.  opacity : what the amplitude is multiplied by.
+    tint_first, tint_share : linear interpolation of the amplitude nodes.  opacity : factor of the amplitude.
     """
 
     measure: NDArray[Any]

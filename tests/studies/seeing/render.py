@@ -99,7 +99,9 @@ def cylinder(radius, away, sigma):
     r, d = np.asarray(radius) / sigma, np.asarray(away) / sigma
     table = _cylinders()
     thick = r > 11.0  # a flat wall
-    share = ndimage.map_coordinates(table, [np.clip(r / 0.1 - 1.0, 0, len(table) - 1), d / 0.1], order=1, mode="nearest")
+    share = ndimage.map_coordinates(
+        table, [np.clip(r / 0.1 - 1.0, 0, len(table) - 1), d / 0.1], order=1, mode="nearest"
+    )
     share = np.where(r < 0.1, 0.0, np.where(d > 15.5, 0.0, share))
     return np.where(thick, 0.5 * (1 + erf((r - d) / np.sqrt(2))), share)
 

@@ -194,7 +194,9 @@ def leaves(rng, seed):
     else:
         low[axis] = n
     lattice = d.lattice
-    d.lattice = r.Lattice(tuple((high - low).tolist()), lattice.spacing, lattice.origin + low * lattice.spacing, lattice.blur)
+    d.lattice = r.Lattice(
+        tuple((high - low).tolist()), lattice.spacing, lattice.origin + low * lattice.spacing, lattice.blur
+    )
     return d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)
 
 
