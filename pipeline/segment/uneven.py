@@ -56,7 +56,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     if len(core) == 0:
         return Filling(np.ones(shape), low, 1.0)
     grey = (grid.values[tuple((core + low).T)].astype(float) - region.levels.outside) / region.levels.contrast
-    block = np.ravel_multi_index(tuple((core // BLOCK).T), shape)
+    block: Index = np.asarray(np.ravel_multi_index(tuple((core // BLOCK).T), shape), np.int64)
     order = np.lexsort((grey, block))
     block, grey = block[order], grey[order]
     name, first, count = (np.asarray(a) for a in np.unique(block, return_index=True, return_counts=True))
@@ -117,6 +117,6 @@ def warning(least: float) -> tuple[str, ...]:
     if least >= EVEN:
         return ()
     return (
-        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its "
-        "wall was taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
+        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its wall "
+        "was taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
     )

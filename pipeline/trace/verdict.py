@@ -154,7 +154,9 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
         double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
-    first = _first_objection(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
+    objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
+    objections += _of_the_ends(image, attempt, points, length_mm)
+    first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
@@ -190,34 +192,13 @@ def _at_edge(image: Subtraction, point: Array) -> bool:
     return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
 
 
-def _first_objection(
-    image: Subtraction,
-    attempt: Attempt,
-    points: Array,
-    seen: tuple[Array, float, NDArray[np.bool_]],
-    lengths: tuple[float, float, float],
-) -> tuple[FrameStatus, str]:
-    """Status and note of the first thing that speaks against a curve (n, 3); OK where nothing does."""
-    (share, noise, outside), (faint_mm, double_mm, length_mm) = seen, lengths
-    left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
-    # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
-    confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
-    objections = (
-        (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
-         f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
-         "scan with more dose or give the frame before"),
-        (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
-         f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
-         f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
-        (left_mm > LEFTOVER_MM, FrameStatus.TRACE_AMBIGUOUS,
-         f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
-         "look for a second device or a wrong turn at a crossing"),
-        (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
-         f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
-         "look at the picture"),
-        (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
-         f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
-         "give the curve of the frame before, which tells strands in contact apart, or look for a second wire"),
+Objection = tuple[bool, FrameStatus, str, str, str]
+"""Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
+
+
+def _of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
+    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
+    return (
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
          "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
@@ -239,7 +220,37 @@ def _first_objection(
          "a line as thick as its vessel", "a wire, which is thinner",
          "check that the frame shows a wire, and that the reference has the frame's contrast"),
     )  # fmt: skip
-    return next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
+
+
+def _of_the_line(
+    image: Subtraction,
+    attempt: Attempt,
+    points: Array,
+    seen: tuple[Array, float, NDArray[np.bool_]],
+    lengths: tuple[float, float, float],
+) -> tuple[Objection, ...]:
+    """What may be wrong along a curve (n, 3)."""
+    (share, noise, outside), (faint_mm, double_mm, length_mm) = seen, lengths
+    left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
+    # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
+    confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
+    return (
+        (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
+         f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
+         "scan with more dose or give the frame before"),
+        (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
+         f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
+         f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
+        (left_mm > LEFTOVER_MM, FrameStatus.TRACE_AMBIGUOUS,
+         f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
+         "look for a second device or a wrong turn at a crossing"),
+        (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
+         f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
+         "look at the picture"),
+        (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
+         f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
+         "give the curve of the frame before, which tells strands in contact apart, or look for a second wire"),
+    )  # fmt: skip
 
 
 def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> NDArray[np.bool_]:
