@@ -1,26 +1,69 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate test lint study bars baseline anatomies bench stress peers aneurism conebeam seeing truth clean
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := reports/out
 SEED ?= 101
+CALIBRATED ?= 100 101 102
 export OMP_NUM_THREADS := 1
 
 validate: setup
-	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --frames 30 --size 256 --seed $(SEED)
-	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume \
-	  --sweep simulate.bending_scale=0.8,1.2 --sweep simulate.wall_scale=0.333,3 --sweep simulate.roll_offset_deg=-15,15
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/validate --resume -j 2 --set budget.members=100 \
+	  --sweep simulate.roll_offset_deg=-15,15 --sweep simulate.taper_scale=0.5,2 \
+	  --sweep simulate.rest_curvature_scale=0.8,1.2 --sweep simulate.friction=0.2
+
+# errors planted into the simulator of the same study: sweep.csv has the skill that is left to each
+planted: setup
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/study --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
+	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/planted --resume -j 2 --until compare \
+	  --sweep simulate.roll_offset_deg=-60,60 --sweep simulate.rest_curvature_scale=0 \
+	  --sweep simulate.taper_scale=2 --sweep simulate.friction=0.2
+
+# parameters found by `wireval calibrate` against the truth, and six blind insertions judged with them
+calibrated: setup
+	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED)
+	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED) --forces --no-blind
 
 test: setup lint
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
+
+# the pages in a browser (needs a Chromium on the path, and the network once)
+browser: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[browser]'
+	$(BIN)/python -m pytest -q tests/reports/test_browser.py
 
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# the wheel as a user gets it: built, installed where nothing is, outside the checkout, and run there
+AWAY = $(abspath $(OUT))/package
+package: setup
+	rm -rf $(AWAY) && mkdir -p $(AWAY)/wheel
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(AWAY)/wheel .
+	$(PYTHON) -m venv $(AWAY)/venv
+	$(AWAY)/venv/bin/python -m pip install --quiet --disable-pip-version-check $(AWAY)/wheel/*.whl
+	cd $(AWAY) && venv/bin/wireval synth straight -o study && venv/bin/wireval run study -o out
+	cd $(AWAY) && venv/bin/python -c 'import wireval; assert wireval.read_results("out").ok, "not all frames are ok"'
+	cd $(AWAY) && $(abspath $(BIN))/mypy --config-file /dev/null --strict --python-executable venv/bin/python \
+	  -c 'import wireval; wireval.run("study", "out").errors.plot()'
+
+# the pages of docs/ that are written from the code
+pages: setup
+	$(BIN)/python -m tests.studies.reference_pages
+
+# the manual as a site, in an environment of its own; a broken link is an error
+DOCS = "mkdocs-material>=9.5" "mkdocs-jupyter>=0.25"
+docs: export NO_MKDOCS_2_WARNING = 1
+docs:
+	test -x $(OUT)/docs/bin/mkdocs || $(PYTHON) -m venv $(OUT)/docs
+	test -x $(OUT)/docs/bin/mkdocs || $(OUT)/docs/bin/python -m pip install --quiet --disable-pip-version-check $(DOCS)
+	$(OUT)/docs/bin/mkdocs build --strict --site-dir $(abspath $(OUT))/site
 
 study: setup
 	$(BIN)/python -m pytest -q -m slow
@@ -32,6 +75,10 @@ bars: setup
 	  $(BIN)/wireval synth circle-of-willis -o $(OUT)/bars/$$seed --frames 30 --size 256 --seed $$seed && \
 	  $(BIN)/wireval run $(OUT)/bars/$$seed/manifest.toml -o $(OUT)/bars/out-$$seed --resume || exit 1; done
 	$(BIN)/python -m tests.studies.bars $(foreach seed,$(SEEDS),$(OUT)/bars/out-$(seed))
+
+# how far the uncertainty budget is right: insertions with inputs as far off as it says, and with errors planted
+budget: setup
+	$(BIN)/python -m tests.studies.budget $(OUT)/budget
 
 # the golden errors of the small catalogue, written anew: look at the difference before committing it
 baseline: setup
@@ -51,6 +98,21 @@ conebeam:
 seeing: setup
 	$(BIN)/python -m tests.studies.seeing.table --jobs 2
 
+# every way to write a scan: right, noted, refused, or wrong and silent (the last is 0)
+formats: setup
+	$(BIN)/python -W ignore -m tests.studies.formats
+
+# malformed inputs, each in a process of its own: nothing crashes, hangs, dies or is believed (an hour)
+COUNT ?= 2000
+fuzz: setup
+	$(BIN)/python -W ignore -m tests.fuzz --count $(COUNT) --seed $(SEED)
+
+# known weaknesses of the locked packages (needs the network)
+audit:
+	test -x .audit/bin/pip-audit || { $(PYTHON) -m venv .audit && \
+	  .audit/bin/python -m pip install --quiet --disable-pip-version-check pip-audit; }
+	.audit/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+
 # the truth against itself, every scene replayed on nodes half as far apart
 truth: setup
 	$(BIN)/python -m tests.studies.truth
@@ -61,6 +123,11 @@ aneurism: setup
 	  mkdir -p $(OUT)/aneurism && cp tests/studies/aneurism/* $(OUT)/aneurism/ && \
 	  ln -sf "$$WIREVAL_DATA/aneurism_3dra/aneurism.raw.gz" $(OUT)/aneurism/ && \
 	  $(BIN)/wireval run $(OUT)/aneurism/manifest.toml -o $(OUT)/aneurism/out; fi
+
+# 37 real X-ray frames of a liver artery (needs WIREVAL_DATA): a simulated wire over the wire that was seen
+liver: setup
+	@if [ -z "$$WIREVAL_DATA" ]; then echo "skipped: set WIREVAL_DATA to the folder of real scans"; else \
+	  $(BIN)/python -m tests.studies.liver $(OUT)/liver; fi
 
 setup: $(VENV)/.ready
 
@@ -83,6 +150,18 @@ peers: setup
 	test -x $(OUT)/peers/bin/python || $(PYTHON) -m venv $(OUT)/peers
 	$(OUT)/peers/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(OUT)/peers/bin/wireval bench -o $(OUT)/bench --peers
+
+# 60 runs that are ended by signals and resumed, against one that was not
+interrupt: setup
+	$(BIN)/python -m tests.studies.interrupt --seed $(SEED)
+
+# many small cases with a sweep on two workers and one, beside a busy loop
+scale: setup
+	$(BIN)/python -m tests.studies.scale
+
+# 100 random changes of product lines, each against the tests: the share that is noticed (hours)
+mutants: setup
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED)
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

@@ -3,45 +3,123 @@
 import argparse
 import importlib
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
-from pipeline.commands import VERBS
+import shtab
 
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+from pipeline.commands import VERBS, complain, unwritable
+from pipeline.status import InputError, StageError, did_you_mean
+from reports.atomic import WriteError
+
+OK, FAILED, BAD_INPUT = 0, 1, 2
+COMMAND_LINE = "the command line"
 
 
-def _parser() -> argparse.ArgumentParser:
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, as a batch system sends it before it kills: ends like Ctrl-C."""
+
+
+def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+    """The parser of the whole command line, and that of each verb by its name."""
     parser = argparse.ArgumentParser(
         prog="wireval",
         description="Validate simulated guide wires against 3D scans.",
-        epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted.",
+        epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted; "
+        "143 terminated.",
     )
     parser.add_argument("--version", action="store_true", help="print the version")
+    shtab.add_argument_to(
+        parser, "--print-completion", help="print what makes this shell complete commands and options"
+    )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    verbs = {}
     for name in VERBS:
         verb = importlib.import_module(f"pipeline.commands.{name}")
-        verb.add_arguments(commands.add_parser(name, help=verb.HELP, description=verb.HELP))
-    return parser
+        verbs[name] = commands.add_parser(name, help=verb.HELP, description=verb.HELP)
+        verb.add_arguments(verbs[name])
+    return parser, verbs
+
+
+def parsed(words: Sequence[str]) -> argparse.Namespace:
+    """What was typed; InputError for a verb or an option that there is none of, argparse's exit for the rest."""
+    parser, verbs = parsers()
+    if words and not words[0].startswith("-") and words[0] not in verbs:
+        raise _usage(f"{words[0]!r} is no command; {did_you_mean(words[0], verbs)}")
+    args, unknown = parser.parse_known_args(words)
+    if unknown:
+        allowed = verbs[args.command]._option_string_actions if args.command else parser._option_string_actions
+        long = [name for name in allowed if name.startswith("--")]
+        hint = did_you_mean(unknown[0], long) if unknown[0].startswith("-") else "one argument too many"
+        raise _usage(f"{unknown[0]}: not an option of wireval {args.command or ''}; {hint}".replace(" ;", ";"))
+    if not args.command and not args.version:
+        parser.print_help()
+        raise SystemExit(BAD_INPUT)
+    return args
+
+
+def _usage(problem: str) -> InputError:
+    error = InputError([problem])
+    error.place = COMMAND_LINE
+    return error
+
+
+def carried_out(args: argparse.Namespace) -> int:
+    """Carry out a verb: its exit code. Raises InputError or StageError where what was given cannot be used.
+
+    Nobody computes for an hour what cannot be written then: every place to write is tried first.
+    """
+    places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
+    problems = [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
+    if problems:
+        raise _usage(problems[0])
+    return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))
+
+
+@contextmanager
+def _ended_by_signal() -> Iterator[None]:
+    """SIGTERM ends a command like Ctrl-C: with its workers ended and what is finished kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    parser = _parser()
-    args = parser.parse_args(argv)
-    if args.version:
-        from pipeline.run.provenance import package_version
-
-        print(f"wireval {package_version()}")
-        return OK
-    if not args.command:
-        parser.print_help()
-        return BAD_INPUT
+    args = argparse.Namespace()
     try:
-        return int(importlib.import_module(f"pipeline.commands.{args.command}").main(args))
-    except KeyboardInterrupt:
+        args = parsed(sys.argv[1:] if argv is None else argv)
+        if args.version:
+            from pipeline.run.provenance import package_version
+
+            print(f"wireval {package_version()}")
+            return OK
+        with _ended_by_signal():
+            return carried_out(args)
+    except InputError as error:
+        return complain(error.problems, error.place or str(getattr(args, "manifest", COMMAND_LINE)))
+    except StageError as error:
+        return complain([str(error)], COMMAND_LINE)
+    except KeyboardInterrupt as why:
+        number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
         print("\ninterrupted; what is finished is kept, the same command goes on from there", file=sys.stderr)
-        return INTERRUPTED
+        return 128 + number
+    except WriteError as error:
+        print(error, file=sys.stderr)
+        return FAILED
     except BrokenPipeError:
         # the reader of a pipe (head, less) has gone: not an error of ours
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from pipeline.ranges import FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.ranges import FiniteProfile, NonNegative, Number, Positive, PositiveProfile, Radius
 from pipeline.status import FrameStatus
 from solver.grid import Grid, read_only
 
@@ -29,11 +29,11 @@ class Wire:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     name: str
-    radius_mm: Positive
+    radius_mm: Radius
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
-    torsional_stiffness_N_mm2: Annotated[float, Field(gt=0)] = float("inf")
-    weight_N_per_mm: Annotated[float, Field(ge=0, le=1)] = 0.0
+    torsional_stiffness_N_mm2: Annotated[float, Number, Field(gt=0)] = float("inf")
+    weight_N_per_mm: Annotated[float, Number, Field(ge=0, le=1)] = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class OverWire:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     bending_stiffness_N_mm2: NonNegative
-    radius_mm: Positive
+    radius_mm: Radius
     insertion_mm: NonNegative | tuple[NonNegative, ...]
 
 
@@ -55,12 +55,31 @@ class Wall:
     friction: NonNegative = 0.0
 
 
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well inputs are known: one standard deviation of each; None is the default of ``budget.inputs``.
+
+    lumen_mm, lumen_bias_mm : of the lumen's surface, place by place and common to
+    all of it.     Relative: rest_curvature; taper (lengths over which the stiffness changes) and wall_stiffness, of
+    their logarithms.     friction : of the coefficient.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+    lumen_mm: NonNegative | None = None
+    lumen_bias_mm: NonNegative | None = None
+    rest_curvature: NonNegative | None = None
+    taper: NonNegative | None = None
+    wall_stiffness: NonNegative | None = None
+    friction: NonNegative | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Clamp:
     """Where the wire is held: entry_mm (3,) LPS, direction (3,) of length 1; note and warning are for the report.
 
     material_axis : (3,) where material axis 1 points at roll 0; None: the world axis least aligned with direction.
     down : (3,) where the wire's weight pulls; None: it has none.
+    covariance : (6, 6) of entry_mm, mm, and of the change of the direction; None: not known.
     """
 
     entry_mm: Array
@@ -69,12 +88,41 @@ class Clamp:
     down: Array | None = None
     note: str = ""
     warning: str = ""
+    covariance: Array | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("entry_mm", "direction", "material_axis", "down"):
+        for name in ("entry_mm", "direction", "material_axis", "down", "covariance"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def sigma_mm(self) -> float:
+        """Standard deviation of the entry along an axis across the wire, mm; NaN where it is not known."""
+        if self.covariance is None:
+            return float("nan")
+        across = np.eye(3) - np.outer(self.direction, self.direction)
+        return float(np.sqrt(0.5 * np.trace(across @ self.covariance[:3, :3])))
+
+    @property
+    def sigma_deg(self) -> float:
+        """Standard deviation of a tilt of the direction about an axis, degrees; NaN where it is not known."""
+        if self.covariance is None:
+            return float("nan")
+        return float(np.degrees(np.sqrt(0.5 * np.trace(self.covariance[3:, 3:]))))
+
+
+@dataclass(frozen=True, eq=False)
+class OtherWire:
+    """A wire that another simulator made: joints_mm (n, 3) from the clamp's plane to the tip, LPS mm; nothing is known
+    of forces. max_penetration_mm : how far it comes out of the lumen, its radius with it."""
+
+    joints_mm: Array
+    max_penetration_mm: float
+
+    def __post_init__(self) -> None:
+        """Freeze the points."""
+        object.__setattr__(self, "joints_mm", read_only(self.joints_mm, np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +163,12 @@ class Branches:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS."""
+    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS; radius_mm (n,) where a file gives one a point."""
 
     points_mm: Array
     triangles: NDArray[np.int64]
     lines: tuple[NDArray[np.int64], ...] = ()
+    radius_mm: Array | None = None
 
 
 def arc_length(points_mm: NDArray[Any]) -> Array:

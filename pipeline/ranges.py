@@ -2,18 +2,40 @@
 
 import math
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Count = Annotated[int, Field(ge=0)]
-PositiveCount = Annotated[int, Field(ge=1)]
+
+def _number(value: Any) -> Any:
+    """The value itself; an error for a text or a truth value, which pydantic would take for a number."""
+    if isinstance(value, (bool, str)):
+        raise ValueError("Input should be a valid number, not in quotes, true or false")
+    return value
+
+
+Number = BeforeValidator(_number)
+Finite = Annotated[float, Number, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
+Positive = Annotated[float, Number, Field(gt=0, le=1e9, allow_inf_nan=False)]
+NonNegative = Annotated[float, Number, Field(ge=0, le=1e9, allow_inf_nan=False)]
+Share = Annotated[float, Number, Field(ge=0, le=1)]
+Count = Annotated[int, Number, Field(ge=0, le=10**6)]
+PositiveCount = Annotated[int, Number, Field(ge=1, le=10**6)]
+Millimetres = Annotated[float, Number, Field(ge=0, le=50, allow_inf_nan=False)]
+Reach = Annotated[float, Number, Field(ge=0.1, le=50, allow_inf_nan=False)]
+"""Distances beside a vessel or along it."""
+Depth = Annotated[float, Number, Field(gt=0, le=5000, allow_inf_nan=False)]
+"""How far a wire is pushed in: no wire is longer than 5 m."""
+Factor = Annotated[float, Number, Field(ge=1e-6, le=1e6, allow_inf_nan=False)]
+Step = Annotated[float, Number, Field(ge=0.01, le=100, allow_inf_nan=False)]
+"""A length in mm that curves are cut into: below 10 µm it is a hang, not a resolution."""
+Radius = Annotated[float, Number, Field(ge=1e-3, le=20, allow_inf_nan=False)]
+Place = Annotated[float, Number, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
+Point = tuple[Place, Place, Place]
+"""LPS mm."""
 Vector = tuple[Finite, Finite, Finite]
-Profile = float | list[tuple[float, float]]
+_Plain = Annotated[float, Number]
+Profile = _Plain | list[tuple[_Plain, _Plain]]
 """A number for the whole wire, or pairs (distance from the tip in mm, value), linear between, constant beyond."""
 
 
@@ -28,7 +50,7 @@ def _unit(value: Vector) -> Vector:
     return value[0] / size, value[1] / size, value[2] / size
 
 
-def _checked(value: Profile, info: ValidationInfo, *, lowest: float) -> Profile:
+def _checked(value: Profile, info: ValidationInfo, *, lowest: float, highest: float) -> Profile:
     name = info.field_name
     pairs = [(0.0, value)] if isinstance(value, (int, float)) else value
     if not pairs:
@@ -36,14 +58,14 @@ def _checked(value: Profile, info: ValidationInfo, *, lowest: float) -> Profile:
     distances = [s for s, _ in pairs]
     if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
         raise ValueError(f"{name}: distances from the tip {distances} must be >= 0 and must not decrease")
-    if any(not math.isfinite(v) or v < lowest for _, v in pairs):
+    if any(not lowest <= v <= highest for _, v in pairs):
         above = "" if lowest < 0 else " and above 0"
-        raise ValueError(f"{name}: values {[v for _, v in pairs]} must be finite{above}")
+        raise ValueError(f"{name}: values {[v for _, v in pairs]} must be finite{above}, at most {highest:g}")
     return value
 
 
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector that is made to have length 1."""
-PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12))]
-FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-math.inf))]
+PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9))]
+FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0))]

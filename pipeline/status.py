@@ -10,6 +10,7 @@ class FrameStatus(Enum):
 
     OK = "traced, simulated to its depth, converged and compared"
     SIMULATED = "simulated only: the case has no frames to compare with"
+    ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
     LOAD_FAILED = "the scan could not be read; see failures.csv for the file and the reason"
     SEGMENT_FAILED = "no lumen could be segmented; see failures.csv for the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
@@ -34,6 +35,13 @@ class FrameStatus(Enum):
         "the simulated wire passes through itself; parts of the wire do not push each other in this model, so that "
         "shape and force are not to be trusted from here on"
     )
+    CURVE_MISSING = "the other simulator has no wire for this frame, which counts as one that it failed in"
+    CURVE_UNUSABLE = "the other simulator's wire cannot be used; see failures.csv for the file and the reason"
+    NOT_TO_DEPTH = (
+        "the other simulator's wire is longer or shorter than the frame is deep by more than "
+        "trace.length_tolerance_mm; push it to the depth in errors.csv of a run of this manifest"
+    )
+    VIEW_FAILED = "the wire cannot be held against its projection; see failures.csv for the reason"
     SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
 
     @property

@@ -10,9 +10,13 @@
 ``figures``        one function per figure: what is on disk -> figure and its table, or None without data
 ``sections.toml``  which figures a page shows, in order, with captions; the cards at its head
 ``html``           report.html of a case, index.html of a run
-``scene3d``        an optional scene to turn (extra ``report3d``)
+``pdf``            summary.pdf of a run: four pages on paper
+``viewer``         what the viewer in a case's page shows: curves, scans, the lumen
+``verdict``        the first sentence of a page, the worst frames, the next command
+``colours``        one colour for one thing everywhere
 ``diff``           two runs compared, the gate for continuous integration
 ``bench``          the page of a benchmark
+``simulators``     the page of several simulators side by side
 ``atomic``         every file appears whole or not at all
 =================  ====================================================================================
 

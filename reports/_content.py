@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from reports.case_files import GOOD, WORST
 from reports.schema import SUMMARY, Column
 
 Grid = dict[str, Any]
@@ -70,7 +71,8 @@ def size(n_bytes: int) -> str:
 def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -> list[dict[str, str]]:
     """The numbers at the head of a page; those that do not apply are left out.
 
-    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total.
+    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total, ``name`` that
+    of a word that follows the label.
     """
     shown = []
     for entry in entries:
@@ -80,24 +82,33 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            shown.append({"value": value, "label": f"{total}{entry['label']}{interval_95}"})
+            named = f" {statistics.get(entry['name'], '')}" if entry.get("name") else ""
+            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
 
 
-def overall(pooled: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The one number over all validation cases, with what it rests on."""
-    label = "mm rms, simulated to traced wire, all validation cases"
-    first = cards([{"column": "rms_mm", "label": label}], pooled)
-    groups = {
-        "value": f"{pooled.get('cases', 0)} / {pooled.get('groups', 0)}",
-        "label": "validation cases / groups of them, which the interval resamples",
-    }
-    return [*first, groups] if first else []
+def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[dict[str, str]]:
+    """The numbers over all validation cases, and what their intervals rest on. table : overall.csv, a row or none."""
+    if table.empty:
+        return []
+    row = {str(name): value for name, value in table.iloc[0].items()}
+    rests = f"insertions stand behind the intervals ({number(row['interval'])})"
+    return [*cards(entries, row), {"value": number(row["insertions"]), "label": rests}]
+
+
+def worst_first(summary: pd.DataFrame) -> pd.DataFrame:
+    """The rows of summary.csv, cases with failed frames first, then by WORST; equal ones as the manifest has them."""
+    order = summary.assign(failed=_failed(summary)).sort_values(["failed", WORST], ascending=False, kind="stable").index
+    return summary.loc[order]
+
+
+def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
+    return ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
 
 
 def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
     """One row per case, linked to its page."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=(summary["frames_failed"] > 0).fillna(value=False))
+    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary))
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

@@ -35,6 +35,7 @@ def render_bench(bench_csv: Path, out_dir: Path, *others: Path | None, note: str
         "sections": draw_sections("bench", bench, out_dir, embed),
         "recommended": _grid(best),
         "claims": _claims(bench.claims),
+        "broken": int(bench.claims["met"].eq(other=False).sum()) if bench.claims["met"].notna().any() else None,
         "rows": _grid(bench.rows.drop(columns="on_front")),
         "stress": _grid(outcomes.assign(all=outcomes.sum(axis=1)).reset_index()),
         # a table that has counts alone says nothing of how much and how well

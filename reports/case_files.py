@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from reports import frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
-from reports.schema import ERRORS, POINTS
+from reports.schema import ERRORS, POINTS, TIMINGS
 
-GOOD = ("ok", "simulated")
+GOOD = ("ok", "simulated", "roll_fitted")
+WORST = "p95_mm"
+"""The one metric by which a frame or a case is called worst, wherever that is said."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +27,7 @@ class CaseFiles:
     result: Mapping[str, Any]
     errors: pd.DataFrame
     points: pd.DataFrame
+    timings: pd.DataFrame
     scan: ScanCrop | None
     frames: tuple[int, ...]
 
@@ -58,8 +61,9 @@ def read_case(folder: Path, points: bool = True) -> CaseFiles:
     """
     errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
     samples = tables.read_if_there(folder / POINTS.file if points else None, POINTS)
+    timings = tables.read_if_there(folder / TIMINGS.file, TIMINGS)
     scan, numbers = _frames(folder / "frames.h5")
-    return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, scan, numbers)
+    return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -5,9 +5,11 @@
     /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
 
-Curves are LPS mm, arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
+The file has the attributes of ``ATTRIBUTES``, each dataset of a frame the attribute ``unit``. Curves are LPS mm,
+arrays indexed x, y, z; NNN is the zero-based frame index, zero-padded.
 """
 
+import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -17,7 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.atomic import replacing
+from reports.atomic import write_bytes
 
 Array = NDArray[np.float64]
 Pictures = Mapping[int, NDArray[np.uint8]]
@@ -44,7 +46,10 @@ class FrameArrays:
 
     traced_mm (n, 3), simulated_mm (k, 3), truth_mm (t, 3): LPS mm, entry to tip.     trace_sigma_mm (n,).
     trace_flags (n,): 1 bridged, streaky or in contact, 2 nearly parallel to the plane of rotation, 3 both, 0 neither.
+    seen_in_view_mm (n, 2), simulated_in_view_mm (k, 2): the real and the simulated wire in an X-ray projection, mm on
+    the plane through the isocentre, whose origin it is.
     error_mm and arc_mm: one value per compared arc sample.     contact_force_N: (k,) or (k, 3) at the joints.
+    median_mm (n, 3), covariance_mm2 (n, 3, 3): of the wires of the ensemble, at such samples.
     """
 
     frame: int
@@ -57,6 +62,10 @@ class FrameArrays:
     trace_sigma_mm: Array | None = None
     mips: Pictures = field(default_factory=dict)
     trace_flags: Array | None = None
+    seen_in_view_mm: Array | None = None
+    simulated_in_view_mm: Array | None = None
+    median_mm: Array | None = None
+    covariance_mm2: Array | None = None
 
     @property
     def curves(self) -> dict[str, Array]:
@@ -65,13 +74,17 @@ class FrameArrays:
         return {name: points for name, points in wires.items() if points is not None and len(points)}
 
 
+ATTRIBUTES = {"schema": 1, "length_unit": "mm", "force_unit": "N", "coordinates": "LPS"}
+"""What stands at the root of the file: positive x to the patient's left, y to the back, z to the head."""
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 _ARRAYS = tuple(f.name for f in fields(FrameArrays) if f.name not in ("frame", "mips"))
 
 
 def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays]) -> None:
     """Write frames.h5; ``frames`` may be a generator, so that one frame is held at a time."""
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    whole = io.BytesIO()  # a few MB; HDF5 on a full disk leaves a file that it can neither write nor close
+    with h5py.File(whole, "w") as file:
+        file.attrs.update(ATTRIBUTES)
         everything = file.create_group("frames")
         if scan is not None:
             group = file.create_group("scan")
@@ -82,8 +95,10 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             group = everything.create_group(f"{frame.frame:03d}")
             for name in _ARRAYS:
                 if getattr(frame, name) is not None:
-                    group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
+                    values = group.create_dataset(name, data=np.asarray(getattr(frame, name), dtype=np.float64))
+                    values.attrs["unit"] = name.rpartition("_")[2] if name.endswith(("_mm", "_N")) else "1"
             _write_pictures(group, "mip", frame.mips)
+    write_bytes(path, whole.getvalue())
 
 
 def read_scan(path: Path) -> ScanCrop | None:

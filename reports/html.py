@@ -7,16 +7,18 @@ from typing import Any
 from urllib.parse import quote
 
 import jinja2
+from markupsafe import Markup
 
-from reports import _content
+from reports import _content, colours
 from reports._content import flatten, settings, size
 from reports.atomic import write_text
 from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
-from reports.scene3d import write_scene
-from reports.schema import ERRORS, FAILURES, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
+from reports.verdict import next_command, verdict, worst_frames
+from reports.viewer import viewer_data
 
 
 def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[str, Any]]:
@@ -38,19 +40,20 @@ def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[
         width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
         source = _link(path, folder, "image/png", embed)
         numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
-        sections.append({**entry, "source": source, "numbers": numbers, "width": width, "height": height})
+        shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
+        sections.append({**entry, **shown})
     return sections
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
     """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
+    templates = Path(__file__).parent / "templates"
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
+        loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
-    write_text(path, environment.get_template(template).render(page))
+    # style and scripts stand in every page: a copied one works from a disk without a network
+    fixed = {"colours": colours, "part": lambda name: Markup((templates / name).read_text(encoding="utf-8"))}
+    write_text(path, environment.get_template(template).render(fixed | dict(page)))
     return path
 
 
@@ -61,7 +64,9 @@ def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
 
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
-_LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5", "log.txt")
+_LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
+_OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
+"""When and where a case was computed, and how long it took: no page says so, so that the same results give the same."""
 
 
 def render_case(case_dir: Path, embed: bool = False) -> Path:
@@ -72,23 +77,27 @@ def render_case(case_dir: Path, embed: bool = False) -> Path:
     """
     case = read_case(case_dir)
     sections = draw_sections("case", case, case_dir, embed)
-    scene, scene_note = write_scene(case)
+    viewer = viewer_data(case)
     result, errors = case.result, case.errors
+    failures = _case_failures(case)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
         "title": f"{case.name} - wireval",
         "name": case.name,
         "status": result.get("status", "no result.json"),
         "good": result.get("status") in GOOD,
-        "sentence": result.get("sentence", "the case has no result.json: it did not finish; see log.txt"),
+        "verdict": _case_verdict(case),
+        "worst": worst_frames({case.name: errors}, {}),
+        "next": next_command([case.name]),
+        "viewer": viewer,
+        "curves": {name for frame in viewer["frames"] for name in frame["curves"]} if viewer else (),
         **{key: result.get(key, "") for key in ("role", "group")},
-        "failures": _case_failures(case),
+        "failures": failures,
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "cards": _content.cards(declared("cards"), case.statistics),
         "points": (case_dir / "points.csv.gz").exists(),
-        "compared": bool(errors["rms_mm"].notna().any()),
-        "scene": scene.name if scene else "",
-        "scene_note": scene_note,
+        # of projections the assumptions say whether wires were shifted
+        "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
         "sections": sections,
         "frames": frames if len(errors) else None,
         "counters": list(flatten(result.get("counters", {}))),
@@ -105,18 +114,28 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = _read_cases(out_dir)
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
+    summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos = list(runs.values())
+    found = {case.name: case.errors for case in cases}
+    errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
+    row = dict(whole.iloc[0]) if len(whole) else {}
+    calibration = set(summary["case"][summary["role"] == "calibration"])
     page = {
         "title": "wireval",
         **_headline(cases, bool(failures)),
+        "verdict": verdict(row),
+        "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
+        "next": next_command([f["case"] for f in failures], _typed(infos)),
         "failures": failures,
+        "simulators": (out_dir / "simulators").is_dir(),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
-        "cards": _content.overall(next((run["overall"] for run in infos if run.get("overall")), {})),
-        "sections": draw_sections("run", RunFiles({c.name: c.errors for c in cases}, summary, sweep), out_dir, embed),
+        "cards": _content.overall(declared("overall"), whole),
+        # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
+        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed), key=_is_tall),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
@@ -135,6 +154,24 @@ def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
     if not rows and case.result.get("status") not in GOOD:
         rows = [{key: case.result.get(key, "") for key in ("stage", "status", "sentence", "message")}]
     return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in rows]
+
+
+def _case_verdict(case: CaseFiles) -> str:
+    """What became of the case, how many frames have a result, and how good they are."""
+    nothing = "the case has no result.json: it did not finish; see log.txt"
+    said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
+    good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
+    counts = f"{good} of {planned} frames have a result." if planned and good != planned else ""
+    return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", verdict(case.statistics))))
+
+
+def _is_tall(section: Mapping[str, Any]) -> bool:
+    return int(section["height"]) > int(section["width"])
+
+
+def _typed(infos: Sequence[Mapping[str, Any]]) -> Sequence[str]:
+    """The command of the run, where a single one wrote the folder."""
+    return infos[0].get("provenance", {}).get("argv", ()) if len(infos) == 1 else ()
 
 
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:
@@ -176,7 +213,8 @@ def _files(case_dir: Path) -> list[dict[str, str]]:
     paths = [case_dir / name for name in _LISTED_FILES]
     paths += sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
     found = {path.relative_to(case_dir).as_posix(): path.stat().st_size for path in paths if path.exists()}
-    return [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
+    listed = [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
+    return listed + [{"name": n, "link": n, "size": ""} for n in _OF_THE_RUN if (case_dir / n).exists()]
 
 
 def _version(infos: Sequence[Any]) -> str:

@@ -17,6 +17,7 @@ POOLED = {
     "points": "from all points of the frames that are ok",
     "rms": "root of the mean square over frames, weighted by their number of points",
     "mean": "mean over frames",
+    "weighted": "mean over frames, weighted by their number of points",
     "median": "median over frames",
     "max": "largest over frames",
     "share": "fraction of frames in which it is true",
@@ -25,7 +26,7 @@ POOLED = {
 PLACES = (
     *("frames", "work"),  # case page: the table of frames, first how far, then forces and effort
     "cases",  # index page: the table of cases
-    "predictors",  # every figure with lines of trivial predictors
+    *("predictors", "rivals"),  # every figure with lines of trivial predictors; beside them where they are pooled
     *("error_by_depth", "tip_by_depth", "tip_angle_by_depth", "skill_by_depth"),  # panels against depth
     *("trace_by_depth", "truth_by_depth", "force_by_depth", "overlap_by_depth"),
 )
@@ -43,6 +44,8 @@ class Column:
     """One line for the reader."""
     kind: str = "float"
     """float, integer, boolean or text."""
+    formula: str = ""
+    """How it is computed: w are points of the simulated wire, c of the traced curve, at arc length s from the entry."""
     better: str = ""
     """low or high where a comparison of two runs has a direction, else empty."""
     pooled: str = ""
@@ -106,11 +109,10 @@ class Table:
         return tuple(c for place in places for c in self.columns if place in c.shown)
 
     def add(self, column: Column) -> None:
-        """Take in a column from outside, before the timings, and its pooled column; ValueError where it is there."""
+        """Take in a column from outside, at the end, and its pooled column; ValueError where it is there."""
         if column.name in self.names:
             raise ValueError(f"{self.file} has a column {column.name!r}; choose another name")
-        place = next((i for i, c in enumerate(self.columns) if c.unit == "s"), len(self.columns))
-        self.columns = (*self.columns[:place], column, *self.columns[place:])
+        self.columns = (*self.columns, column)
         self._pool(column)
 
     def check(self, given: Iterable[str], where: str) -> None:
@@ -137,10 +139,16 @@ def predictor(name: str, label: str, meaning: str) -> Column:
 
 
 SUMMARY = Table("summary.csv")
+OVERALL_FILE = "overall.csv"  # one row over all validation cases, with the columns of summary.csv
 ERRORS = Table("errors.csv", pooled_in=SUMMARY)
 POINTS = Table("points.csv.gz")
 FAILURES = Table("failures.csv")
+TIMINGS = Table("timings.csv")  # of a case and its frames; of a run, one row a case
+BUDGET = Table("budget.csv")
+ENTRIES = Table("entries.csv")
 SWEEP = Table("sweep.csv")
+SIMULATORS = Table("simulators.csv")
+WHERE = Table("where.csv")
 BENCH = Table("bench.csv")
 STRESS = Table("stress.csv")
 CLAIMS = Table("claims.csv")

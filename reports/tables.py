@@ -42,14 +42,30 @@ def write(path: Path, table: Table, content: pd.DataFrame | Mapping[str, Any] | 
 
 def write_csv(path: Path, content: pd.DataFrame) -> None:
     """Write any DataFrame as CSV, gzipped where the name ends in .gz."""
+    texts = content.select_dtypes(include=["object", "string"]).columns
+    content = content.assign(**{name: content[name].map(_plain_text) for name in texts})
     text = content.to_csv(index=False, float_format=_FLOAT_DIGITS, lineterminator="\n").encode("utf-8")
     # mtime 0: the same result gives the same bytes
     write_bytes(path, gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
 
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""A text that begins so is a formula to a spreadsheet, which would run it: it is written after an apostrophe."""
+
+
+def _plain_text(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
+
+
+def _own_text(value: Any) -> Any:
+    """What ``_plain_text`` was given."""
+    return value[1:] if isinstance(value, str) and value[:1] == "'" and value[1:].startswith(FORMULA) else value
+
+
 def read(path: Path, table: Table) -> pd.DataFrame:
     """Read a table; a column that the file lacks is NA, one that it has in excess is kept at the end."""
     raw = pd.read_csv(path, dtype="string", keep_default_na=False, na_values=[""])
+    raw = raw.assign(**{c.name: raw[c.name].map(_own_text) for c in table if c.kind == "text" and c.name in raw})
     try:
         return _conform(raw, table)
     except (ValueError, TypeError) as error:
@@ -58,9 +74,16 @@ def read(path: Path, table: Table) -> pd.DataFrame:
         ) from error
 
 
+_EMPTY: dict[tuple[str, ...], pd.DataFrame] = {}
+
+
 def read_if_there(path: Path | None, table: Table) -> pd.DataFrame:
     """Read a table; without a file it has no rows, and every column in its kind."""
-    return read(path, table) if path is not None and path.exists() else _conform(pd.DataFrame(), table)
+    if path is not None and path.exists():
+        return read(path, table)
+    if table.names not in _EMPTY:  # kept: the page of 500 cases asks for thousands
+        _EMPTY[table.names] = _conform(pd.DataFrame(), table)
+    return _EMPTY[table.names].copy()
 
 
 def has(content: pd.DataFrame, *columns: str) -> bool:

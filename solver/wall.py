@@ -5,15 +5,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from solver._kernels.data import Field
 from solver._kernels.field import bounds, look_up, prefilter
 from solver.creases import creases
 from solver.doors import ANYWHERE_MM, FAR_MM, Array, Found, Range, instance, number, numbers
 from solver.errors import refuse
-from solver.grid import Grid
+from solver.grid import Grid, read_only
 
+OFFSET_MM = Range(-FAR_MM, FAR_MM, "a tenth of a voxel is usual")
 MAKE_A_DISTANCE = (
     "a mask of the lumen is made one by scipy.ndimage: "
     "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm)"
@@ -55,6 +56,11 @@ def _checked(grid: Grid) -> Array:
     return values
 
 
+def _padded(coefficients: Array) -> NDArray[np.float32]:
+    """Coefficients with their ghost layers: c[-1] = 2 c[0] - c[1], which goes on linearly beyond the grid."""
+    return np.pad(coefficients, 1, mode="reflect", reflect_type="odd").astype(np.float32)
+
+
 @dataclass(frozen=True, eq=False)
 class VesselWall:
     """The lumen's wall as a signed distance in mm, negative inside; its law is in ``_kernels.wall_law``.
@@ -77,10 +83,8 @@ class VesselWall:
         values = _checked(instance("wall", "distance", self.distance, Grid))
         marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
-        # the ghost layers: c[-1] = 2 c[0] - c[1]
-        padded = np.pad(values, 1, mode="reflect", reflect_type="odd")
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)
-        coefficients = padded.astype(np.float32)
+        coefficients = _padded(values)
         gap, slope = (float(bound) for bound in bounds(coefficients, to_index))
         origin, spacing = np.array(self.distance.origin_mm), float(self.distance.spacing_mm.min())
         object.__setattr__(self, "field", Field(coefficients, to_index, origin, gap, slope, spacing, marks))
@@ -97,6 +101,21 @@ class VesselWall:
             if value is not None:
                 object.__setattr__(other, name, value)
         other._check_law()
+        return other
+
+    def shifted(self, offset_mm: ArrayLike) -> "VesselWall":
+        """The lumen with an offset (nx, ny, nz), mm, added to its distance: positive makes it narrower.
+
+        Half the time of a new wall: the creases stay where they were, so the offset must be smooth and small.
+        """
+        offset = numbers("wall", "offset_mm", offset_mm, self.distance.shape, OFFSET_MM).copy()
+        values = self.distance.values + offset
+        prefilter(offset)
+        coefficients = self.field.coefficients + _padded(offset)
+        gap, slope = (float(bound) for bound in bounds(coefficients, self.field.to_index))
+        other, moved = copy(self), self.distance.with_values(read_only(values))
+        object.__setattr__(other, "distance", moved)
+        object.__setattr__(other, "field", self.field._replace(coefficients=coefficients, gap=gap, slope=slope))
         return other
 
     @cached_property

@@ -94,7 +94,7 @@ def test_texts_name_no_machine(path: Path) -> None:
 
 def test_help_imports_nothing_heavy() -> None:
     """`wireval --help` must be instant: the command line imports a command's modules inside the command."""
-    code = "import sys, pipeline.cli; pipeline.cli._parser(); print(*sys.modules)"
+    code = "import sys, pipeline.cli; pipeline.cli.parsers(); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True, cwd=ROOT)
     assert not {"numpy", "SimpleITK", "numba", "matplotlib", "pandas"} & set(done.stdout.split())
 

@@ -7,11 +7,21 @@ from data_synthetic.catalogue import hard, plain, willis
 from data_synthetic.catalogue.limits import Wanted
 from data_synthetic.catalogue.own_scenes import background_scene, from_anatomy
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory
-from data_synthetic.catalogue.study import Study, make_study
+from data_synthetic.catalogue.study import Study, insertion_into, prepare
 from data_synthetic.scanner import PsfScanner
 from data_synthetic.scanner.conebeam import ConeBeamScanner
 
-__all__ = ["Wanted", "background_scene", "build", "describe", "from_anatomy", "names"]
+__all__ = [
+    "SCANNERS",
+    "Wanted",
+    "background_scene",
+    "build",
+    "describe",
+    "from_anatomy",
+    "insertion_into",
+    "names",
+    "prepare",
+]
 
 SCANNERS: dict[str, ScannerFactory] = {"psf": PsfScanner.of, "conebeam": ConeBeamScanner.of}
 """What turns a phantom into grey values: the ideal scanner, and 3D rotational X-ray (needs the extra [conebeam])."""
@@ -61,4 +71,4 @@ def build(
     if problems:
         raise ValueError("; ".join(problems))
     scene = describe(name) if isinstance(name, str) else name
-    return make_study(scene, SCANNERS[scanner], wanted, truth_step_mm)
+    return insertion_into(prepare(scene, SCANNERS[scanner], wanted, truth_step_mm), 0)

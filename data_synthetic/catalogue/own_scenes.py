@@ -92,6 +92,8 @@ def steered(setup: Setup, first_mm: float, corridor_mm: float) -> Setup:
     return replace(setup, depths_mm=spread(first_mm, last, frames), rolls_deg=(best_roll,) * frames)
 
 
+SMALLEST = 16
+"""Voxels along an axis below which nothing can be found in a scan."""
 VESSEL_GREY = 1000.0
 """Grey values are stretched so that the vessel lies here: room for a brighter wire, and for noise below zero."""
 BACKGROUND_ENTRY_ARC_MM, CORRIDOR_MM = 1.0, 4.0
@@ -123,18 +125,36 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
 
 
 def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
-    """Grey values indexed x, y, z, and where they lie."""
-    image: Any = sitk.ReadImage(str(path))
+    """Grey values indexed x, y, z, and where they lie; ValueError for what is no volume of grey values."""
+    series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
+    try:
+        image: Any = sitk.ReadImage(series)
+    except RuntimeError:
+        allowed = "a file that SimpleITK reads, or a folder with one DICOM series"
+        raise ValueError(f"{path}: cannot be read as a volume; allowed: {allowed}; check the file") from None
+    size, channels = image.GetSize(), image.GetNumberOfComponentsPerPixel()
+    if len(size) != 3 or channels != 1 or min(size) < SMALLEST:
+        found = f"{len(size)} axes of {size} with {channels} value(s) per voxel"
+        raise ValueError(
+            f"{path}: {found}; allowed: one volume of grey values, {SMALLEST} voxels or more along each axis"
+        )
     values = np.ascontiguousarray(sitk.GetArrayFromImage(image).transpose(2, 1, 0), dtype=np.float32)
     spacing = np.array(image.GetSpacing()) if voxel_mm is None else np.full(3, voxel_mm)
     direction = np.array(image.GetDirection()).reshape(3, 3)
+    if not np.all(np.isfinite(values)) or values.min() == values.max():
+        raise ValueError(f"{path}: its grey values are NaN, infinite or all alike; allowed: a scan that shows a vessel")
     return values, ScanGrid(values.shape, spacing, np.array(image.GetOrigin()), direction)
 
 
 def _plan(values: Volume, grid: ScanGrid, threshold: float, frames: int) -> Setup:
     """Enter the vessel that is found, against the wall that the scan itself shows."""
-    vessel, way = find_way(values, grid, threshold)
+    try:
+        vessel, way = find_way(values, grid, threshold)
+    except (ValueError, IndexError):
+        why = "no vessel with an inlet and a way through it is found among the bright voxels"
+        raise ValueError(f"{why}; allowed: a contrast-filled vessel brighter than all around it; crop to it") from None
     box, part = _around(way, grid)
+    share = (grid.voxel_mm / 0.3) ** 2
     return Setup(
         Anatomy((way,)),
         way,
@@ -142,7 +162,8 @@ def _plan(values: Volume, grid: ScanGrid, threshold: float, frames: int) -> Setu
         spread(10.0, way.length_mm - BACKGROUND_ENTRY_ARC_MM, frames),
         (0.0,) * frames,
         grid.to_mm(0.5 * (np.array(grid.shape) - 1)),
-        greys=Greys(noise=40.0 * (grid.voxel_mm / 0.3) ** 2, correlation_voxels=0.5),
+        # a wire fills less of a larger voxel: it is made as much brighter, or it would drown in voxels of 0.5 mm
+        greys=Greys(noise=40.0 * share, wire=Greys.wire * max(share, 1.0), correlation_voxels=0.5),
         wall=iso_wall(np.where(vessel[box], values[box], 0.0).astype(np.float32), part, threshold),
     )
 

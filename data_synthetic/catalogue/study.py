@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from data_synthetic.catalogue.limits import Wanted
-from data_synthetic.catalogue.scene import NamedScene, ScannerFactory, Setup
+from data_synthetic.catalogue.scene import NamedScene, Scanner, ScannerFactory, Setup
 from data_synthetic.geometry import ScanGrid, normal_to, rotate, unit
 from data_synthetic.rod.replay import TrueFrame
 from data_synthetic.rod.truth import converged_truth
@@ -18,6 +18,8 @@ ENTRY_ERROR_VOXELS = 0.5
 """How far the manifest's entry is from the true one: what pointing at a scan achieves."""
 DIRECTION_ERROR_DEG = 2.0
 """How far the manifest's entry direction is from the true one."""
+ANEW_DEG, ANEW_MM = 45.0, 0.5
+"""How far roll and depths of a further insertion are from those of the first, either way: its aim is the same."""
 DEPTH_NOISE_MM = 0.2
 """sd of the manifest's insertion depths: reading a scale on the wire's shaft."""
 
@@ -46,33 +48,63 @@ class Study:
         return (self.frame(i) for i in range(len(self.truth)))
 
 
-def make_study(scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth_step_mm: float | None) -> Study:
-    """Build a scene; one in a real scan brings its own voxels and scanner. truth_step_mm : as in converged_truth."""
+class Plan(NamedTuple):
+    """What all insertions into a phantom share. at : the phantom shifted by mm, voxelised."""
+
+    scene: NamedScene
+    setup: Setup
+    grid: ScanGrid
+    seed: int
+    truth_step_mm: float | None
+    at: Callable[[tuple[float, ...]], Scanner]
+    reference: Scan
+
+
+def prepare(scene: NamedScene, scanner: ScannerFactory, wanted: Wanted, truth_step_mm: float | None = None) -> Plan:
+    """The phantom of a scene; one in a real scan brings its own voxels and scanner.
+
+    truth_step_mm : as in converged_truth.
+    """
     seed, (frames, size, voxel_mm) = wanted.seed, wanted.of(scene)
     setup = scene.setup(np.random.default_rng([seed, 1]), frames)
     grid, scanner = scene.scan or (scan_grid(setup, size, voxel_mm), scanner)
-    truth, quality = converged_truth(setup.insertion(), setup.depths_mm, setup.rolls_deg, truth_step_mm)
     # voxelising is done once per place of the phantom, the last one kept; moving it by +shift moves the grid by -shift
     at = lru_cache(maxsize=1)(lambda shift: scanner(setup, replace(grid, origin_mm=grid.origin_mm - np.array(shift))))
+    return Plan(scene, setup, grid, seed, truth_step_mm, at, at((0.0, 0.0, 0.0)).scan((), (seed, 2)))
 
-    def frame(number: int) -> Scan:
-        shift = np.zeros(3) if setup.motion_mm is None else setup.motion_mm[number]
-        shown = setup.visible is None or setup.visible[number]
-        wires: Wires = [(truth[number].points_mm, setup.wire.radius_mm)] if shown else []
-        return at(tuple(shift.tolist())).scan([*wires, *setup.others], (seed, 3, number))
 
+def insertion_into(plan: Plan, number: int) -> Study:
+    """An insertion into a phantom by its number; all but the first roll the wire anew."""
+    scene, seed, more = plan.scene, plan.seed, (number,) * bool(number)
+    setup = rolled_anew(plan.setup, np.random.default_rng([seed, 5, *more])) if number else plan.setup
+    truth, quality = converged_truth(setup.insertion(), setup.depths_mm, setup.rolls_deg, plan.truth_step_mm)
+
+    def frame(index: int) -> Scan:
+        shift = np.zeros(3) if setup.motion_mm is None else setup.motion_mm[index]
+        shown = setup.visible is None or setup.visible[index]
+        wires: Wires = [(truth[index].points_mm, setup.wire.radius_mm)] if shown else []
+        return plan.at(tuple(shift.tolist())).scan([*wires, *setup.others], (seed, 3, index, *more))
+
+    name = f"{scene.name}-{number + 1}" if number else scene.name
     return Study(
-        name=scene.name,
+        name=name,
         why=scene.why,
-        grid=grid,
-        reference=at((0.0, 0.0, 0.0)).scan((), (seed, 2)),
+        grid=plan.grid,
+        reference=plan.reference,
         truth=truth,
-        expected=scene.expected_statuses(frames),
-        manifest=describe_case(scene.name, setup, grid, np.random.default_rng([seed, 4])),
+        expected=scene.expected_statuses(len(truth)),
+        manifest=describe_case(name, setup, plan.grid, np.random.default_rng([seed, 4, *more])),
         quality=quality,
         setup=setup,
         frame=frame,
     )
+
+
+def rolled_anew(setup: Setup, rng: np.random.Generator) -> Setup:
+    """The same way in with the wire taken in hand anew: another roll, depths a little off."""
+    turn, moved = rng.uniform(-ANEW_DEG, ANEW_DEG), rng.uniform(-ANEW_MM, ANEW_MM)
+    depths = tuple(depth + moved for depth in setup.depths_mm)
+    return replace(setup, depths_mm=depths, rolls_deg=tuple(roll + turn for roll in setup.rolls_deg))
 
 
 def scan_grid(setup: Setup, size: int, voxel_mm: float) -> ScanGrid:

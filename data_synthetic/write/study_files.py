@@ -4,7 +4,7 @@ import contextlib
 import json
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from data_synthetic.catalogue.study import Study
 from data_synthetic.write.volumes import FORMATS, HDF5_FILE, manifest_names, volume_names, write_volume
 
 MANIFEST, TRUTH = "manifest.toml", "truth.json"
+ALL_OF_THEM = "insertions into one phantom"
 
 
 def earlier_files(folder: Path) -> list[Path]:
@@ -86,6 +87,27 @@ def write_study(study: Study, folder: str | Path, format: str = "mha", progress:
     return manifest
 
 
+def write_one_of(study: Study, folder: Path, number: int, format: str = "mha") -> str:
+    """Write an insertion of several as a study in a folder of its own; its part of the manifest of all of them."""
+    write_study(study, folder / str(number), format)
+    return manifest_text(study, format, f"{number}/", wires=number == 1)
+
+
+def write_all_of_them(texts: Sequence[str], folder: Path) -> Path:
+    """Write the manifest of all insertions into one phantom. texts : of ``write_one_of``, in order."""
+    manifest = folder / MANIFEST
+    manifest.write_text("\n".join([f"# {ALL_OF_THEM}: {len(texts)}", *texts]), encoding="utf-8")
+    return manifest
+
+
+def alone(folder: Path) -> list[str]:
+    """A sentence where the folder holds another manifest than one of several insertions."""
+    manifest = folder / MANIFEST
+    if not manifest.exists() or ALL_OF_THEM in manifest.read_text(encoding="utf-8"):
+        return []
+    return [f"{manifest}: is not of several insertions; give another folder"]
+
+
 def truth_record(study: Study) -> dict[str, Any]:
     """What truth.json holds. points_mm lie in the phantom as the reference scan shows it."""
     frames = [
@@ -113,13 +135,14 @@ def truth_record(study: Study) -> dict[str, Any]:
     }
 
 
-def manifest_text(study: Study, format: str) -> str:
-    """The manifest of a study as TOML."""
+def manifest_text(study: Study, format: str, below: str = "", *, wires: bool = True) -> str:
+    """The manifest of a study as TOML. below : its folder as seen from there; wires : with their tables."""
     case = dict(study.manifest["case"])
     wall = case.pop("wall")
-    case |= {**manifest_names(format, len(study.truth)), "truth": TRUTH}
-    lines = [f"# {study.why}", "schema = 1", ""]
-    for name, wire in study.manifest["wires"].items():
+    names = {**manifest_names(format, len(study.truth)), "truth": TRUTH}
+    case |= {key: [below + name for name in n] if isinstance(n, list) else below + n for key, n in names.items()}
+    lines = [f"# {study.why}", "schema = 1", ""] * wires
+    for name, wire in study.manifest["wires"].items() if wires else ():
         lines += [f"[wires.{name}]", *_table(wire), ""]
     lines += ["[[case]]", *_table(case), "", "[case.wall]", *_table(wall), ""]
     return "\n".join(lines)

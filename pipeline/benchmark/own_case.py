@@ -1,10 +1,10 @@
 """A user's own study as a scene of the benchmark: its lumen, its wire, its depth."""
 
 from pipeline.benchmark.scenes import BenchScene
+from pipeline.run.cache import Store, default_root
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import each_frame
-from pipeline.run.store import Store, default_root
 from pipeline.simulate import guide_wire
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
@@ -30,7 +30,7 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         entry_mm=case.entry_mm,
         direction=case.entry_direction,
         material_axis=case.material_axis,
-        roll_deg=each_frame(case.roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
+        roll_deg=each_frame(case.stated_roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
         guide_wire=guide_wire(case.wire, config.solver.segment_mm, config.simulate.bending_scale),
         wall_stiffness=case.wall.stiffness_N_mm2,
         friction=case.wall.friction,

@@ -8,7 +8,7 @@ from pipeline.benchmark.claims import CLAIMS_CSV, ORDERS_CSV
 from pipeline.benchmark.cost import SOLVER_CSV
 from pipeline.benchmark.peers.run import PEERS_CSV
 from pipeline.benchmark.stress.run import STRESS_CSV
-from pipeline.run.provenance import collect
+from pipeline.run.provenance import code_state, this_run
 from reports.bench import render_bench
 from reports.schema import BENCH
 
@@ -23,7 +23,7 @@ NOTE = (
 
 def machine() -> str:
     """Processor, number of cores and versions in one sentence."""
-    found = collect()
+    found = code_state() | this_run()
     versions = ", ".join(f"{name} {found['versions'][name]}" for name in ("numpy", "numba"))
     dirty = " with uncommitted changes" if found["git_dirty"] else ""
     return (

@@ -6,6 +6,7 @@ inside ``main``, so that --help is instant.
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pipeline.study.settings import Resolved, Setting
 
-VERBS = ("check", "run", "report", "diff", "synth", "bench", "cache")
+VERBS = ("check", "init", "run", "score", "calibrate", "report", "diff", "settings", "synth", "bench", "cache")
 """In the order of --help."""
 
 
@@ -22,6 +23,13 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("-c", "--config", type=Path, action="append", default=[], metavar="CFG", help="settings (TOML)")
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
+
+
+def add_verbosity(parser: argparse.ArgumentParser) -> None:
+    """-q and -v."""
+    how = parser.add_mutually_exclusive_group().add_argument
+    how("-q", "--quiet", action="store_true", help="print the result alone")
+    how("-v", "--verbose", action="store_true", help="print every step, those of the simulation too")
 
 
 def settings_of(args: argparse.Namespace) -> "list[Setting]":
@@ -45,6 +53,25 @@ def complain(problems: Sequence[str], what: str) -> int:
         sys.stderr.write(f"{problem}\n")
     sys.stderr.write(f"{len(problems)} problem{'s' * (len(problems) != 1)} in {what}; nothing was run\n")
     return 2
+
+
+def unwritable(place: Path, option: str) -> list[str]:
+    """Why nothing can be written at a place (a folder, or a file to be); empty where something can.
+
+    Tried with a folder that goes again, in the nearest one that exists: permissions alone do not tell.
+    """
+    try:
+        if option == "-o" and place.exists() and not place.is_dir():
+            return [f"{option} {place}: this is a file; name a folder"]
+        if option != "-o" and place.is_dir():
+            return [f"{option} {place}: this is a folder; name a file"]
+        nearest = next(one for one in (place, *place.absolute().parents) if one.exists())
+        if option != "-o" and nearest == place:
+            nearest = place.parent
+        with tempfile.TemporaryDirectory(prefix=".tmp-", dir=nearest):
+            return []
+    except OSError as error:
+        return [f"{option} {place}: cannot be written: {error.strerror or error}; name a place where you may write"]
 
 
 def say(text: str) -> None:

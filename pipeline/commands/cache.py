@@ -1,29 +1,50 @@
-"""``wireval cache --info | --prune``: the stage store."""
+"""``wireval cache --info | --check | --limit SIZE | --prune``: the stage store."""
 
 import argparse
+import re
+import sys
 
-from pipeline.commands import say
+from pipeline.commands import complain, say
 
 HELP = "the stage store"
+UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--info", action="store_true", help="where the stage store lies and how large it is")
+    action.add_argument("--check", action="store_true", help="read every result; remove those that are not whole")
+    action.add_argument("--limit", metavar="SIZE", help="how large it may grow (20G, 500M): the oldest used go first")
     action.add_argument("--prune", action="store_true", help="empty it")
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0."""
-    from pipeline.run.store import Store, default_root
+    """Exit 0; 1 where the check finds a damaged result, 2 for a size that is none."""
+    from pipeline.run.cache import Store, default_root
 
     store = Store(default_root())
-    if args.prune:
-        count, size = store.prune()
+    if args.check:
+        whole, damaged = store.check()
+        for path in damaged:
+            sys.stderr.write(f"{path}: not as it was written; removed, the next run computes it again\n")
+        say(f"{store.root}: {whole} stage results are whole, {len(damaged)} were not")
+        return 1 if damaged else 0
+    if args.limit is not None:
+        limit = _bytes(args.limit)
+        if limit is None:
+            return complain([f"--limit {args.limit!r}: expected a size as in 20G or 500M"], "the command line")
+        store.set_limit(limit)
+    if args.prune or args.limit is not None:
+        count, size = store.trim(0 if args.prune else None)
         say(f"removed {count} stage results, {size / 2**20:.1f} MiB, from {store.root}")
-    else:
-        entries = store.entries()
-        size = sum(p.stat().st_size for p in entries)
-        say(f"{store.root}: {len(entries)} stage results, {size / 2**20:.1f} MiB")
+    entries = store.entries()
+    taken = sum(size for _, size, _ in entries) / 2**20
+    say(f"{store.root}: {len(entries)} stage results, {taken:.1f} MiB of at most {store.limit / 2**30:g} GiB")
     return 0
+
+
+def _bytes(text: str) -> int | None:
+    """A size in bytes; None for what is no size."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
+    return int(float(found[1]) * UNITS.get(found[2].upper(), 1)) if found else None

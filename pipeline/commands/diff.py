@@ -1,12 +1,19 @@
-"""``wireval diff OUT_A OUT_B``: paired differences, the gate for CI."""
+"""``wireval diff OUT_A OUT_B``: what differs, the verdict with paired intervals, frame by frame: the gate for CI."""
 
 import argparse
 import tomllib
 from pathlib import Path
+from typing import Any
 
-from pipeline.commands import complain, say
+from pipeline.commands import say, unwritable
 
 HELP = "paired differences of two outputs; exit 1 on a regression"
+FILES = {
+    "json": "the verdict for programs",
+    "markdown": "tables for a pull request",
+    "junit": "a JUnit summary, one test per frame",
+    "html": "a page",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,24 +22,50 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("first", type=Path, metavar="OUT_A", help="the baseline")
     add("second", type=Path, metavar="OUT_B", help="the candidate")
     add("--tolerance", type=Path, metavar="T", help="TOML, column = allowed increase; a default ships")
+    for name, what in FILES.items():
+        add(f"--{name}", type=Path, metavar="FILE", help=f"write {what}")
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression, 2 on wrong input."""
-    import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
-    from reports.diff import DEFAULT_TOLERANCE, diff_folders, load_tolerance
+    """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression; InputError on wrong input."""
+    from pipeline.run.launch import UsageError
 
+    places = {name: getattr(args, name) for name in FILES}
+    problems = [text for name, path in places.items() if path for text in unwritable(path, f"--{name}")]
+    if problems:
+        raise UsageError(problems)
     try:
-        if not args.second.is_dir():
-            raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")
-        tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
-        difference = diff_folders(args.first, args.second, tolerance)
+        verdict = _verdict(args)
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
-        return complain([str(error)], "the two outputs")
-    if len(difference.by_column):
-        say(difference.by_column.to_string(index=False, float_format="{:.4g}".format))
-    bad = difference.regressions
-    if len(bad):
-        say(bad.to_string(index=False, float_format="{:.4g}".format, max_rows=30))
-    say(difference.sentence)
-    return 1 if len(bad) else 0
+        raise UsageError([str(error)]) from None
+    verdict.write(**places)
+    for line in verdict.lines():
+        say(line)
+    return 1 if verdict.closed else 0
+
+
+def _verdict(args: argparse.Namespace) -> Any:
+    """Both folders read and compared; ValueError where they cannot be."""
+    import pandas as pd
+
+    import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
+    from pipeline.run.overall import found_cases, overall, ratio
+    from reports.diff import DEFAULT_TOLERANCE, RATIO, diff_folders, load_tolerance
+    from reports.origin import what_differs
+    from reports.schema import SUMMARY
+    from reports.two_runs import Verdict
+
+    if not args.second.is_dir():
+        raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")
+    tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
+    allowed = 1.0 + tolerance.get(RATIO, float("inf"))
+    frames = diff_folders(args.first, args.second, tolerance)
+    before, after = found_cases(args.first), found_cases(args.second)
+    old, new = overall(before), overall(after)
+    names = [column.name for column in SUMMARY if column.better and column.name in old and column.name in new]
+    rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
+    pooled = [row for row in rows if row["before"] != row["after"] and pd.notna(row["before"])]
+    paired = ratio(before, after)
+    worse = paired is not None and paired.low > allowed
+    differs = what_differs(args.first, args.second)
+    return Verdict(differs, pooled, paired.verdict if paired else "", worse, frames)

@@ -1,15 +1,18 @@
 """``wireval run MANIFEST -o OUT``: the whole pipeline over every case."""
 
 import argparse
+import math
+import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from pipeline.commands import add_settings, complain, resolved_settings, say, settings_of
+from pipeline.commands import add_settings, add_verbosity, resolved_settings, say, settings_of
+from pipeline.commands.given import add_manifest, given
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
-    from pipeline.study.manifest import Manifest
+    from pipeline.run.workers import Limits
 
 HELP = "the whole pipeline: scans in, errors and a report out"
 
@@ -17,110 +20,97 @@ HELP = "the whole pipeline: scans in, errors and a report out"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     add = parser.add_argument
-    add("manifest", type=Path, metavar="MANIFEST", help="manifest.toml, or a folder of scans (one case)")
+    add_manifest(parser)
     add("-o", "--out", type=Path, required=True, metavar="OUT", help="output folder")
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add("--case-timeout", type=float, default=math.inf, metavar="S", help="seconds that a case may take")
+    add("--case-memory", type=float, default=math.inf, metavar="MIB", help="MiB of memory that a case may take")
     add("--shard", default="", metavar="I/N", help="only the I-th of N parts of the cases; merge with cp -r")
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
     add("--executor", default="", metavar="ADDRESS", help="tcp://host:port of a dask scheduler")
-    add("--resume", action="store_true", help="go on in an OUT made from another manifest")
+    add("--resume", action="store_true", help="go on in an OUT made from another manifest or with other settings")
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame")
+    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
+    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
+    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither read nor write the stage store")
-    folder = parser.add_argument_group("where MANIFEST is a folder of scans").add_argument
-    folder("--entry", metavar="X,Y,Z", help="LPS mm, where the wire enters the lumen")
-    folder("--direction", metavar="X,Y,Z", help="where the wire points at the entry")
-    folder("--wire-radius", type=float, metavar="MM", help="outer radius of the wire")
+    add_verbosity(parser)
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 all ok, 1 some case failed, 2 input wrong."""
-    from pipeline.load import LoadError
+    """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
+    from pipeline.run.gate import gate
     from pipeline.run.launch import failure_lines, intention, last_line, launch
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from reports.inside import links_out
 
-    try:
-        plan = _plan(args)
-    except InputError as error:
-        return complain(error.problems, error.place or str(args.manifest))
-    except LoadError as error:
-        return complain([str(error)], "the command line")
-    problems = check(plan.cases, plan.template.settings.config)
+    gates = [gate(text) for text in args.fail_if]
+    plan = _plan(args)
+    problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
     if problems:
-        return complain(problems, str(args.manifest))
+        raise InputError(problems)
     if args.dry_run:
         for line in intention(plan):
             say(line)
         return 0
     totals, index = launch(plan, junit=args.junit)
-    for line in failure_lines(plan):
+    closed = [sentence for one in gates if (sentence := one.closed(totals.pooled))]
+    for line in [*failure_lines(plan), *closed]:
         sys.stderr.write(f"{line}\n")
     say(last_line(totals, index))
-    return 0 if totals.all_ok else 1
+    return 0 if totals.all_ok and not closed else 1
 
 
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
+    from pipeline.run.cache import default_root
+    from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, points_of
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
     from pipeline.run.log import STAGES
-    from pipeline.run.store import default_root
+    from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
 
-    manifest, assumptions = _manifest(args)
+    if args.executor:  # workers elsewhere know nothing of this process's working folder
+        args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
+    manifest, assumptions = given(args, None if args.dry_run else args.out)
     settings = resolved_settings(args)
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    limits = _limits(args)
     cache = None if args.no_cache else default_root()
-    template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, args.embed)
+    how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
+    template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    cases = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
+    for note in notes:
+        say(note)
     if not (args.resume or args.fresh):
-        guard_out(args.out, manifest.path)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, args.shard, assumptions)
+        guard_out(args.out, manifest.path, settings)
+    notes = (*assumptions, *notes)
+    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 
-def _manifest(args: argparse.Namespace) -> "tuple[Manifest, tuple[str, ...]]":
-    """The manifest as given, or inferred from a folder of scans and printed."""
-    from pipeline.study.infer import infer_manifest
-    from pipeline.study.manifest import read_manifest
-    from reports.atomic import write_text
-
-    path: Path = args.manifest
-    if path.is_dir() and (path / "manifest.toml").exists():
-        path = path / "manifest.toml"
-    if not path.is_dir():
-        return read_manifest(path), ()
-    entry, direction = _vector(args.entry, "--entry"), _vector(args.direction, "--direction")
-    load = resolved_settings(args).config.load
-    text, assumptions = infer_manifest(path, entry, direction, args.wire_radius, load)
-    say(text)
-    for note in assumptions:
-        say(f"assumed: {note}")
-    written = args.out / "manifest.inferred.toml"
-    write_text(written, text)
-    return read_manifest(written), assumptions
-
-
-def _vector(text: str | None, name: str) -> Any:
-    import numpy as np
-
+def _limits(args: argparse.Namespace) -> "Limits":
+    """What a case may take."""
     from pipeline.run.launch import UsageError
+    from pipeline.run.workers import Limits, resident_mib
 
-    if text is None:
-        return None
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.zeros(0)
-    if values.shape != (3,):
-        raise UsageError([f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"])
-    return values
+    limits = Limits(args.case_timeout, args.case_memory)
+    for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
+        if not value > 0:
+            raise UsageError([f"{name} {value:g}: expected a number over 0"])
+    if limits.any and args.executor:
+        raise UsageError(["--case-timeout and --case-memory hold on this machine; a cluster's workers have their own"])
+    if limits.memory_mib < math.inf and not resident_mib(os.getpid()):
+        raise UsageError(["--case-memory: this system does not tell what a process takes (no /proc)"])
+    return limits

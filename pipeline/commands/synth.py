@@ -16,19 +16,30 @@ def add_arguments(parser: ArgumentParser) -> None:
     """What may follow the verb."""
     add = parser.add_argument
     add("name", nargs="?", metavar="NAME", help="a scene of the catalogue; --list names them")
-    add("-o", "--out", type=Path, metavar="DIR")
+    add("-o", "--out", type=Path, metavar="DIR", help="folder for the study")
     add("--list", action="store_true", help="name the scenes, each with its reason")
     add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii")
     add("--background", type=Path, metavar="VOLUME", help="paint a wire into this real scan")
-    add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"))
-    add("--frames", type=int, metavar="N")
+    add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"), help="of the scans (default mha)")
+    add("--frames", type=int, metavar="N", help="scans with the wire; each scene has its own number")
+    add(
+        "--insertions",
+        type=int,
+        default=1,
+        metavar="N",
+        help="into the same phantom, each rolled anew, in one manifest",
+    )
+    add("-j", "--jobs", type=int, default=1, metavar="N", help="insertions made at once (default 1)")
     add("--size", type=int, metavar="N", help="voxels along each axis")
-    add("--voxel-mm", type=float, metavar="V")
-    add("--seed", type=int, default=0, metavar="S")
-    add("--scanner", default="psf", choices=("psf", "conebeam"))
+    add("--voxel-mm", type=float, metavar="V", help="size of a voxel")
+    add("--seed", type=int, default=0, metavar="S", help="of what is drawn at random (default 0)")
+    add(
+        "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
+    )
 
 
 if TYPE_CHECKING:
+    from data_synthetic.catalogue import Wanted
     from data_synthetic.catalogue.scene import NamedScene
 
 
@@ -48,6 +59,8 @@ def _problems(args: Namespace) -> list[str]:
         return ["give one of NAME (--list shows them), --anatomy FILE and --background VOLUME"]
     if args.name is not None and args.name not in catalogue.names():
         return [f"no scene {args.name!r}; {did_you_mean(args.name, catalogue.names())}"]
+    if args.insertions < 1 or args.jobs < 1:
+        return [f"--insertions {args.insertions} -j {args.jobs}: expected 1 or more"]
     if args.name is None and args.scanner != "psf":
         return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]
     for path in (args.anatomy, args.background):
@@ -77,6 +90,8 @@ def main(args: Namespace) -> int:
     problems = _problems(args)
     if problems:
         return complain(problems, "the command line")
+    if args.insertions > 1:
+        return _several(args)
     clock = perf_counter()
     numbers = {"frames": args.frames, "size": args.size, "voxel_mm": args.voxel_mm, "seed": args.seed}
     try:
@@ -99,3 +114,46 @@ def main(args: Namespace) -> int:
     manifest = write_study(study, args.out, format=args.format, progress=_progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
+
+
+def _several(args: Namespace) -> int:
+    """Several insertions into one phantom, shared out among processes; as ``main``."""
+    from concurrent.futures import ProcessPoolExecutor
+    from functools import partial
+
+    from data_synthetic.write import alone, in_the_way, write_all_of_them
+
+    clock = perf_counter()
+    try:
+        scene = _scene(args)
+        frames = args.frames or scene.frames
+        problems = _wanted(args).problems(scene, args.scanner) + alone(args.out)
+        problems += [p for n in range(args.insertions) for p in in_the_way(args.out / str(n + 1), args.format, frames)]
+    except ValueError as error:
+        problems = [str(error)]
+    if problems:
+        return complain(problems, "the command line")
+    shares = [range(first, args.insertions, args.jobs) for first in range(min(args.jobs, args.insertions))]
+    with ProcessPoolExecutor(len(shares)) as pool:
+        parts = {number: text for part in pool.map(partial(_share, args), shares) for number, text in part.items()}
+    manifest = write_all_of_them([parts[number] for number in sorted(parts)], args.out)
+    say(f"{scene.name}: {len(parts)} insertions written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
+    return 0
+
+
+def _wanted(args: Namespace) -> "Wanted":
+    from data_synthetic.catalogue import Wanted
+
+    return Wanted(args.frames, args.size, args.voxel_mm, args.seed)
+
+
+def _share(args: Namespace, numbers: range) -> dict[int, str]:
+    """A process's share of the insertions, written; their parts of the manifest."""
+    from data_synthetic import catalogue
+    from data_synthetic.write import write_one_of
+
+    plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
+    for number in numbers:
+        written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
+        sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
+    return written

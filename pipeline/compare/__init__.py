@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays.polyline import resample
+from pipeline.arrays.polyline import at_arc, samples
+from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
-from pipeline.compare.metrics import METRICS, Pair, measured, pair_of, point_to_curve, rms
-from pipeline.model import Array, Curve, Lumen
-from solver import Solution
+from pipeline.compare.metrics import METRICS, Pair, Simulated, Way, measured, pair_of, point_to_curve, rms, scored
+from pipeline.model import Array, Curve, Lumen, arc_length
 
 __all__ = ["Comparison", "compare", "compare_truth", "point_to_curve", "rms"]
 
@@ -29,15 +29,21 @@ class Comparison(Pair):
         return self.values[name]
 
 
-def compare(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig()) -> Comparison:
-    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError."""
-    pair = pair_of(simulated, traced, lumen, config)
+def compare(
+    simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig = CompareConfig(), way: Way | None = None
+) -> Comparison:
+    """Errors of one simulated wire against the traced one; refuses an empty curve with ValueError.
+
+    way : the vessel's axis and branches, which all frames share; without it there are the lumen's branches and no axis.
+    """
+    start = traced.points_mm[:1] if len(traced.points_mm) else np.zeros((1, 3))
+    pair = pair_of(simulated, traced, lumen, config, way or Way(None, branches_of(lumen.distance, start[0])))
     values = {name: measured(name, metric, pair) for name, metric in METRICS.items()}
     return Comparison(**vars(pair), values=values)
 
 
 def compare_truth(
-    truth_mm: Array, traced: Curve | None, simulated: Solution | None, config: CompareConfig = CompareConfig()
+    truth_mm: Array, traced: Curve | None, simulated: Simulated | None, config: CompareConfig = CompareConfig()
 ) -> dict[str, float]:
     """Synthetic studies only: errors of both curves against the true wire by their columns' names, mm.
 
@@ -49,12 +55,13 @@ def compare_truth(
         values |= {"trace_mean_mm": float(distance.mean()), "trace_max_mm": float(distance.max())}
         values["trace_tip_mm"] = tip
     if simulated is not None and len(simulated.joints_mm) > 1:
-        distance, tip = _against(simulated.joints_mm, truth_mm, config.sample_mm)
+        distance, tip = _against(simulated.joints_mm, truth_mm, config.sample_mm, config.skip_mm)
         values |= {"truth_rms_mm": rms(distance), "truth_tip_mm": tip}
     return values
 
 
-def _against(curve: Array, truth: Array, step_mm: float) -> tuple[Array, float]:
-    """Distances of equal steps along a curve to the true wire, and between the tips."""
-    distance, _ = point_to_curve(resample(curve, step_mm), truth)
+def _against(curve: Array, truth: Array, step_mm: float, skip_mm: float = 0.0) -> tuple[Array, float]:
+    """Distances of equal steps along a curve, behind the clamp's reach, to the true wire, and between the tips."""
+    arc = scored(samples(float(arc_length(curve)[-1]), step_mm), skip_mm)
+    distance, _ = point_to_curve(at_arc(curve, arc), truth)
     return distance, float(np.linalg.norm(curve[-1] - truth[-1]))

@@ -2,14 +2,17 @@
 
 from dataclasses import dataclass
 
-from pipeline.ranges import Count, Positive
+from pipeline.ranges import Millimetres, Step
 
 
 @dataclass(frozen=True)
 class CompareConfig:
     """How curves are compared."""
 
-    sample_mm: Positive = 0.5
+    sample_mm: Step = 0.5
     """Arc-length step at which both curves are sampled, so that segment lengths cannot flatter."""
-    bootstrap: Count = 2000
-    """Resamples behind the 95 % intervals; 0 leaves them out."""
+    skip_mm: Millimetres = 10.0
+    """Length of wire behind the entry that no score counts, since the clamp was fitted there."""
+    simulated_nulls: bool = True
+    """Whether simulators without the roll and without the tip's curve are among the predictors, and entries.csv is
+    written: 17 more insertions."""

@@ -10,12 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.arrays.polyline import angle_deg, at_arc, resample, samples, tip_tangent
+from pipeline.arrays.polyline import angle_deg, at_arc, samples, tip_tangent
+from pipeline.compare.branches import Branches
 from pipeline.compare.config import CompareConfig
-from pipeline.model import Array, Curve, Lumen, arc_length
+from pipeline.model import Array, Curve, Lumen, OtherWire, arc_length
 from reports.schema import ERRORS, Column
 from solver import Solution
 
+Simulated = Solution | OtherWire
+COVERED_MM = 1.0
+"""A point of the traced curve counts as covered where the simulated wire is no farther away."""
+TANGENT_MM = 1.0
+"""The vessel's direction at the tip is that of its axis from so much before the tip's foot to so much behind it."""
+OFF_AXIS_MM = 0.1
+"""Nearer to the vessel's axis nobody knows on which side of it a wire lies: a third of a voxel."""
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB
 
 
@@ -59,14 +67,23 @@ def point_to_curve(points: ArrayLike, curve: ArrayLike) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
+class Way:
+    """What is known of the vessel beside its wall: its axis (k, 3) to the deepest tip, or None, and its branches."""
+
+    axis_mm: Array | None
+    branches: Branches
+
+
+@dataclass(frozen=True, eq=False)
 class Pair:
     """A simulated wire and the traced curve of the same frame.
 
     wire_mm (k, 3), curve_mm (m, 3) : joints and points, entry to tip.     curve_length_mm : of the traced curve.
-    sample_mm (n, 3), arc_mm (n,) : equal steps along the wire, so that neither the segment length nor the density of
-    the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve, and where along it that is.
-    back_mm : distances the other way, from equal steps along the curve to the wire.     by_arc_mm : distances between
-    points of equal arc length.     lumen : the vessel.     max_penetration_mm : the wire's, of the soft wall.
+    sample_mm (n, 3), arc_mm (n,) : equal steps along the wire behind the clamp's reach, so that neither the segment
+    length nor the density of the trace can flatter.     error_mm, foot_arc_mm (n,) : distance of each to the curve,
+    and where along it that is.     back_mm : distances the other way, from equal steps along the curve, behind the
+    reach, to the wire.     by_arc_mm : distances between points of equal arc length.     lumen : the vessel.
+    way : the vessel's axis and branches.
     """
 
     wire_mm: Array
@@ -79,18 +96,29 @@ class Pair:
     back_mm: Array
     by_arc_mm: Array
     lumen: Lumen
-    max_penetration_mm: float
+    way: Way
 
 
 Metric = Callable[[Pair], float | bool]
+SHORT_MM = 2.0
 
 
-def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareConfig) -> Pair:
+def scored(arc_mm: Array, skip_mm: float) -> Array:
+    """The arc lengths that count of a wire's (n,): those behind the clamp's reach, where the clamp was fitted.
+
+    Of a wire that is hardly longer than that, the last 2 mm; of one shorter than 4 mm, the last half.
+    """
+    length = float(arc_mm[-1])
+    return np.asarray(arc_mm[arc_mm >= min(skip_mm, max(length - SHORT_MM, 0.5 * length)) - 1e-9])
+
+
+def pair_of(simulated: Simulated, traced: Curve, lumen: Lumen, config: CompareConfig, way: Way) -> Pair:
     """Sample both curves and measure their distances; ValueError where one of them is empty."""
     wire, curve = simulated.joints_mm, traced.points_mm
     if len(curve) < 2 or len(wire) < 2:
         raise ValueError(f"compare: got {len(wire)} simulated joints and {len(curve)} traced points, need 2 of each")
-    arc = samples(float(arc_length(wire)[-1]), config.sample_mm)
+    arc = scored(samples(float(arc_length(wire)[-1]), config.sample_mm), config.skip_mm)
+    back = at_arc(curve, scored(samples(traced.length_mm, config.sample_mm), config.skip_mm))
     points = at_arc(wire, arc)
     error, foot = point_to_curve(points, curve)
     common = arc[arc <= traced.length_mm + 1e-9]
@@ -102,10 +130,10 @@ def pair_of(simulated: Solution, traced: Curve, lumen: Lumen, config: CompareCon
         arc,
         error,
         foot,
-        back_mm=point_to_curve(resample(curve, config.sample_mm), wire)[0],
+        back_mm=point_to_curve(back, wire)[0],
         by_arc_mm=np.linalg.norm(at_arc(wire, common) - at_arc(curve, common), axis=1),
         lumen=lumen,
-        max_penetration_mm=simulated.max_penetration_mm,
+        way=way,
     )
 
 
@@ -115,16 +143,52 @@ def rms(values: ArrayLike) -> float:
     return float(np.sqrt(np.mean(array**2))) if array.size else float("nan")
 
 
-def same_branch(pair: Pair) -> bool:
-    """Whether the straight line between the tips stays in the lumen to half a voxel and what the wall gave way.
+def distal(pair: Pair, length_mm: float) -> float:
+    """Root mean square of the point errors of the wire's last ``length_mm``, as far as they count; mm."""
+    return rms(pair.error_mm[pair.arc_mm >= pair.arc_mm[-1] - length_mm - 1e-9])
 
-    Two wires in one vessel see each other; between two branches there is a wall.
-    """
-    grid, start, end = pair.lumen.distance, pair.wire_mm[-1], pair.curve_mm[-1]
-    chord = start + np.linspace(0.0, 1.0, 33)[:, None] * (end - start)
-    index = np.clip(np.rint(grid.to_index(chord)).astype(int), 0, np.array(grid.shape) - 1)
-    slack = 0.5 * float(grid.spacing_mm.max()) + pair.max_penetration_mm
-    return bool(np.max(grid.values[tuple(index.T)]) <= slack)
+
+def same_branch(pair: Pair) -> bool:
+    """Whether both tips lie in one branch of the lumen's graph; where branches meet, all of them are one."""
+    first, second = (pair.way.branches.at(curve[-1]) for curve in (pair.wire_mm, pair.curve_mm))
+    return bool(first & second)
+
+
+def tip_offset(pair: Pair) -> tuple[float, float]:
+    """The simulated tip from the traced one, mm: along the vessel (positive: deeper), across it; NaN without axis."""
+    axis = pair.way.axis_mm
+    if axis is None or len(axis) < 2:
+        return float("nan"), float("nan")
+    offset, place = pair.wire_mm[-1] - pair.curve_mm[-1], point_to_curve(pair.curve_mm[-1], axis)[1]
+    last = float(arc_length(axis)[-1])
+    ends = at_arc(axis, np.clip([place[0] - TANGENT_MM, place[0] + TANGENT_MM], 0.0, last))
+    tangent = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    along = float(offset @ tangent)
+    return along, float(np.linalg.norm(offset - along * tangent))
+
+
+def depth_offset(pair: Pair) -> float:
+    """How much deeper the simulated wire lies along itself, mm: mean of the part along the trace at equal arc."""
+    arc = pair.arc_mm[: len(pair.by_arc_mm)]
+    if len(arc) < 2:
+        return float("nan")
+    wire, curve = at_arc(pair.wire_mm, arc), at_arc(pair.curve_mm, arc)
+    tangent = np.gradient(curve, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
+    return float(np.mean(np.sum((wire - curve) * tangent, axis=1)))
+
+
+def side_agrees(pair: Pair) -> float:
+    """Share of the points, of those where both wires lie 0.1 mm or more off the axis, at which they lie on one side."""
+    axis = pair.way.axis_mm
+    if axis is None or len(axis) < 2:
+        return float("nan")
+    arc = pair.arc_mm[: len(pair.by_arc_mm)]
+    curves = [at_arc(curve, arc) for curve in (pair.wire_mm, pair.curve_mm)]
+    feet = [at_arc(axis, point_to_curve(points, axis)[1]) for points in curves]
+    first, second = (points - foot for points, foot in zip(curves, feet, strict=True))
+    known = np.minimum(np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)) >= OFF_AXIS_MM
+    return float(np.mean(np.sum(first * second, axis=1)[known] > 0)) if known.any() else float("nan")
 
 
 OF_POINTS: dict[str, Callable[[Array], float]] = {
@@ -136,14 +200,20 @@ OF_POINTS: dict[str, Callable[[Array], float]] = {
 """Statistics of point errors: of one frame's points, and pooled over all points of a case alike."""
 METRICS: dict[str, Metric] = {
     **{name: lambda pair, of=of: of(pair.error_mm) for name, of in OF_POINTS.items()},  # type: ignore[misc]
+    "distal10_rms_mm": lambda pair: distal(pair, 10.0),
+    "distal20_rms_mm": lambda pair: distal(pair, 20.0),
     "back_rms_mm": lambda pair: rms(pair.back_mm),
     "hausdorff_mm": lambda pair: float(max(pair.error_mm.max(), pair.back_mm.max())),
     "arc_rms_mm": lambda pair: rms(pair.by_arc_mm),
-    "arc_max_mm": lambda pair: float(pair.by_arc_mm.max()),
+    "arc_max_mm": lambda pair: float(pair.by_arc_mm.max(initial=0.0)) if len(pair.by_arc_mm) else float("nan"),
     "tip_mm": lambda pair: float(np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1])),
     "tip_angle_deg": lambda pair: angle_deg(tip_tangent(pair.wire_mm), tip_tangent(pair.curve_mm)),
     "branch_ok": same_branch,
-    "coverage": lambda pair: min(1.0, float(pair.arc_mm[-1]) / pair.curve_length_mm),
+    "tip_along_mm": lambda pair: tip_offset(pair)[0],
+    "tip_across_mm": lambda pair: tip_offset(pair)[1],
+    "depth_offset_mm": depth_offset,
+    "side_ok": side_agrees,
+    "coverage": lambda pair: float(np.mean(pair.back_mm <= COVERED_MM)),
 }
 
 

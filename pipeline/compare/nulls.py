@@ -1,18 +1,22 @@
 """Trivial predictors: what anybody would guess without a simulator. Skill is measured against them.
 
-All but ``previous`` are told where the wire ends up (the deepest traced tip), which a simulator is not: beating them is
-not easy, and that is the point. ``register`` adds one, with its column.
+The paths are told where the wire ends up (the deepest traced tip), which a simulator is not: beating them is not easy,
+and that is the point. Those in ``TOLD`` see something of the frame itself, or of a later one: they are printed beside
+the others, and skill is never measured against them. ``register`` adds one, with its column.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from skimage.graph import MCP_Geometric
 
-from pipeline.arrays.polyline import smooth, to_length
-from pipeline.compare.metrics import point_to_curve, rms
+from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
+from pipeline.compare.branches import branches_of
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import Way, point_to_curve, rms, scored
+from pipeline.compare.pinned import pinned
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
 from solver import Grid, GuideWire, VesselWall, relax
@@ -64,13 +68,37 @@ class Clues:
         return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
 
     @cached_property
+    def way(self) -> Way:
+        """The vessel's axis and its branches around the traced wires."""
+        return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
+
+    @cached_property
+    def straight_wire(self) -> GuideWire:
+        """A wire that only wants to be straight."""
+        return GuideWire(segment_mm=1.0, radius_mm=self.radius_mm, bending_stiffness_N_mm2=10.0)
+
+    @cached_property
     def hard_wall(self) -> VesselWall:
-        """The lumen's wall for a wire that only wants to be straight."""
-        return VesselWall(self.lumen.distance, stiffness_N_mm2=HARD_WALL_N_MM2)
+        """The wall around the traced wires, for a wire that only wants to be straight."""
+        return VesselWall(self.room, stiffness_N_mm2=HARD_WALL_N_MM2)
 
 
-Guess = Callable[[Clues, float, Array | None], Array | None]
-"""From the clues, a depth (mm) and the last trusted trace (n, 3) before the frame to a wire (m, 3), or None."""
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a predictor may see beside the depth.
+
+    previous_mm, following_mm : (n, 3) the last trusted trace before the frame, the first after it.     tip_mm : (3,)
+    of the frame itself.     simulated : wires of simulators that lack something, by the predictor's name.
+    """
+
+    previous_mm: Array | None = None
+    following_mm: Array | None = None
+    tip_mm: Array | None = None
+    simulated: Mapping[str, Array] = field(default_factory=dict)
+
+
+Guess = Callable[[Clues, float, Seen], Array | None]
+"""From the clues, a depth (mm) and what is seen to a wire (m, 3), or None."""
 
 
 def of_path(path: Array | None, depth_mm: float) -> Array | None:
@@ -78,13 +106,13 @@ def of_path(path: Array | None, depth_mm: float) -> Array | None:
     return None if path is None or len(path) < 2 else to_length(path, depth_mm)
 
 
-def min_bending(clues: Clues, depth_mm: float, _previous: Array | None = None) -> Array | None:
+def min_bending(clues: Clues, depth_mm: float, _seen: Seen = Seen()) -> Array | None:
     """The curve of least bending in the lumen: a straight wire laid on the centreline and let go."""
     start = of_path(clues.centreline, depth_mm)
     if start is None:
         return None
     solution = relax(
-        GuideWire(segment_mm=1.0, radius_mm=clues.radius_mm, bending_stiffness_N_mm2=10.0),
+        clues.straight_wire,
         clues.hard_wall,
         depth_mm=depth_mm,
         entry_mm=start[0],
@@ -94,35 +122,63 @@ def min_bending(clues: Clues, depth_mm: float, _previous: Array | None = None) -
     return np.asarray(solution.joints_mm) if solution.converged else None
 
 
+def to_this_tip(clues: Clues, depth_mm: float, seen: Seen) -> Array | None:
+    """The curve of least bending whose tip is held at the frame's own."""
+    start = min_bending(clues, depth_mm)
+    if start is None or seen.tip_mm is None:
+        return None
+    return pinned(clues.straight_wire, clues.hard_wall, clues.clamp, start, seen.tip_mm)
+
+
+def between(_: Clues, depth_mm: float, seen: Seen) -> Array | None:
+    """The mean, at equal arc length, of the frames before and after: a ceiling, since it saw where the wire went."""
+    sides = [of_path(curve, depth_mm) for curve in (seen.previous_mm, seen.following_mm)]
+    arc = samples(depth_mm, 0.5)
+    both = [at_arc(curve, arc) for curve in sides if curve is not None]
+    return np.asarray(np.mean(both, axis=0)) if len(both) == 2 else None
+
+
 NULLS: dict[str, Guess] = {
     "centreline": lambda clues, depth, _: of_path(clues.centreline, depth),
     "shortest": lambda clues, depth, _: of_path(clues.shortest, depth),
     "min_bending": min_bending,
-    "previous": lambda _, depth, previous: of_path(previous, depth),
+    "previous": lambda _, depth, seen: of_path(seen.previous_mm, depth),
+    "roll_unknown": lambda _clues, _depth, seen: seen.simulated.get("roll_unknown"),
+    "no_tip_curve": lambda _clues, _depth, seen: seen.simulated.get("no_tip_curve"),
+    "pinned": to_this_tip,
+    "neighbours": between,
 }
+TOLD = {"pinned": "where this frame's tip is", "neighbours": "the frame after this one"}
+"""Predictors that skill is not measured against, and what they are told of the frame or of a later one."""
+ANOTHER = "another"
+"""Another insertion at the same depth: known once all are done, so it stands in overall.csv alone."""
 
 
-def register(name: str, label: str, meaning: str, guess: Guess) -> None:
+def rivals() -> list[str]:
+    """The predictors that skill may be measured against."""
+    return [*(name for name in NULLS if name not in TOLD), ANOTHER]
+
+
+def register(name: str, label: str, meaning: str, guess: Guess, told: str = "") -> None:
     """Add a predictor; its column ``null_<name>_rms_mm`` is in errors.csv, summary.csv and the pages from then on.
 
-    label : what legends call it.     meaning : one line for the list of columns.
+    label : what legends call it.     meaning : one line for the list of columns.     told : as in TOLD; empty: it
+    sees neither the frame nor a later one.
     """
     ERRORS.add(predictor(name, label, meaning))
     NULLS[name] = guess
+    TOLD.update({name: told} if told else {})
 
 
-def score(
-    clues: Clues, depth_mm: float, previous_mm: Array | None, curve_mm: Array, step_mm: float
-) -> dict[str, float]:
+def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, config: CompareConfig) -> dict[str, float]:
     """Root mean square distance (mm) of every predictor's wire from the traced curve, by the predictor's name.
 
-    Wires are sampled every ``step_mm``; a predictor that has no guess has no entry.
+    Wires are sampled where the simulated one is; a predictor that has no guess has no entry.
     """
-    guesses = {name: guess(clues, depth_mm, previous_mm) for name, guess in NULLS.items()}
+    arc = scored(samples(depth_mm, config.sample_mm), config.skip_mm)
+    guesses = {name: guess(clues, depth_mm, seen) for name, guess in NULLS.items()}
     return {
-        name: rms(point_to_curve(to_length(wire, depth_mm, step_mm), curve_mm)[0])
-        for name, wire in guesses.items()
-        if wire is not None
+        name: rms(point_to_curve(at_arc(wire, arc), curve_mm)[0]) for name, wire in guesses.items() if wire is not None
     }
 
 

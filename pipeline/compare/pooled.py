@@ -1,24 +1,27 @@
-"""Pooled statistics of a case and their block-bootstrap intervals.
+"""Pooled statistics of frames, and their intervals over insertions. Points are pooled, RMSEs never averaged."""
 
-Points are pooled, RMSEs never averaged. Neighbouring frames of one insertion are not independent, so the bootstrap
-resamples blocks: cases (groups) where there are several, runs of consecutive frames within a single case.
-"""
-
-import itertools
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.compare.metrics import OF_POINTS
+from pipeline.compare import intervals
+from pipeline.compare.metrics import OF_POINTS, rms
+from pipeline.compare.nulls import ANOTHER, rivals
 from pipeline.model import Array
 from pipeline.status import FrameStatus
 from reports.schema import ERRORS
 
-SEED = 20021  # of the bootstrap: the same result files give the same intervals
 Row = Mapping[str, Any]
 """A row of errors.csv: values by the names of its columns; what does not apply is NaN, None or absent."""
+
+
+class Scored(NamedTuple):
+    """A frame that counts: its row, its point errors (n,) in mm, and the insertion that it belongs to."""
+
+    row: Row
+    error_mm: Array
+    insertion: str
 
 
 def is_pooled(row: Row, error_mm: Array | None) -> bool:
@@ -35,54 +38,133 @@ def skill_of(rms_mm: float, null_mm: float) -> float:
     return 1.0 - (rms_mm / null_mm) ** 2 if null_mm > 0 else float("nan")
 
 
-def pooled_rms(rows: Array) -> float:
-    """Root mean square over rows of (number of points, sum of squares, ...)."""
-    return float(np.sqrt(rows[:, 1].sum() / rows[:, 0].sum()))
-
-
-def pooled(frames: Sequence[tuple[Row, Array]], draws: int) -> dict[str, float]:
-    """Values of summary.csv over frames that count, each its row and its point errors (n,); empty where there are none.
-
-    draws : resamples behind the 95 % intervals.
-    """
+def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
+    """Values of summary.csv over frames that count; empty where there are none."""
     if not frames:
         return {}
-    points = np.array([len(errors) for _, errors in frames], dtype=float)
-    everything = np.concatenate([errors for _, errors in frames])
-    result = {}
+    points = np.array([len(frame.error_mm) for frame in frames], dtype=float)
+    everything = np.concatenate([frame.error_mm for frame in frames])
+    result: dict[str, Any] = {}
     for column in ERRORS:
         if column.name in OF_POINTS:
             result[column.pooled_name] = OF_POINTS[column.name](everything)
         elif column.pooled in POOLING:
-            values = np.array([_number(row.get(column.name)) for row, _ in frames])
+            values = numbers(frames, column.name)
             result[column.pooled_name] = _over_frames(POOLING[column.pooled], values, points)
-    return result | _with_intervals(frames, points, draws)
+    # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
+    left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
+    result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
+    return result | _releases(frames) | _with_intervals(frames, points)
 
 
-def _with_intervals(frames: Sequence[tuple[Row, Array]], points: Array, draws: int) -> dict[str, float]:
-    """The statistics that have intervals: rms, median tip and skill."""
-    squares = [float(np.sum(errors**2)) for _, errors in frames]
-    null = np.array([_number(row.get("null_centreline_rms_mm")) for row, _ in frames])
-    tips = [_number(row.get("tip_mm")) for row, _ in frames]
-    rows = np.column_stack([points, squares, points * null**2, tips])
-    units = blocks(len(frames), max(round(np.sqrt(len(frames))), 1))
-    rms_ci, tip_ci, skill_ci = intervals(
-        rows, units, (pooled_rms, lambda r: float(np.median(r[:, 3])), _pooled_skill), draws
-    )
+def _releases(frames: Sequence[Scored]) -> dict[str, Any]:
+    """How often tips let go, and the error without the frames in which they may have; empty without a budget."""
+    if not np.isfinite(numbers(frames, "u_input_mm")).any():
+        return {}
+    calm = [frame for frame, p in zip(frames, numbers(frames, "release"), strict=True) if not np.isfinite(p)]
+    told = [frame.row.get("released") for frame in frames]
     return {
-        "rms_mm": pooled_rms(rows),
-        "rms_low_mm": rms_ci[0],
-        "rms_high_mm": rms_ci[1],
-        "tip_low_mm": tip_ci[0],
-        "tip_high_mm": tip_ci[1],
-        "skill": _pooled_skill(rows),
-        "skill_low": skill_ci[0],
-        "skill_high": skill_ci[1],
+        "release_frames": len(frames) - len(calm),
+        "rms_calm_mm": rms(np.concatenate([np.zeros(0), *(frame.error_mm for frame in calm)])),
+        **{f"releases_{word}": told.count(word) for word in RELEASED},
     }
 
 
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
+RELEASED = ("both", "missed", "spurious")
+"""What may become of a release: simulated and real, real alone, simulated alone."""
+
+
+WITHIN_MM = 1.0
+"""Largest 95th percentile of a frame that counts for ``within_1mm``."""
+
+
+def within(rows: Iterable[Row], planned: int) -> float:
+    """Share of ``planned`` frames with a result and a 95th percentile of at most 1 mm: a frame that fails adds none."""
+    good = [
+        row for row in rows if row["status"] == FrameStatus.OK.identifier and (row.get("p95_mm") or 0.0) <= WITHIN_MM
+    ]
+    return len(good) / planned if planned else float("nan")
+
+
+def numbers(frames: Sequence[Scored], name: str) -> Array:
+    """A column's values (frames,), NaN where a frame has none."""
+    values = (frame.row.get(name) for frame in frames)
+    return np.array([float("nan") if value is None else float(value) for value in values])
+
+
+def squares_of(frames: Sequence[Scored]) -> Array:
+    """Sums of squared point errors (frames,), mm^2."""
+    return np.array([float(np.sum(frame.error_mm**2)) for frame in frames])
+
+
+def by_insertion(frames: Sequence[Scored], *values: Array) -> list[Array]:
+    """Sums (insertions,) of values (frames,) over the frames of each insertion, in the order of the insertions."""
+    names = [frame.insertion for frame in frames]
+    chosen = [np.array([name == one for name in names]) for one in dict.fromkeys(names)]
+    return [np.array([float(of[rows].sum()) for rows in chosen]) for of in values]
+
+
+def _with_intervals(frames: Sequence[Scored], points: Array) -> dict[str, Any]:
+    """The statistics that have intervals (rms, median tip, skill), and what these rest on."""
+    squares, nulls = squares_of(frames), points * numbers(frames, "null_centreline_rms_mm") ** 2
+    names = list(dict.fromkeys(frame.insertion for frame in frames))
+    own = [[frame for frame in frames if frame.insertion == name] for name in names]
+    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
+    tips = intervals.of_medians([numbers(part, "tip_mm") for part in own])
+    mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in own]
+    return {
+        "insertions": len(names),
+        "interval": intervals.note(len(names)),
+        "effective_frames": intervals.effective_frames(mean_squares),
+        "rms_low_mm": float(low),
+        "rms_high_mm": float(high),
+        "tip_low_mm": tips.low,
+        "tip_high_mm": tips.high,
+        **skill(frames, squares, nulls),
+        **strongest(frames, squares, points),
+    }
+
+
+def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill") -> dict[str, float]:
+    """Skill against a predictor's sums of squares (frames,), with its interval; over the frames that it has a guess of.
+
+    name : of the column; those of the ends follow from it.
+    """
+    known = np.isfinite(nulls)
+    if not nulls[known].sum() > 0:
+        return {}
+    kept = [frame for frame, is_known in zip(frames, known, strict=True) if is_known]
+    points = np.array([len(frame.error_mm) for frame in kept], dtype=float)
+    ends = intervals.of_log_ratio(*by_insertion(kept, squares[known], nulls[known], points))
+    value = 1.0 - float(squares[known].sum() / nulls[known].sum())
+    # less error is more skill: the ends change places
+    return {name: value, f"{name}_low": 1.0 - float(np.exp(ends.high)), f"{name}_high": 1.0 - float(np.exp(ends.low))}
+
+
+LEAST_SHARE = 0.5
+"""Of the points that a predictor must have a guess of to be the strongest: the first frame has no previous one."""
+
+
+def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[str, Any]:
+    """Skill against the predictor that leaves the least, of those that are told nothing of the frame; its name."""
+    depths = [
+        numbers([f for f in frames if f.insertion == one], "insertion_mm") for one in {f.insertion for f in frames}
+    ]
+    steps = np.abs(np.concatenate([np.diff(own) for own in depths]))
+    result: dict[str, Any] = {"frame_spacing_mm": float(np.median(steps)) if len(steps) else float("nan")}
+    best = {"skill_strongest": float("inf")}
+    for name in rivals():
+        nulls = points * numbers(frames, f"null_{name}_rms_mm") ** 2
+        known = np.isfinite(nulls)
+        if name == ANOTHER and known.any():
+            result["null_another_rms_mm"] = float(np.sqrt(nulls[known].sum() / points[known].sum()))
+        if points[known].sum() < LEAST_SHARE * points.sum():
+            continue
+        found = skill(frames, squares, nulls, "skill_strongest")
+        if found and found["skill_strongest"] < best["skill_strongest"]:
+            best = found
+            result["strongest_null"] = name
+    return result | (best if "strongest_null" in result else {})
 
 
 def _over_frames(rule: Callable[[Array, Array], float], values: Array, points: Array) -> float:
@@ -95,33 +177,9 @@ POOLING: dict[str, Callable[[Array, Array], float]] = {
     # a frame's mean square times its number of points is a sum of squares
     "rms": lambda values, points: float(np.sqrt(np.sum(points * values**2) / points.sum())),
     "mean": lambda values, _: float(np.mean(values)),
+    "weighted": lambda values, points: float(np.sum(points * values) / points.sum()),
     "share": lambda values, _: float(np.mean(values)),
     "median": lambda values, _: float(np.median(values)),
     "max": lambda values, _: float(np.max(values)),
 }
 """Rules of ``Column.pooled`` from values of frames (n,) and their numbers of points (n,)."""
-
-
-def blocks(count: int, length: int) -> list[NDArray[np.intp]]:
-    """Indices 0..count-1 in runs of ``length``; a short rest joins the last run."""
-    starts = range(0, max(count - length + 1, 1), length)
-    return [np.arange(a, b) for a, b in itertools.pairwise([*starts, count])]
-
-
-def intervals(
-    rows: Array, units: Sequence[NDArray[np.intp]], statistics: Sequence[Callable[[Array], float]], draws: int
-) -> list[tuple[float, float]]:
-    """95 % percentile intervals of statistics of ``rows`` (n, m) when whole units (index arrays) are resampled."""
-    if draws < 1 or len(units) < 3:  # two blocks give three distinct resamples: no interval worth the name
-        return [(float("nan"), float("nan"))] * len(statistics)
-    generator = np.random.default_rng(SEED)
-    values = np.empty((draws, len(statistics)))
-    for i in range(draws):
-        chosen = np.concatenate([units[j] for j in generator.integers(len(units), size=len(units))])
-        values[i] = [statistic(rows[chosen]) for statistic in statistics]
-    low, high = np.nanpercentile(values, (2.5, 97.5), axis=0)
-    return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
-
-
-def _pooled_skill(rows: Array) -> float:
-    return 1.0 - float(rows[:, 1].sum() / rows[:, 2].sum()) if rows[:, 2].sum() > 0 else float("nan")

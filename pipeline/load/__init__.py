@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.load import dicom, files, hdf5
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, LoadError, Source, require_same_geometry, unusable
+from pipeline.load.geometry import Box, Header, LoadError, Source, judged, require_same_geometry, unusable
+from pipeline.load.guard import is_folder, size_of, told
+from pipeline.load.voxels import plain
 from pipeline.model import Counters, Volume
 from solver.grid import read_only
 
@@ -31,7 +33,9 @@ __all__ = [
     "load",
     "read_header",
     "read_headers",
+    "require_one",
     "require_same_geometry",
+    "require_whole",
 ]
 
 
@@ -53,7 +57,7 @@ class Format(Protocol):
 
 FORMATS: tuple[Format, ...] = (dicom, hdf5, files)
 """The first that recognises a path reads it; ``files`` leaves the rest to SimpleITK."""
-SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
+SUFFIXES = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".hdr")
 """By these a file in a folder is taken for a scan where there is no manifest."""
 
 
@@ -68,21 +72,22 @@ def read_header(
     Raises LoadError: unreadable, not 3-D, sheared, tilted, missing slices, mixed series.
     """
     source = source if isinstance(source, Source) else Source(Path(source))
-    if not source.path.exists():
-        why = "no such file or folder; check the path in the manifest (relative to the manifest itself)"
-        raise unusable(source.path, why)
-    header = _format_of(source.path).read_header(source, config)
-    if spacing_mm is None:
-        return header
-    spacing = np.asarray(spacing_mm, float)
-    note = f"{source.path.name}: spacing {spacing.tolist()} mm taken from the manifest"
-    return replace(header, spacing_mm=spacing, assumed=(*header.assumed, note))
+    if not is_folder(source.path):
+        size_of(source.path)
+    with told(source):
+        header = _format_of(source.path).read_header(source, config)
+    if spacing_mm is not None:
+        spacing = np.asarray(spacing_mm, float)
+        note = f"{source.path.name}: spacing {spacing.tolist()} mm taken from the manifest"
+        header = replace(header, spacing_mm=spacing, assumed=(*header.assumed, note))
+    return judged(header)
 
 
 def load(header: Header, box: Box | None = None, config: LoadConfig = LoadConfig()) -> Volume:
     """Voxels of a scan, indexed x, y, z, with its geometry; of ``box`` alone where one is given."""
     start, stop = box or header.box
-    values = _format_of(header.source.path).read(header, (start, stop), config)
+    with told(header.source):
+        values = plain(_format_of(header.source.path).read(header, (start, stop), config), header.source)
     if values.dtype.kind == "f" and not np.all(np.isfinite(values)):
         bad = int(np.size(values) - np.isfinite(values).sum())
         why = f"{bad} voxels are NaN or infinite; allowed: finite grey values. Replace them first."
@@ -152,11 +157,26 @@ def each_volume(header: Header) -> Iterator[Header]:
         yield replace(header, source=source, item_count=1)
 
 
+def require_whole(header: Header, config: LoadConfig) -> None:
+    """LoadError where the file of a header is cut short, as far as its length shows that."""
+    if _format_of(header.source.path) is files:
+        files.head_of(header.source.path, config.most_gib)
+
+
+def require_one(header: Header) -> None:
+    """LoadError where a file that should hold one volume is a sequence."""
+    if header.item_count > 1:
+        what = f"holds {header.item_count} volumes; allowed: one for the reference"
+        raise unusable(header.source, f"{what}. Name a file or dataset of the scan without wire alone.")
+
+
 def read_headers(
     reference: Source | None, frames: Sequence[Source], config: LoadConfig, spacing_mm: ArrayLike | None = None
 ) -> Scans:
     """Headers of a case's scans; raises LoadError where one is unusable or its geometry differs from the first's."""
     empty = read_header(reference, config, spacing_mm) if reference else None
+    if empty is not None:
+        require_one(empty)
     headers = [read_header(source, config, spacing_mm) for source in frames]
     scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
     for header in scans.frames:

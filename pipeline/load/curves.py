@@ -1,7 +1,7 @@
 """Wires that users bring (.csv, .vtp, .mrk.json), and the true ones of a synthetic study (truth.json). Out: LPS mm."""
 
 import csv
-import json
+import io
 from pathlib import Path
 from typing import Any
 
@@ -9,25 +9,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused, unusable
+from pipeline.load.guard import reachable, read_json, read_text, told
+from pipeline.load.outside import millimetres
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.model import Array, Curve
 
+CURVE_BYTES = 16 * 2**20
+"""Longest table of a curve: 200,000 points."""
 _NAMES = (("x_mm", "y_mm", "z_mm"), ("x", "y", "z"))
 
 
 def markups_in(path: Path) -> list[dict[str, Any]]:
     """The markups of a 3D Slicer file that have control points."""
-    try:
-        return [m for m in json.loads(path.read_text(encoding="utf-8"))["markups"] if m.get("controlPoints")]
-    except (ValueError, KeyError, TypeError) as error:
-        raise refused(path, repr(error), "a 3D Slicer markups file", "save the curve as .mrk.json") from error
+    found = read_json(path, "a 3D Slicer markups file")
+    markups = found.get("markups") if isinstance(found, dict) else None
+    if not isinstance(markups, list) or not all(isinstance(markup, dict) for markup in markups):
+        raise refused(path, "no list of markups", "a 3D Slicer markups file", "save the curve as .mrk.json")
+    return [markup for markup in markups if markup.get("controlPoints")]
 
 
-def positions_of(markup: dict[str, Any]) -> NDArray[np.float64]:
+SYSTEMS = {"LPS": 1.0, "1": 1.0, "RAS": RAS_TO_LPS, "0": RAS_TO_LPS}
+
+
+def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
     """Control points (n, 3) of a markup, LPS mm. Where a file does not say it is LPS, as for 3D Slicer; 0 is RAS."""
-    points = np.array([p["position"] for p in markup["controlPoints"]], dtype=float).reshape(-1, 3)
-    lps = str(markup.get("coordinateSystem", "LPS")).upper() in {"LPS", "1"}
-    return points if lps else points * RAS_TO_LPS
+    system = str(markup.get("coordinateSystem", "LPS")).upper()
+    if system not in SYSTEMS:
+        raise refused(path, f"coordinateSystem {system!r}", "LPS or RAS", "save the curve again")
+    factor = millimetres(path, str(markup.get("coordinateUnits", "mm")))
+    with told(path):
+        points = np.array([p["position"] for p in markup["controlPoints"]], dtype=float).reshape(-1, 3)
+    return reachable(path, points * SYSTEMS[system] * factor)
 
 
 def read_markups_curve(path: Path) -> NDArray[np.float64]:
@@ -35,13 +47,16 @@ def read_markups_curve(path: Path) -> NDArray[np.float64]:
     found = markups_in(path)
     if not found:
         raise refused(path, "no control points", "one curve", "save the curve as .mrk.json")
-    return positions_of(found[0])
+    return positions_of(path, found[0])
 
 
 def read_csv_points(path: Path) -> NDArray[np.float64]:
     """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the first three of a bare table."""
-    with path.open(newline="") as file:
-        rows = [r for r in csv.reader(file) if r and not r[0].lstrip().startswith("#")]
+    try:
+        lines = csv.reader(io.StringIO(read_text(path, CURVE_BYTES), newline=""))
+        rows = [r for r in lines if r and not r[0].lstrip().startswith("#")]
+    except csv.Error:
+        raise refused(path, "a line that is no CSV", "columns x_mm, y_mm, z_mm of numbers", "save it again") from None
     if not rows:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
@@ -72,9 +87,9 @@ def read_curve(path: Path) -> Curve:
     kind = next((k for k in READERS if path.name.lower().endswith(k)), None)
     if kind is None:
         raise refused(path, repr(path.suffix), ", ".join(READERS), "export the curve in one of these")
-    if not path.exists():
-        raise unusable(path, "no such file; check traces in the manifest (relative to the manifest itself)")
     points = READERS[kind](path)
+    if len(points):
+        reachable(path, points)
     if len(points):
         keep = np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])
         points = points[keep]
@@ -85,12 +100,16 @@ def read_curve(path: Path) -> Curve:
 
 def read_truth(path: Path, frame_count: int) -> list[Array]:
     """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip."""
+    expected = '{"frames": [{"points_mm": [[x, y, z], ...]}]}'
+    found = read_json(path, expected)
     try:
-        frames = json.loads(path.read_text(encoding="utf-8"))["frames"]
-        curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in frames]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        why = f'cannot be read as truth: {error!r}; expected {{"frames": [{{"points_mm": [[x, y, z], ...]}}]}}'
-        raise unusable(path, why) from None
+        curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in found["frames"]]
+    except (ValueError, KeyError, TypeError, IndexError):
+        raise unusable(path, f"cannot be read as truth; expected {expected}") from None
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
+    for number, curve in enumerate(curves):
+        if len(curve) < 2:
+            raise unusable(path, f"frame {number} holds {len(curve)} points; expected two or more")
+        reachable(path, curve, f"frame {number}: points")
     return curves

@@ -1,6 +1,6 @@
 """What a scan's header says, and whether two scans share one geometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +47,14 @@ class Source:
         return name if self.item is None else f"{name}[{self.item}]"
 
 
+@dataclass(frozen=True)
+class Mask(Source):
+    """An own lumen.     label : of several in a label map, by number or by name.     level : of a probability, 0..1."""
+
+    label: int | str | None = None
+    level: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Header:
     """Geometry and type of a scan, read without its voxels.
@@ -83,6 +91,35 @@ class Header:
         return (int(low[0]), int(low[1]), int(low[2])), (int(high[0]), int(high[1]), int(high[2]))
 
 
+ORTHONORMAL = 1e-3
+"""Largest departure of a direction matrix from orthonormal: header rounding is below it, a shear far above."""
+SPACING_MM, FARTHEST_MM = (1e-3, 100.0), 1e4
+"""A voxel's edges, and the farthest that a scan may reach from the origin: beyond these a unit is not mm."""
+
+
+def judged(header: Header) -> Header:
+    """The header with exactly orthonormal axes; LoadError where its geometry is none."""
+    spacing, origin, direction = (np.asarray(v, float) for v in (header.spacing_mm, header.origin_mm, header.direction))
+    low, high = SPACING_MM
+    if not np.all((spacing >= low) & (spacing <= high)):
+        why = f"spacing {spacing.tolist()} mm; allowed: {low:g} to {high:g} along every axis"
+        raise unusable(header.source, f"{why}; is it in mm? Correct the header, or give spacing_mm in the manifest.")
+    reach = np.abs(origin).max() + float(np.dot(spacing, header.shape))
+    if not reach <= FARTHEST_MM:
+        why = f"origin {origin.tolist()} mm, {list(header.shape)} voxels of {spacing.tolist()} mm"
+        raise unusable(header.source, f"{why}; allowed: all of it within {FARTHEST_MM:g} mm; correct the header")
+    if not np.all(np.isfinite(direction)) or np.abs(direction.T @ direction - np.eye(3)).max() > ORTHONORMAL:
+        found = f"the axes are sheared or scaled, direction {direction.round(5).tolist()}"
+        why = f"{found}; allowed: an orthonormal matrix (a tilted gantry gives this)"
+        raise unusable(header.source, f"{why}. Resample the scan onto a regular grid first.")
+    if min(header.shape) < 2:
+        why = f"{list(header.shape)} voxels: one slice is no volume; allowed: 2 voxels or more along every axis"
+        raise unusable(header.source, why)
+    left, _, right = np.linalg.svd(direction)
+    turn = direction if np.allclose(direction.T @ direction, np.eye(3), atol=1e-6) else left @ right
+    return replace(header, spacing_mm=spacing, origin_mm=origin, direction=turn)
+
+
 def describe(header: Header) -> str:
     """One line with the whole geometry, for messages."""
     said = {"shape": header.shape, "spacing": header.spacing_mm, "origin": header.origin_mm}
@@ -93,8 +130,8 @@ def describe(header: Header) -> str:
     return f"{header.source}: {numbers}"
 
 
-def require_same_geometry(reference: Header, other: Header) -> None:
-    """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's."""
+def require_same_geometry(reference: Header, other: Header, name: str = "") -> None:
+    """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's; name : what to call it, besides."""
     found, shift = "the shapes differ", float("inf")
     if reference.shape == other.shape:
         apart = np.linalg.norm(corners_mm(reference.grid) - corners_mm(other.grid), axis=1)
@@ -103,6 +140,6 @@ def require_same_geometry(reference: Header, other: Header) -> None:
     if shift > SAME_VOXELS:
         raise LoadError(
             f"geometry differs between scans of one case: {found}, allowed {SAME_VOXELS} voxel.\n"
-            f"  {describe(reference)}\n  {describe(other)}\n"
+            f"  {describe(reference)}\n  {name + ' of ' if name else ''}{describe(other)}\n"
             "  Resample the scans onto one grid, or split them into two cases."
         )

@@ -2,6 +2,7 @@
 
 A dataset's attributes give spacing_mm (needed), origin_mm (default 0), direction (default identity) and axes: "z,y,x"
 (the default: x fastest, as in other formats) or "x,y,z". A 4-D dataset has the volume's number as its first axis.
+The datasets of a group come in natural order, and each one's own geometry is held against the first one's.
 """
 
 from pathlib import Path
@@ -12,16 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.config import LoadConfig
-from pipeline.load.geometry import Box, Header, Source, unusable
+from pipeline.load.geometry import Box, Header, Source, judged, require_same_geometry, unusable
+from pipeline.load.guard import require_room
+from pipeline.load.order import natural_key
+from pipeline.load.voxels import LONGEST_AXIS
 
 AXES = ("z,y,x", "x,y,z")
+MOST_NAMES = 20
 
 
 def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
-    """The dataset named, or the 3-D datasets of the group named, by name."""
-    node = file.get(source.dataset or "/volume")
+    """The dataset named, or the 3-D datasets of the group named, in natural order."""
+    node = _inside(file, source.dataset or "/volume", source)
     if isinstance(node, h5py.Group):
-        inside = [node[name] for name in sorted(node)]
+        inside = [_inside(node, name, source) for name in sorted(node, key=natural_key)]
         found = [item for item in inside if isinstance(item, h5py.Dataset) and item.ndim == 3]
         if found:
             return found
@@ -29,8 +34,21 @@ def _volumes(file: h5py.File, source: Source) -> list[h5py.Dataset]:
         return [node]
     held: list[str] = []
     file.visititems(lambda name, item: held.append(f"/{name} {item.shape}") if isinstance(item, h5py.Dataset) else None)
-    none = f"no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held) or 'none'}. "
+    none = f"no volume {source.dataset or '/volume'!r}; the file holds {', '.join(held[:MOST_NAMES]) or 'none'}. "
     raise unusable(source.path, none + "Name a 3-D or 4-D dataset, or a group of 3-D ones, as FILE.h5#/name.")
+
+
+def _inside(group: h5py.Group, name: str, source: Source) -> Any:
+    """A member of a group, None where there is none; LoadError where its data lie in another file."""
+    parts = [part for part in name.split("/") if part]
+    for depth in range(1, len(parts) + 1):
+        link = group.get("/".join(parts[:depth]), getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise unusable(source, "a link into another file; allowed: data in this file; copy them into it")
+    node = group.get(name)
+    if isinstance(node, h5py.Dataset) and (node.external or node.is_virtual):
+        raise unusable(source, "its data lie in other files; allowed: data in this file; copy them into it")
+    return node
 
 
 def _is_xyz(data: h5py.Dataset, source: Source) -> bool:
@@ -50,32 +68,64 @@ def parts(_path: Path) -> tuple[Path, ...]:
     return ()
 
 
-def read_header(source: Source, _config: LoadConfig) -> Header:
+def read_header(source: Source, config: LoadConfig) -> Header:
     """Geometry of a dataset from its attributes; spacing_mm must be there."""
     try:
-        return _header(source)
-    except (OSError, ValueError) as error:
-        why = f"{error}. Check that the file is complete, spacing_mm and origin_mm three numbers, direction nine"
-        raise unusable(source, why) from None
-
-
-def _header(source: Source) -> Header:
-    with h5py.File(source.path, "r") as file:
+        file = h5py.File(source.path, "r")
+    except OSError as error:
+        kind = "it is truncated" if "truncated" in str(error) else "it is no HDF5 file, or damaged"
+        raise unusable(source, f"{kind}. Check that the file is complete: copy it again.") from None
+    with file:
         volumes = _volumes(file, source)
-        data = volumes[0]
-        if "spacing_mm" not in data.attrs:
-            lacks = f"{data.name} lacks the attribute spacing_mm (three lengths in mm, x, y, z); "
-            raise unusable(source, f"{lacks}found {sorted(data.attrs)}. Add it to every dataset.")
-        a, b, c = data.shape[-3:]
-        return Header(
-            source,
-            (a, b, c) if _is_xyz(data, source) else (c, b, a),
-            np.array(data.attrs["spacing_mm"], float).reshape(3),
-            np.array(data.attrs.get("origin_mm", np.zeros(3)), float).reshape(3),
-            np.array(data.attrs.get("direction", np.eye(3)), float).reshape(3, 3),
-            str(data.dtype),
-            item_count=data.shape[0] if data.ndim == 4 else len(volumes),
-        )
+        headers = [_header(source, data, config) for data in volumes]
+        for header, data in zip(headers, volumes, strict=True):
+            if len(headers) > 1:
+                require_same_geometry(judged(headers[0]), judged(header), str(data.name))
+        count = volumes[0].shape[0] if volumes[0].ndim == 4 else len(volumes)
+    first = headers[0]
+    return Header(
+        source, first.shape, first.spacing_mm, first.origin_mm, first.direction, first.pixel_type, int(count),
+        tuple(dict.fromkeys(note for header in headers for note in header.assumed)),
+    )  # fmt: skip
+
+
+def _header(source: Source, data: h5py.Dataset, config: LoadConfig) -> Header:
+    """What one dataset says."""
+    if data.dtype.kind not in "iufb":
+        raise unusable(source, f"{data.name} holds {data.dtype}; allowed: whole or decimal numbers")
+    if min(data.shape) < 1 or max(data.shape) > LONGEST_AXIS:
+        raise unusable(source, f"{data.name} has the shape {data.shape}; allowed: 1 to {LONGEST_AXIS} along every axis")
+    if "spacing_mm" not in data.attrs:
+        lacks = f"{data.name} lacks the attribute spacing_mm (three lengths in mm, x, y, z); "
+        raise unusable(source, f"{lacks}found {sorted(data.attrs)[:MOST_NAMES]}. Add it to every dataset.")
+    a, b, c = data.shape[-3:]
+    volume_bytes, stored = a * b * c * data.dtype.itemsize, int(data.id.get_storage_size())
+    total = int(np.prod([int(n) for n in data.shape], dtype=object)) * data.dtype.itemsize
+    require_room(source, volume_bytes, 0, "", config.most_gib)
+    if stored == 0 or (data.chunks is None and stored < total):
+        raise unusable(source, f"{data.name}: {stored} of {total} bytes were ever written; write it again")
+    if data.chunks is not None:
+        require_room(source, total, stored, "deflate", config.most_gib)
+    defaults = {"origin_mm": "0, 0, 0", "direction": "along x, y, z"}
+    missing = [f"{name}: {value}" for name, value in defaults.items() if name not in data.attrs]
+    return Header(
+        source,
+        (a, b, c) if _is_xyz(data, source) else (c, b, a),
+        _numbers(source, data, "spacing_mm", np.ones(3)),
+        _numbers(source, data, "origin_mm", np.zeros(3)),
+        _numbers(source, data, "direction", np.eye(3)),
+        str(data.dtype.newbyteorder("=")),
+        assumed=tuple(f"{source.path.name}: {data.name} lacks {text} assumed" for text in missing),
+    )
+
+
+def _numbers(source: Source, data: h5py.Dataset, name: str, default: NDArray[Any]) -> NDArray[np.float64]:
+    """An attribute of as many numbers as the default has."""
+    found = np.asarray(data.attrs.get(name, default))
+    if found.dtype.kind not in "iuf" or found.size != default.size:
+        got = f"{data.name} has {name} = {str(found.tolist())[:80]}"
+        raise unusable(source, f"{got}; allowed: {default.size} numbers. Check that the file is complete: correct it.")
+    return found.astype(float).reshape(default.shape)
 
 
 def read(header: Header, box: Box, _config: LoadConfig) -> NDArray[Any]:

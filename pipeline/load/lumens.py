@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import load, read_header
 from pipeline.load.curves import markups_in, positions_of
-from pipeline.load.geometry import refused, unusable
+from pipeline.load.geometry import Mask, Source, refused
+from pipeline.load.guard import reachable, read_text, told
+from pipeline.load.masks import read_mask
 from pipeline.load.surfaces import read_stl, read_vtp
 from pipeline.model import Branches, Shapes, Volume
 
@@ -14,13 +15,15 @@ from pipeline.model import Branches, Shapes, Volume
 def read_swc(path: Path) -> Branches:
     """A .swc tree: number, type, x, y, z, radius, parent (-1 = root), lengths in mm."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_text(path).splitlines()
         table = np.array([r.split() for r in lines if r.strip() and not r.lstrip().startswith("#")], float)
-    except ValueError as error:
-        raise refused(path, str(error), "seven numbers a line", "export it again as .swc") from error
+    except ValueError:
+        got = "a line that is not seven numbers"
+        raise refused(path, got, "seven numbers a line", "export it again as .swc") from None
     if table.ndim != 2 or table.shape[1] < 7:
         got = f"a table of shape {table.shape}"
         raise refused(path, got, "seven numbers a line", "export it again as .swc")
+    reachable(path, table[:, :7], "numbers")
     row_of = {int(n): i for i, n in enumerate(table[:, 0])}
     child = np.array([i for i in range(len(table)) if int(table[i, 6]) in row_of], dtype=np.int64)
     parent = np.array([row_of[int(table[i, 6])] for i in child], dtype=np.int64)
@@ -35,7 +38,7 @@ def read_markups_branches(path: Path) -> Branches:
     """Curves with a ``Radius`` measurement per control point (as VMTK writes), every markup one branch."""
     branches = []
     for markup in markups_in(path):
-        points = positions_of(markup)
+        points = positions_of(path, markup)
         named = {str(m.get("name", "")).lower(): m for m in reversed(markup.get("measurements", []))}
         values = named.get("radius", {}).get("controlPointValues")
         if values is None or len(values) != len(points):
@@ -61,28 +64,67 @@ def _closed(shapes: Shapes, path: Path) -> Shapes:
     return shapes
 
 
-def _labels(path: Path, least_voxels: int) -> Volume:
-    """A label map; LoadError where fewer than ``least_voxels`` are labelled."""
-    volume = load(read_header(path))
-    count = np.count_nonzero(volume.values)
-    if count < least_voxels:
-        allowed = f"at least {least_voxels} (segment.least_voxels)"
-        raise refused(path, f"{count} labelled voxels", allowed, "check the label map")
-    return volume
+def _centreline(shapes: Shapes, path: Path) -> Branches:
+    """The lines of a VMTK centreline as branches."""
+    radius = np.asarray(shapes.radius_mm)
+    if len(radius) != len(shapes.points_mm) or not np.all((radius > 0) & np.isfinite(radius)):
+        got = f"{len(radius)} radii for {len(shapes.points_mm)} points"
+        raise refused(path, got, "one finite radius above 0 for each point", "compute the centreline again")
+    start = np.concatenate([line[:-1] for line in shapes.lines])
+    end = np.concatenate([line[1:] for line in shapes.lines])
+    return Branches(shapes.points_mm[start], shapes.points_mm[end], radius[start], radius[end])
 
 
-def read_lumen(path: Path, least_voxels: int) -> Branches | Shapes | Volume:
-    """What a file holds: .swc or .mrk.json a centreline with radius, .stl or .vtp a closed surface, else a label map.
+SHORTEST_MM = 2.0
+"""No vessel that a wire is pushed through is shorter: a file of this size is in metres."""
+COARSEST_MM, LATTICE_VOXELS, MOST_FEET, MOST_WORK = 1.5, 60e6, 2e7, 5e9
+"""Coarsest lattice that a lumen may be put on (it holds LATTICE_VOXELS at most), points on its wall, voxels visited."""
+
+
+def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:
+    """What was read; LoadError where it is so large, or covers itself so often, that no lattice resolves it."""
+    ends = found.points_mm if isinstance(found, Shapes) else np.concatenate([found.start_mm, found.end_mm])
+    if float(np.ptp(ends, axis=0).max()) < SHORTEST_MM:
+        got = f"a lumen of {np.ptp(ends, axis=0).max():.3g} mm"
+        raise refused(path, got, f"{SHORTEST_MM:g} mm or more", "is it in metres? Convert it to mm")
+    size = np.ptp(ends, axis=0) + 10.0
+    voxel = max(0.3, float(np.cbrt(np.prod(size) / LATTICE_VOXELS)))
+    if voxel > COARSEST_MM:
+        got = f"a lumen of {' x '.join(f'{n:.0f}' for n in size)} mm"
+        allowed = f"a box that fits into {LATTICE_VOXELS:.0f} voxels of {COARSEST_MM:g} mm"
+        raise refused(path, got, allowed, "is it in another unit than mm? Else cut it to the vessel")
+    if isinstance(found, Shapes):
+        a, b, c = (found.points_mm[found.triangles[:, k]] for k in range(3))
+        area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        amount, most = 8 * area / voxel**2 + 8 * len(found.triangles), MOST_FEET
+    else:
+        thick = np.maximum(found.start_radius_mm, found.end_radius_mm) + 3.0
+        box = np.abs(found.end_mm - found.start_mm) + 2 * thick[:, None]
+        amount, most = float(np.prod(box / voxel, axis=1).sum()), MOST_WORK
+    if amount > most:
+        got = f"a wall {amount / most:.1f} times as large as can be put on a lattice"
+        raise refused(path, got, "one vessel", "remove what covers itself, or make it coarser")
+    return found
+
+
+def read_lumen(source: Source | Path, least_voxels: int) -> Branches | Shapes | Volume:
+    """What a file holds: .swc, .mrk.json or VMTK's .vtp a centreline with radius, .stl or .vtp a closed surface, else a
+    label map or probabilities.
 
     Raises LoadError when the file does not hold a lumen; a label map of fewer than ``least_voxels`` is none.
     """
-    name = path.name.lower()
-    if not path.exists():
-        raise unusable(path, "no such file; check lumen in the manifest (relative to the manifest itself)")
-    if name.endswith(".swc"):
-        return read_swc(path)
-    if name.endswith(".mrk.json"):
-        return read_markups_branches(path)
-    if name.endswith((".stl", ".vtp")):
-        return _closed(read_stl(path) if name.endswith(".stl") else read_vtp(path), path)
-    return _labels(path, least_voxels)
+    source = source if isinstance(source, Source) else Source(source)
+    path, name = source.path, source.path.name.lower()
+    marks = name.endswith((".swc", ".mrk.json", ".stl", ".vtp"))
+    if marks and isinstance(source, Mask) and (source.label, source.level) != (None, None):
+        raise refused(path, "a label or level for a centreline or surface", "one for a label map", "leave it out")
+    if not marks:
+        return read_mask(source, least_voxels)
+    with told(path):
+        if name.endswith(".swc"):
+            return _in_bounds(path, read_swc(path))
+        if name.endswith(".mrk.json"):
+            return _in_bounds(path, read_markups_branches(path))
+        shapes = read_stl(path) if name.endswith(".stl") else read_vtp(path)
+        centreline = shapes.radius_mm is not None and shapes.lines and not len(shapes.triangles)
+        return _in_bounds(path, _centreline(shapes, path) if centreline else _closed(shapes, path))

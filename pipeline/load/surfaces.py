@@ -16,8 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.load.geometry import refused
+from pipeline.load.guard import TEXT_BYTES, reachable, read_bytes, told
 from pipeline.model import Shapes
 
+MOST_UNPACKED = 256 * 2**20
+RADIUS = "MaximumInscribedSphereRadius"
+"""Name under which VMTK writes the radius of every point of a centreline."""
 RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 _TYPES = {
     "Float32": "f4", "Float64": "f8", "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2",
@@ -25,7 +29,7 @@ _TYPES = {
 }  # fmt: skip
 
 
-def _to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (n, 3) of a file in LPS mm: 3D Slicer says SPACE=RAS in a comment or header, all else is taken as LPS."""
     return points * RAS_TO_LPS if b"SPACE=RAS" in text[:4096] else points
 
@@ -35,7 +39,10 @@ class _Vtp:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        raw = path.read_bytes()
+        raw = read_bytes(path)
+        if b"<!DOCTYPE" in raw or b"<!ENTITY" in raw:
+            raise refused(path, "a document type with entities", "plain VTK PolyData", "write it again")
+        self.room = MOST_UNPACKED
         self.head = raw[:4096]
         self.tail = b""
         match = re.search(rb"<AppendedData[^>]*encoding=\"(raw|base64)\"[^>]*>\s*_", raw)
@@ -83,50 +90,69 @@ class _Vtp:
             return data[size : size + first]
         sizes = struct.unpack_from(f"{self.header[0]}{first}{self.header[1]}", data, 3 * size)
         ends = (3 + first) * size + np.cumsum([0, *sizes])
-        return b"".join(zlib.decompress(data[a:b]) for a, b in itertools.pairwise(ends))
+        blocks = []
+        for a, b in itertools.pairwise(ends):
+            blocks.append(zlib.decompressobj().decompress(data[a:b], self.room + 1))
+            self.room -= len(blocks[-1])
+            if self.room < 0:
+                got = f"arrays that unpack to more than {MOST_UNPACKED / 2**20:.0f} MiB"
+                raise refused(self.path, got, "less", "make the surface coarser, or save it uncompressed")
+        return b"".join(blocks)
 
 
-def _cells(file: _Vtp, piece: ET.Element, kind: str) -> list[NDArray[np.int64]]:
+def _cells(file: _Vtp, piece: ET.Element, kind: str, count: int) -> list[NDArray[np.int64]]:
     node = piece.find(kind)
     if node is None:
         return []
     arrays = {str(a.get("Name")): file.array(a).astype(np.int64) for a in node.findall("DataArray")}
-    if "offsets" not in arrays or len(arrays["offsets"]) == 0:
+    ends = arrays.get("offsets", np.zeros(0, np.int64))
+    if len(ends) == 0:
         return []
-    return [c for c in np.split(arrays["connectivity"], arrays["offsets"]) if len(c)]
+    corners = arrays["connectivity"]
+    if np.any(np.diff(ends, prepend=0) < 0) or ends[-1] != len(corners) or np.any((corners < 0) | (corners >= count)):
+        got = f"{kind} whose corners are not among its {count} points"
+        raise refused(file.path, got, "whole cells", "write it again")
+    return [c for c in np.split(corners, ends[:-1]) if len(c)]
 
 
 def read_vtp(path: Path) -> Shapes:
     """Points, lines and triangles (polygons are fanned) of a .vtp file. Raises LoadError for any other content."""
-    file = _Vtp(path)
-    piece = file.root.find("./PolyData/Piece")
-    node = None if piece is None else piece.find("./Points/DataArray")
-    if piece is None or node is None:
-        raise refused(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
-    points = _to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3))
-    fans = [
-        np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
-        for p in _cells(file, piece, "Polys")
-        if len(p) > 2
-    ]
-    triangles = np.concatenate(fans) if fans else np.zeros((0, 3), np.int64)
-    return Shapes(points, triangles, tuple(_cells(file, piece, "Lines")))
+    with told(path):
+        file = _Vtp(path)
+        piece = file.root.find("./PolyData/Piece")
+        node = None if piece is None else piece.find("./Points/DataArray")
+        if piece is None or node is None:
+            raise refused(path, "no PolyData piece with points", "one <Piece> of <PolyData>", "export as PolyData")
+        points = reachable(path, to_lps(file.head, file.array(node).astype(np.float64).reshape(-1, 3)))
+        fans = [
+            np.stack([np.full(len(p) - 2, p[0]), p[1:-1], p[2:]], axis=1)
+            for p in _cells(file, piece, "Polys", len(points))
+            if len(p) > 2
+        ]
+        triangles = np.concatenate(fans) if fans else np.zeros((0, 3), np.int64)
+        named = {a.get("Name"): a for a in piece.findall("./PointData/DataArray")}
+        radius = file.array(named[RADIUS]).astype(np.float64) if RADIUS in named else None
+        return Shapes(points, triangles, tuple(_cells(file, piece, "Lines", len(points))), radius)
 
 
 def read_stl(path: Path) -> Shapes:
     """Triangles of an .stl file; equal corners are merged so that the surface is closed."""
-    raw = path.read_bytes()
+    raw = read_bytes(path)
     count = struct.unpack("<I", raw[80:84])[0] if len(raw) >= 84 else -1
     if len(raw) == 84 + 50 * count:
         record = np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("extra", "<u2")])
         corners = np.frombuffer(raw[84:], record)["corner"].reshape(-1, 3).astype(np.float64)
+    elif len(raw) > TEXT_BYTES:
+        got = f"{len(raw)} bytes for {count} triangles"
+        raise refused(path, got, "84 + 50 bytes each (binary), or 64 MiB of text", "save it as binary .stl")
     else:
         found = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", raw)
         try:
             corners = np.array(found, dtype=float).reshape(-1, 3)
-        except ValueError as error:
-            raise refused(path, str(error), "three numbers after each vertex", "export it again as .stl") from error
+        except ValueError:
+            got = "a vertex that is not three numbers"
+            raise refused(path, got, "three numbers after each vertex", "export it again as .stl") from None
     if len(corners) == 0 or len(corners) % 3:
         raise refused(path, f"{len(corners)} corners", "triangles", "export a triangle surface as .stl")
-    points, index = np.unique(corners, axis=0, return_inverse=True)
-    return Shapes(_to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))
+    points, index = np.unique(reachable(path, corners), axis=0, return_inverse=True)
+    return Shapes(to_lps(raw, points), index.reshape(-1, 3).astype(np.int64))

@@ -10,16 +10,20 @@ from time import perf_counter
 import solver
 from pipeline.compare.metrics import METRICS
 from pipeline.compare.nulls import NULLS
-from pipeline.run import outputs, results
+from pipeline.run import ledger, outputs, results
+from pipeline.run.cache import Store
 from pipeline.run.log import CaseProgress, Log, Stage
-from pipeline.run.provenance import collect, package_version, peak_memory_mib
+from pipeline.run.occupied import held
+from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import Store, code_of, digest
+from pipeline.run.store import code_of, digest
+from pipeline.run.view import write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
+from reports.atomic import writing
 from reports.html import render_case
-from reports.schema import ERRORS, POINTS
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up
 from solver._compile import hash_of
 
@@ -36,12 +40,20 @@ class Job:
     fresh: bool = False
     embed: bool = False
     quiet: bool = False
+    verbose: bool = False
     pictures: bool = True
 
     @property
     def folder(self) -> Path:
         """Where the case's files go."""
         return self.out / "cases" / self.case.id
+
+    @property
+    def wants_pages(self) -> ledger.Pages:
+        """Which pages are asked for."""
+        if not self.pictures or self.until != "report":
+            return ""
+        return "embedded" if self.embed else "linked"
 
     @property
     def key(self) -> str:
@@ -54,62 +66,102 @@ class Job:
 
 def clear(folder: Path) -> None:
     """Make a case's folder, and take out of it what an earlier run wrote: it belongs to another result."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in ("result.json", ERRORS.file, POINTS.file, "frames.h5", "report.html", "scene3d.html"):
-        (folder / name).unlink(missing_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
+            (folder / name).unlink(missing_ok=True)
+        for path in folder.glob(".tmp-*"):  # of a run that was killed here: nobody else is at work in this folder
+            path.unlink(missing_ok=True)
     for name in ("view", "figures"):
         shutil.rmtree(folder / name, ignore_errors=True)
 
 
 def finished(job: Job, key: str) -> bool:
-    """Whether the result on disk is complete, ok and made from the same."""
-    path = job.folder / "result.json"
-    if job.fresh or not path.exists():
-        return False
-    try:
-        result = results.read_result(path)
-    except ValueError:
-        return False
-    return result.key == key and result.ok
+    """Whether the result on disk is ok, made from the same, and whole but for its pages."""
+    return _why_again(job, key) is None
+
+
+def _why_again(job: Job, key: str) -> str | None:
+    """Why a case has to be computed: None where it has not, empty where that needs no words."""
+    known = None if job.fresh else ledger.read(job.folder)
+    if known is None or known.key != key:
+        return ""
+    wrong = known.amiss(job.folder, known.data)
+    if wrong:
+        return f"{wrong}: computed again"
+    return None if results.read_result(job.folder / ledger.RESULT).ok else ""
 
 
 def run_case(job: Job) -> None:
-    """Run one case. Whatever happens to it is in its folder, never an exception (but bugs)."""
+    """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
     key = job.key
-    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet)
-    if finished(job, key):
-        progress("compare", 1, 1, "unchanged since the last run, kept")
-        if job.embed and job.pictures:
-            render_case(job.folder, embed=True)
-        return
-    clear(job.folder)
+    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
+    with held(job.folder, progress.warn):
+        again = _why_again(job, key)
+        if again is None:
+            _heal(job, progress)
+            return
+        clear(job.folder)
+        progress.start()
+        if again:
+            progress.warn(again)
+        _compute(job, key, progress)
+
+
+def _compute(job: Job, key: str, progress: CaseProgress) -> None:
     if job.until in ("simulate", "compare", "report"):
         load_kernels(progress)
     clock = perf_counter()
     log = Log(progress)
-    known = run_stages(Context(job.case, job.settings.config, Store(job.cache), log), job.until)
-    progress.close()
+    known = run_stages(Context(job.case, job.settings.config, Store(job.cache, progress.warn), log), job.until)
     _write(job, known, log, key, clock)
-    if job.pictures and job.until == "report":
-        render_case(job.folder, embed=job.embed)
+    if job.wants_pages:
+        draw(job.folder, job.wants_pages)
     progress.write(f"done in {perf_counter() - clock:.2f} s")
 
 
+def _heal(job: Job, progress: CaseProgress) -> None:
+    """Keep a finished case; pages that are missing, altered or of another kind are drawn again from its data."""
+    known = ledger.read(job.folder)
+    assert known is not None
+    wrong = known.amiss(job.folder, known.drawn)
+    if known.pages != job.wants_pages and (job.embed or not known.pages):
+        wrong = "they are of another kind" if known.pages else "the run before ended first"
+    if job.wants_pages and wrong:
+        draw(job.folder, job.wants_pages)
+        progress("compare", 1, 1, f"unchanged since the last run, kept; its pages were drawn again: {wrong}")
+    else:
+        progress("compare", 1, 1, "unchanged since the last run, kept")
+
+
+def draw(folder: Path, pages: ledger.Pages) -> None:
+    """Draw the pages of a case anew, and record them."""
+    shutil.rmtree(folder / "figures", ignore_errors=True)
+    render_case(folder, embed=pages == "embedded")
+    ledger.record_pages(folder, pages)
+
+
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
-    """Every file of the case; result.json last, since it says that the case is complete."""
-    errors = [outputs.error_row(frame, log) for frame in known.frames]
-    tables.write(job.folder / ERRORS.file, ERRORS, errors)
+    """Every file of the case but its pages; the ledger last, since it says that they are complete."""
+    errors = [outputs.error_row(frame) for frame in known.frames]
+    summary = outputs.summary_row(job.case, known, errors)
+    tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
     points = outputs.point_columns(known.frames)
     if points:
         tables.write(job.folder / POINTS.file, POINTS, points)
-    outputs.write_frames(job.folder / "frames.h5", known)
+    for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
+        if rows:
+            tables.write(job.folder / table.file, table, rows)
+    outputs.write_frames(job.folder / ledger.FRAMES, known)
     if job.pictures:
-        outputs.write_view(job.folder / "view", known)
-    summary = outputs.summary_row(job.case, known, errors, log, job.settings.config.compare.bootstrap)
+        write_view(job.folder / "view", known)
+    spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
+    tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
+    results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
     details = results.details_of(job.case, known, log)
-    details |= {"config": job.settings.as_dict(), "provenance": collect()}
-    summary |= {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
+    details |= {"config": job.settings.as_dict(), "provenance": code_state()}
     results.result_of(job.case, known, summary, key, details).write(job.folder)
+    ledger.write(job.folder, key)
 
 
 @functools.cache

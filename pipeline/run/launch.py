@@ -6,7 +6,9 @@ agreement that no parameter moves is suspicious.
 """
 
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,17 +17,22 @@ import numpy as np
 
 from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
+from pipeline.run.cache import Store
 from pipeline.run.case import Job, clear, finished, run_case
-from pipeline.run.provenance import collect
-from pipeline.run.results import LOST, Result, found_results, lost, write_json
+from pipeline.run.log import last_stage
+from pipeline.run.occupied import owner_of
+from pipeline.run.outcome import Outcome
+from pipeline.run.provenance import code_state, this_run
+from pipeline.run.results import found_results, lost, write_json
 from pipeline.run.store import file_hash
+from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
+from pipeline.run.watch import Watch
+from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve, to_toml
-from reports import tables
-from reports.atomic import write_text
+from pipeline.study.settings import Resolved, differing, to_toml
+from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.html import render_index
-from reports.schema import SWEEP
 
 
 class UsageError(InputError):
@@ -35,54 +42,10 @@ class UsageError(InputError):
 
 
 @dataclass(frozen=True)
-class SweepPoint:
-    """One changed setting and the settings that result."""
-
-    parameter: str
-    value: str
-    settings: Resolved
-
-    @property
-    def folder(self) -> Path:
-        """Its sub-folder of the output."""
-        return Path("sweep", f"{self.parameter}={self.value}".replace("/", "_"))
-
-
-def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
-    """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
-    points = []
-    for text in texts:
-        name, equals, values = text.partition("=")
-        if not equals or not values.strip():
-            raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
-        for value in values.split(","):
-            setting = parse_assignment(f"{name}={value}", "sweep")
-            points.append(SweepPoint(name.strip(), value.strip(), resolve([*base, setting])))
-    return points
-
-
-def _lost_points(plan: "Plan") -> list[tuple[SweepPoint, Result]]:
-    """Cases of which a sweep has no result, and at which point."""
-    return [(p, r) for p in plan.points for r in found_results(plan.out / p.folder) if r.status in LOST]
-
-
-def write_sweep(out: Path, points: Sequence[SweepPoint]) -> None:
-    """sweep.csv: the plain result first, then every point."""
-    rows = [_row("(plain)", "", result) for result in found_results(out)]
-    for point in points:
-        rows += [_row(point.parameter, point.value, r) for r in found_results(out / point.folder)]
-    tables.write(out / "sweep.csv", SWEEP, rows)
-
-
-def _row(parameter: str, value: str, result: Result) -> dict[str, Any]:
-    own = {"parameter": parameter, "value": value, "case": result.case}
-    return {name: result.summary.get(name) for name in SWEEP.names} | own
-
-
-@dataclass(frozen=True)
 class Plan:
     """What to run and how. template : settings and output of every case; workers, address : where it runs.
 
+    limits : what a case may take.
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
     """
 
@@ -92,6 +55,7 @@ class Plan:
     points: tuple[SweepPoint, ...] = ()
     workers: int = 1
     address: str = ""
+    limits: Limits = NO_LIMITS
     shard: str = ""
     assumptions: tuple[str, ...] = ()
 
@@ -102,8 +66,19 @@ class Plan:
 
     @property
     def jobs(self) -> list[Job]:
-        """One per case."""
-        return [replace(self.template, case=case) for case in self.cases]
+        """One per case, the longest first, so that no long case is left for the end."""
+        several = self.workers > 1 or self.address
+        longest = sorted(self.cases, key=lambda case: -case.frame_count) if several else self.cases
+        return [replace(self.template, case=case) for case in longest]
+
+    @property
+    def sweep_jobs(self) -> list[Job]:
+        """The same at every point of the sweep; they come last, when the store knows lumen and traces."""
+        return [
+            replace(job, settings=point.cheap, out=self.out / point.folder, pictures=False, quiet=True)
+            for point in self.points
+            for job in self.jobs
+        ]
 
 
 def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case, ...]:
@@ -126,63 +101,83 @@ def _shard(text: str) -> tuple[int, int]:
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
-def guard_out(out: Path, manifest: Path) -> None:
-    """Refuse an output folder that holds something else than a run of the same manifest."""
-    if out.exists() and not out.is_dir():
-        raise UsageError([f"-o {out}: this is a file; name a folder"])
-    if not out.exists() or not any(out.iterdir()):
+def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
+    """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
+    if (out / "simulators").is_dir():
+        raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
+    allowed = "say --resume (keep what fits) or --fresh (compute again)"
+    # a run that ended before its first file was whole leaves nothing but that file's temporary name
+    if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):
         return
-    info = out / "run.json"
-    try:
-        known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256") if info.exists() else None
-    except ValueError:
-        raise UsageError([f"{info} is damaged; say --resume (keep what fits) or --fresh (compute again)"]) from None
-    if not info.exists() and (list(out.glob("run.*.json")) or (out / "manifest.inferred.toml").exists()):
-        return
-    if known != file_hash(manifest):
-        what = "was made from another manifest" if known else "is not empty and holds no run"
-        allowed = "name another folder, or say --resume (keep what fits) or --fresh (compute again)"
-        raise UsageError([f"{out} {what}; {allowed}"])
+    infos, wanted = sorted(out.glob("run*.json")), file_hash(manifest)
+    for info in infos:
+        try:
+            known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256")
+        except (ValueError, AttributeError):
+            raise UsageError([f"{info} is damaged; {allowed}"]) from None
+        if known != wanted:
+            raise UsageError([f"{out} was made from another manifest; name another folder, or {allowed}"])
+    if not infos and not (out / "manifest.inferred.toml").exists():
+        raise UsageError([f"{out} is not empty and holds no run; name another folder, or {allowed}"])
+    others = differing(out / "config.resolved.toml", settings)
+    if others:
+        raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
 def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
-    """Run everything and write what is about the whole; the totals and the path of the page."""
-    out, jobs = plan.out, plan.jobs
-    settings, manifest = plan.template.settings, plan.manifest.path
+    """Run everything and write what is about the whole; the totals and the path of the page.
+
+    Raises UsageError where nothing can be written to begin with, WriteError where that shows later.
+    """
+    out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
-    info |= {"provenance": collect(), "assumptions": plan.assumptions, "config": settings.as_dict()}
+    heads = heads_of(settings, plan.cases, plan.points)
+    info["sweep"] = heads
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
-    write_text(out / "config.resolved.toml", to_toml(settings))
-    write_json(out / name, {"manifest_sha256": info["manifest_sha256"], "cases": []})
-    run_cases(plan, jobs)
-    for point in plan.points:
-        here = replace(plan.template, settings=point.settings, out=out / point.folder, pictures=False, quiet=True)
-        run_cases(plan, [replace(here, case=case) for case in plan.cases])
-    if plan.points:
-        write_sweep(out, plan.points)
-    totals = replace(aggregate(out, info, name), sweep_lost=len(_lost_points(plan)))
+    try:
+        write_json(out / name, info | {"cases": []})
+        write_text(out / "config.resolved.toml", to_toml(settings))
+        write_json(out / name.replace("run", "provenance"), this_run())
+    except WriteError as error:
+        raise UsageError([str(error)]) from error
+    remove_leftovers(out)
+    run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
+    if heads:
+        write_sweep(out, found_heads(out))  # what other shards have done so far is among them
+    info |= {"provenance": code_state(), "assumptions": plan.assumptions, "config": settings.as_dict()}
+    Store(plan.template.cache).trim()
+    totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     if junit:
         write_junit(junit, found_results(out))
     return totals, render_index(out, embed=plan.template.embed)
 
 
 def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
-    """Run jobs, the longest first, so that no long case is left for the end; a crash becomes that case's result."""
-    several = plan.workers > 1 or plan.address
-    longest = sorted(jobs, key=lambda job: -job.case.frame_count) if several else jobs
-    for outcome in run_all(longest, run_case, plan.workers, plan.address):
-        if outcome.error:
-            _write_crash(outcome.job, outcome.error, outcome.log)
+    """Run jobs; a case that could not be finished gets a result that says so. Raises WriteError, which ends the run."""
+    watch = Watch(jobs, silent=plan.template.quiet, lines=plan.template.verbose)
+    quiet = [replace(job, quiet=True) for job in jobs] if watch.bar else jobs
+    outcomes = run_all(quiet, run_case, plan.workers, plan.address, plan.limits)
+    with watch.shown(), closing(outcomes):
+        for outcome in outcomes:
+            if outcome.status == "unwritable":
+                raise WriteError(outcome.error)
+            if outcome.error:
+                _write_lost(outcome)
+            watch.finished(outcome.job, outcome.error)
 
 
-def _write_crash(job: Job, error: str, log: str) -> None:
+def _write_lost(outcome: Outcome[Job, None]) -> None:
     """A result for a job that could not be finished; files of an earlier run, which belong to another one, go."""
+    job, log = outcome.job, outcome.job.folder / "log.txt"
+    owner = owner_of(job.folder)
+    if owner:
+        sys.stderr.write(f"{job.case.id}: {outcome.error}; left to {owner}, which is at work on it\n")
+        return
     clear(job.folder)
-    with (job.folder / "log.txt").open("a", encoding="utf-8") as handle:
-        handle.write(log + "\n")
-    case = job.case
-    result = lost(case.id, "crashed", error, role=case.role, group=case.group, frames=case.frame_count)
-    result.write(job.folder)
+    stage = last_stage(log)
+    with writing(log), log.open("a", encoding="utf-8") as file:
+        file.write(outcome.log + "\n")
+    lost(job.case.id, outcome.status, outcome.error, job.case, stage).write(job.folder)
 
 
 def intention(plan: Plan) -> list[str]:
@@ -206,8 +201,8 @@ def failure_lines(plan: Plan) -> list[str]:
             frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
             lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
     return lines + [
-        f"{point.folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
-        for point, result in _lost_points(plan)
+        f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
+        for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
 
 
@@ -220,6 +215,14 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
+        parts.append(_with_interval(totals.pooled))
     if totals.frames:
         parts.append(f"solver {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
     return ".  ".join(parts) + f".  report: {index}"
+
+
+def _with_interval(pooled: Mapping[str, Any]) -> str:
+    """The pooled error with its interval, or why there is none."""
+    ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
+    known = ends if np.isfinite(pooled["rms_low_mm"]) else ""
+    return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal, TextIO
+from typing import Literal, TextIO
 
 import numpy as np
 
 from pipeline.model import Counters, Levels
+from reports.atomic import writing
 
 Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]
 STAGES: tuple[Stage, ...] = ("load", "segment", "trace", "simulate", "compare", "report")
@@ -21,7 +22,10 @@ Progress = Callable[[str, int, int, str], None]
 
 @dataclass
 class Log:
-    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage).     chosen : and why."""
+    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage).     chosen : and why.
+
+    reused : results by stage that came from the store.
+    """
 
     progress: Progress
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
@@ -29,6 +33,7 @@ class Log:
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     chosen: dict[str, str] = field(default_factory=dict)
+    reused: dict[str, int] = field(default_factory=dict)
     _counts: dict[str, dict[str, float]] = field(default_factory=lambda: defaultdict(dict))
     _levels: dict[str, dict[str, list[float]]] = field(default_factory=lambda: defaultdict(dict))
 
@@ -40,6 +45,10 @@ class Log:
             yield
         finally:
             self.spent(stage, perf_counter() - clock, frame)
+
+    def begins(self, stage: Stage) -> None:
+        """Note that a stage begins: the last line of the log of a case that is killed tells where it was."""
+        self.progress(stage, 0, 0, "begins")
 
     def spent(self, stage: Stage, seconds: float, frame: int | None = None) -> None:
         """Add a time that was measured elsewhere."""
@@ -71,63 +80,58 @@ def _spread(levels: dict[str, list[float]]) -> dict[str, dict[str, float]]:
     }
 
 
+def last_stage(log: Path) -> str:
+    """The stage that the last line of a case's log that names one is about; empty without."""
+    try:
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ""
+    words = (line.partition("] ")[2].partition(" ")[0] for line in reversed(lines))
+    return next((word for word in words if word in STAGES), "")
+
+
 SHOWN = ("segment", "trace", "compare")
-"""Stages whose steps are printed; simulating a frame takes milliseconds and goes to the log alone."""
+"""Stages whose steps are printed; simulating a frame takes milliseconds and is printed with -v alone."""
 
 
 @dataclass
 class CaseProgress:
-    """Reports the steps of one case."""
+    """Reports the steps of one case, a line each. quiet : to its log alone; verbose : steps of every stage."""
 
     case: str
     log: Path
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     quiet: bool = False
+    verbose: bool = False
     _start: float = field(default_factory=perf_counter)
-    _bar: Any = None
-    _stage: str = ""
 
-    def __post_init__(self) -> None:
-        """Start an empty log."""
-        self.log.parent.mkdir(parents=True, exist_ok=True)
-        self.log.write_text("", encoding="utf-8")
+    def start(self) -> None:
+        """Begin the log anew."""
+        with writing(self.log):
+            self.log.write_text("", encoding="utf-8")
 
     def __call__(self, stage: str, done: int, total: int, text: str) -> None:
         """One step of a stage is finished."""
         line = f"[{self.case}] {stage} {done}/{total}  {text}"
         self.write(line)
-        if self.quiet or stage not in SHOWN:
-            return
-        if self.stream.isatty():
-            self._show_bar(stage, done, total, text)
-        else:
+        if total and (self.verbose or (stage in SHOWN and not self.quiet)):
             self.stream.write(line + "\n")
             self.stream.flush()
 
     def say(self, text: str) -> None:
         """A line for the reader and the log that belongs to no step."""
+        if self.quiet:
+            self.write(text)
+        else:
+            self.warn(text)
+
+    def warn(self, text: str) -> None:
+        """A line that every reader has to see."""
         self.write(text)
-        if not self.quiet:
-            self.stream.write(f"[{self.case}] {text}\n")
-            self.stream.flush()
+        self.stream.write(f"[{self.case}] {text}\n")
+        self.stream.flush()
 
     def write(self, line: str) -> None:
         """A line for the log alone."""
-        with self.log.open("a", encoding="utf-8") as handle:
+        with writing(self.log), self.log.open("a", encoding="utf-8") as handle:
             handle.write(f"{perf_counter() - self._start:8.2f} s  {line}\n")
-
-    def _show_bar(self, stage: str, done: int, total: int, text: str) -> None:
-        from tqdm import tqdm
-
-        if stage != self._stage:
-            self.close()
-            self._bar = tqdm(total=total, desc=f"{self.case} {stage}", file=self.stream, leave=False)
-            self._stage = stage
-        self._bar.update(done - self._bar.n)
-        self._bar.set_postfix_str(text)
-
-    def close(self) -> None:
-        """Remove the bar."""
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None

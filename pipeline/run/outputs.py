@@ -1,7 +1,6 @@
 """What is written of a case beside result.json.
 
-A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5, and the files
-that 3D Slicer and ParaView open; LPS mm.
+A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5. LPS mm.
 """
 
 from collections.abc import Sequence
@@ -10,41 +9,53 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.measure import marching_cubes
 
 from pipeline.compare.metrics import rms
-from pipeline.compare.pooled import Row, is_pooled, pooled, skill_of
-from pipeline.model import Array, Lumen, Volume, arc_length
+from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
+from pipeline.model import Volume
 from pipeline.run.log import STAGES, Log
 from pipeline.run.projections import projections
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
+from pipeline.run.view import contact_at
 from pipeline.study.manifest import Case
-from reports import export, frames_file
+from reports import frames_file
 
 TIMED = STAGES[:-1]
 """Stages whose seconds stand in the tables."""
-SIMULATED_COLOUR = (0.835, 0.369, 0.0)
+BEYOND = 2.0
+"""Times u, beyond which an error is the model's."""
 
 
-def summary_row(case: Case, known: Known, errors: Sequence[Row], log: Log, draws: int) -> dict[str, Any]:
-    """The row of a case in summary.csv. errors : its rows of errors.csv; draws : resamples behind the intervals."""
+def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, Any]:
+    """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
     good = sum(frame.ok for frame in known.frames)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
     head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
-    scored = [(row, mm) for row, mm in zip(errors, points, strict=True) if mm is not None and is_pooled(row, mm)]
-    times = {f"{stage}_s": log.seconds[stage] for stage in TIMED}
+    pairs = zip(errors, points, strict=True)
+    scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
+    if case.compared:
+        head["within_1mm"] = within(errors, len(errors))
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
-        head["push_force_max_N"] = max(wire.push_force_N for wire in wires)
-    return head | pooled(scored, draws) | times
+    solved = [frame.solved.push_force_N for frame in known.frames if frame.solved is not None]
+    head |= {"push_force_max_N": max(solved)} if solved else {}
+    return head | pooled(scored)
 
 
-def error_row(frame: Frame, log: Log) -> dict[str, Any]:
+def timing_rows(case: str, log: Log, **whole: float) -> list[dict[str, Any]]:
+    """timings.csv: the case with what is known of the ``whole``, then its frames."""
+    rows = {frame: {"case": case, "frame": frame} for frame in sorted({index for index, _ in log.frame_seconds})}
+    for (index, stage), seconds in log.frame_seconds.items():
+        rows[index] |= {f"{stage}_s": seconds}
+    return [{"case": case, **{f"{stage}_s": log.seconds[stage] for stage in TIMED}, **whole}, *rows.values()]
+
+
+def error_row(frame: Frame) -> dict[str, Any]:
     """One row of errors.csv."""
     row: dict[str, Any] = {
         "frame": frame.index,
@@ -52,7 +63,6 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
         "insertion_mm": frame.depth_mm,
         "roll_deg": frame.roll_deg,
     }
-    row |= {f"{stage}_s": s for (index, stage), s in log.frame_seconds.items() if index == frame.index}
     row |= {f"null_{name}_rms_mm": value for name, value in frame.nulls_rms_mm.items()}
     row |= frame.truth
     if frame.comparison is not None:
@@ -62,23 +72,41 @@ def error_row(frame: Frame, log: Log) -> dict[str, Any]:
     if frame.curve is not None and len(frame.curve.sigma_mm):
         row["trace_sigma_mm"] = rms(frame.curve.sigma_mm)
     if frame.simulated is not None:
-        wire = frame.simulated
-        row |= {"max_penetration_mm": wire.max_penetration_mm, "push_force_N": wire.push_force_N}
-        row |= {"joints": len(wire.joints_mm), "iterations": wire.iterations, "num_mm": frame.num_mm}
+        row |= {"max_penetration_mm": frame.simulated.max_penetration_mm, "joints": len(frame.simulated.joints_mm)}
+    if frame.solved is not None:
+        wire = frame.solved
+        row |= {"push_force_N": wire.push_force_N, "iterations": wire.iterations, "num_mm": frame.num_mm}
         row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
+    return row | budget_of(frame)
+
+
+def budget_of(frame: Frame) -> dict[str, Any]:
+    """What the ensemble says of a frame, as fields of errors.csv."""
+    budget = frame.budget
+    if budget is None:
+        return {}
+    row: dict[str, Any] = {"u_input_mm": rms(budget.input_mm), "energy_score_mm": budget.energy_score_mm}
+    row["released"] = budget.released or None
+    if budget.whole_mm is not None:
+        row["u_val_mm"] = rms(budget.whole_mm)
+    if budget.shapes is not None:
+        real = budget.shapes.real
+        row |= {"release": budget.shapes.simulated, "release_real": real, "log_score_bits": -float(np.log2(real))}
+    elif budget.ratio is not None:
+        row["share_beyond_2u"] = float(np.mean(budget.ratio > BEYOND))
+    if frame.solved is not None and frame.solved.snaps:
+        row["released_at_mm"] = frame.solved.snaps[0].from_mm
     return row
 
 
-def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
-    """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
-
-    Forces of joints are added up, so that their sum does not depend on the length of the segments.
-    """
-    assert frame.simulated is not None
-    arc = arc_length(frame.simulated.joints_mm)
-    force = np.zeros((len(arc_mm), 3))
-    np.add.at(force, np.abs(arc_mm[None, :] - arc[:, None]).argmin(axis=1), frame.simulated.contact_force_N)
-    return np.asarray(np.linalg.norm(force, axis=1))
+def with_strongest(errors: Sequence[dict[str, Any]], summary: Row) -> list[dict[str, Any]]:
+    """The rows of errors.csv with their skill against the case's strongest predictor."""
+    name = summary.get("strongest_null")
+    if not name:
+        return list(errors)
+    nulls = [row.get(f"null_{name}_rms_mm", float("nan")) for row in errors]
+    skills = [skill_of(row.get("rms_mm", float("nan")), null) for row, null in zip(errors, nulls, strict=True)]
+    return [row | {"skill_strongest": skill, "strongest_null": name} for row, skill in zip(errors, skills, strict=True)]
 
 
 def point_columns(frames: Sequence[Frame]) -> dict[str, NDArray[Any]]:
@@ -97,7 +125,15 @@ def _points(frame: Frame) -> dict[str, NDArray[Any]]:
         "error_mm": c.error_mm,
         "foot_arc_mm": c.foot_arc_mm,
         "contact_force_N": contact_at(frame, c.arc_mm),
+        **_over_u(frame, len(c.arc_mm)),
     }
+
+
+def _over_u(frame: Frame, count: int) -> dict[str, NDArray[Any]]:
+    """u_val and the error over it at the points of a frame; NaN where there is no budget."""
+    budget, nothing = frame.budget, np.full(count, np.nan)
+    u, ratio = (None, None) if budget is None else (budget.u_mm, budget.ratio)
+    return {"u_val_mm": nothing if u is None else u, "error_over_u": nothing if ratio is None else ratio}
 
 
 def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
@@ -126,14 +162,6 @@ def write_frames(path: Path, known: Known) -> None:
     frames_file.write_frames(path, scan, map(_arrays_of, known.frames))
 
 
-def write_view(folder: Path, known: Known) -> None:
-    """The lumen and every frame's wires, each in a file."""
-    if known.lumen is not None:
-        _write_lumen(folder, known.lumen)
-    for frame in known.frames:
-        _write_wires(folder, frame)
-
-
 def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
     curve, wire, errors = frame.curve, frame.simulated, frame.comparison
     return frames_file.FrameArrays(
@@ -142,40 +170,13 @@ def _arrays_of(frame: Frame) -> frames_file.FrameArrays:
         trace_sigma_mm=None if curve is None else curve.sigma_mm,
         trace_flags=None if curve is None else np.asarray(curve.flagged) + 2.0 * np.asarray(curve.in_plane),
         simulated_mm=None if wire is None else wire.joints_mm,
-        contact_force_N=None if wire is None else wire.contact_force_N,
+        contact_force_N=None if frame.solved is None else frame.solved.contact_force_N,
         error_mm=None if errors is None else errors.error_mm,
         arc_mm=None if errors is None else errors.arc_mm,
+        median_mm=None if frame.budget is None else frame.budget.median_mm,
+        covariance_mm2=None if frame.budget is None else frame.budget.covariance_mm2,
         truth_mm=frame.truth_mm,
+        seen_in_view_mm=frame.in_view_mm[0] if frame.in_view_mm else None,
+        simulated_in_view_mm=frame.in_view_mm[1] if frame.in_view_mm else None,
         mips=dict(enumerate(frame.projections)),
     )
-
-
-def _write_lumen(folder: Path, lumen: Lumen) -> None:
-    grid = lumen.distance
-    inside = (grid.values < 0).astype(np.uint8)
-    export.write_segmentation_nrrd(
-        folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
-    )
-    if inside.any() and not inside.all():
-        # a copy, since marching cubes wants to write
-        vertices, triangles, _, _ = marching_cubes(np.array(grid.values, dtype=np.float32), 0.0)
-        export.write_surface_vtp(folder / "lumen.vtp", grid.to_mm(vertices), triangles)
-
-
-def _write_wires(folder: Path, frame: Frame) -> None:
-    name = f"{frame.index:03d}"
-    if frame.curve is not None and frame.traced:
-        path = folder / f"wire_traced_{name}.mrk.json"
-        export.write_markups_curve(path, frame.curve.points_mm, f"traced {name}")
-    if frame.simulated is None:
-        return
-    points = joints = frame.simulated.joints_mm
-    path = folder / f"wire_simulated_{name}.mrk.json"
-    export.write_markups_curve(path, joints, f"simulated {name}", colour=SIMULATED_COLOUR)
-    arrays: dict[str, Any] = {"contact_force_N": frame.simulated.contact_force_N}
-    if frame.comparison is not None:
-        errors = frame.comparison
-        points = errors.sample_mm
-        arrays = {"error_mm": errors.error_mm, "arc_mm": errors.arc_mm}
-        arrays["contact_force_N"] = contact_at(frame, errors.arc_mm)
-    export.write_polyline_vtp(folder / f"wire_simulated_{name}.vtp", points, arrays)

@@ -41,8 +41,8 @@ def peak_memory_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
-def collect() -> dict[str, Any]:
-    """Versions, code state, command line and machine of this run."""
+def code_state() -> dict[str, Any]:
+    """Versions and code state: what a result may depend on beside its inputs and settings."""
     commit = _git("rev-parse", "HEAD")
     return {
         "wireval": package_version(),
@@ -50,6 +50,12 @@ def collect() -> dict[str, Any]:
         "git_dirty": bool(commit and _git("status", "--porcelain", "--untracked-files=no")),
         "python": platform.python_version(),
         "versions": {name: version(name) for name in PACKAGES},
+    }
+
+
+def this_run() -> dict[str, Any]:
+    """Command line, machine and time of this run: what no result depends on, and what differs in every run."""
+    return {
         "argv": [Path(sys.argv[0]).name, *sys.argv[1:]],
         "host": platform.node(),
         "system": platform.platform(),

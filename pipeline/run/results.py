@@ -12,16 +12,19 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 
 from pipeline.load import Scans
 from pipeline.register.frames import record
+from pipeline.run import ledger
 from pipeline.run.log import Log
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.run.store import file_hash
+from pipeline.run.store import digest, file_hash
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
+    "worker_lost": "the worker process was killed, twice; its log tells where it was",
+    "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "damaged": "a result file cannot be read; run the case again with --fresh",
 }
 """What may have become of a case that has no result of its own, and the sentences that say so."""
@@ -47,8 +50,9 @@ class Result:
     """A case as result.json holds it.
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
-    key : of everything that the result depends on; empty where it is to be computed again.     details : settings,
-    inputs, counters, assumptions and what else the pages show.
+    key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
+    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     details :
+    settings, inputs, counters, assumptions and what else the pages show.
     """
 
     case: str
@@ -60,6 +64,7 @@ class Result:
     failures: list[Annotated[Row, has("case", "status", "sentence", "message")]]
     summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
+    phantom: str = ""
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -87,11 +92,16 @@ def found_results(out: Path) -> list[Result]:
 
 
 def _found(path: Path) -> Result:
+    folder = path.parent
+    written = ledger.read(folder)
+    wrong = written.amiss(folder, ledger.TABLES) if written else ""
+    if wrong:
+        return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")
     try:
         return read_result(path)
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
-        return lost(path.parent.name, "damaged", f"{path}: {why}")
+        return lost(folder.name, "damaged", f"{path}: {why}")
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
@@ -105,15 +115,19 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, details)
+    source = case.lumen or case.reference
+    phantom = "" if source is None else digest(source)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, details)
 
 
-def lost(name: str, status: str, reason: str, *, role: str = "", group: str = "", frames: int = 0) -> Result:
+def lost(name: str, status: str, reason: str, case: Case | None = None, stage: str = "") -> Result:
     """The result of a case that could not be finished, or whose result cannot be read (see LOST)."""
     sentence = LOST[status]
+    role, group, frames = (case.role, case.group, case.frame_count) if case else ("", "", 0)
     summary: dict[str, Any] = {"case": name, "group": group, "role": role, "status": status}
     summary |= {"frames": frames, "frames_ok": 0, "frames_failed": frames}
-    failure = {"case": name, "status": status, "sentence": sentence, "message": reason, "log": f"cases/{name}/log.txt"}
+    failure = {"case": name, "status": status, "sentence": sentence, "message": reason}
+    failure |= {"log": f"cases/{name}/log.txt"} | ({"stage": stage} if stage else {})
     return Result(name, role, group, status, sentence, [], [failure], summary)
 
 
@@ -122,8 +136,9 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
     clamp: dict[str, Any] = {"entry_mm": case.entry_mm, "entry_direction": case.entry_direction}
     if known.clamp is not None:
         clamp |= {"used_mm": known.clamp.entry_mm, "used_direction": known.clamp.direction}
+        clamp |= {"sigma_mm": known.clamp.sigma_mm, "sigma_deg": known.clamp.sigma_deg}
+        clamp["covariance"] = known.clamp.covariance
     return {
-        "seconds": log.seconds,
         "assumptions": log.assumptions,
         "warnings": log.warnings,
         "wire": case.wire,
@@ -139,7 +154,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
 
 def _events(frame: Frame) -> dict[str, Any]:
     """Where the simulated wire gave way since the frame before, and the hand's work that is not in wire and wall."""
-    wire = frame.simulated
+    wire = frame.solved
     if wire is None:
         return {}
     return {"snaps": [snap._asdict() for snap in wire.snaps], "dissipated_N_mm": wire.dissipated_N_mm}

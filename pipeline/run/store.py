@@ -1,4 +1,4 @@
-"""The store of stage results: a stage whose inputs and code have not changed is not computed again.
+"""The keys of the store of stage results: a stage whose inputs and code have not changed is not computed again.
 
 The key of a result is a hash of everything that it depends on, and of the code that made it: it is made from the values
 that a stage is called with, so nothing can be forgotten. A file counts by its content, never by its name or time, so
@@ -8,24 +8,19 @@ that moving a study recomputes nothing.
 import functools
 import hashlib
 import inspect
-import json
-import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
-from zipfile import BadZipFile
 
 import numpy as np
 from pydantic import BaseModel
 
 from pipeline.load import parts_of
-from pipeline.model import Curve, Lumen, Volume
-from pipeline.status import FrameStatus
+from pipeline.model import Volume
 from solver._compile import hash_of
-from solver.grid import Grid, read_only
 
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
@@ -106,63 +101,3 @@ def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
     """
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
-
-
-def default_root() -> Path:
-    """``$WIREVAL_CACHE``, else the user's cache folder."""
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(os.environ.get("WIREVAL_CACHE") or Path(home) / "wireval" / "stages")
-
-
-@dataclass(frozen=True)
-class Store:
-    """Results on disk, one file a key; ``root`` None switches the store off."""
-
-    root: Path | None
-
-    def _path(self, stage: str, key: str) -> Path | None:
-        return None if self.root is None else self.root / stage / key[:2] / f"{key}.npz"
-
-    def get(self, stage: str, key: str) -> Lumen | Curve | None:
-        """The stored result, or None; a damaged entry counts as absent and is removed."""
-        path = self._path(stage, key)
-        if path is None or not path.exists():
-            return None
-        try:
-            # a file that is opened here is closed here: numpy leaves a damaged one open
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-                arrays: dict[str, Any] = {name: read_only(data[name]) for name in data.files if name != "json"}
-                rest = json.loads(str(data["json"]))
-            if stage == "segment":
-                return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
-            return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
-        except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile):
-            path.unlink(missing_ok=True)
-            return None
-
-    def put(self, stage: str, key: str, result: Lumen | Curve) -> None:
-        """Store a result: written beside, then renamed, so that a reader never sees half of it."""
-        path = self._path(stage, key)
-        if path is None:
-            return
-        named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
-        arrays = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
-        rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}
-        text = json.dumps(rest, default=lambda status: status.name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.stem}.{os.getpid()}.npz")
-        with temporary.open("wb") as handle:
-            np.savez(handle, json=np.array(text), **arrays)  # type: ignore[arg-type]
-        temporary.replace(path)
-
-    def entries(self) -> list[Path]:
-        """Every stored result."""
-        return sorted(self.root.glob("*/??/*.npz")) if self.root and self.root.exists() else []
-
-    def prune(self) -> tuple[int, int]:
-        """Remove every result; returns how many and how many bytes."""
-        found = self.entries()
-        size = sum(p.stat().st_size for p in found)
-        for path in found:
-            path.unlink(missing_ok=True)
-        return len(found), size

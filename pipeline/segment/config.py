@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from pipeline.ranges import Count, NonNegative, Positive, Share, Vector
+from pipeline.ranges import Count, Millimetres, Point, Positive, Reach, Share
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,11 @@ class SegmentConfig:
     """Neighbours of a voxel: 6 (faces) or 26."""
     scale: Count | None = None
     """Voxels on either side over which grey is averaged before affinities are taken; from the noise when not given."""
-    other_seeds_mm: tuple[Vector, ...] = ()
+    other_seeds_mm: tuple[Point, ...] = ()
     """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: cut off at the weakest link."""
-    margin_mm: NonNegative = 5.0
+    margin_mm: Millimetres = 5.0
     """Room around the vessel in the box that holds its signed distance."""
-    outer_mm: Positive = 3.0
+    outer_mm: Reach = 3.0
     """How far outside the wall the distance is exact."""
     least_voxels: Count = 200
     """A smaller connected region is no lumen."""

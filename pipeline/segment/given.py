@@ -68,18 +68,17 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
 
 
 def lumen_from_labels(labels: Volume, config: SegmentConfig) -> Lumen:
-    """Everything but 0 in a label map; the wall is its half level after light smoothing."""
+    """A map of 0 and 1, or of probabilities 0..1; the wall is the half level after light smoothing."""
     grid, axes = in_memory_order(labels)
-    order = np.flatnonzero(grid.values.reshape(-1))
-    binary = grid.with_values((grid.values != 0).astype(np.uint8))
-    site = prepare(binary, order, LABEL_TAPS, config.margin_mm)
+    order = np.flatnonzero(grid.values.reshape(-1) >= 0.5)
+    site = prepare(grid, order, LABEL_TAPS, config.margin_mm)
     values = signed_distance(site, GreyLevels(1.0, 0.0, 0.0), config.outer_mm).values
     distance = reorder(site.grid.with_values(values), axes)
     return _lumen(distance, "the lumen is the given label map, its staircase smoothed")
 
 
 def given_lumen(given: Branches | Shapes | Volume, config: SegmentConfig) -> Lumen:
-    """The lumen that is the union of cones, or inside a closed surface, or labelled with anything but 0."""
+    """The lumen that is the union of cones, or inside a closed surface, or where a map is above 0.5."""
     if isinstance(given, Branches):
         return lumen_from_branches(given, config)
     if isinstance(given, Shapes):

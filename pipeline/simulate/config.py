@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from pipeline.ranges import Finite, Positive, PositiveCount
+from pipeline.ranges import Factor, Finite, NonNegative, Number, PositiveCount, Step
 from solver._kernels.minimise import METHODS
 
-Segment = Positive | Literal["auto"]
+Segment = Step | Literal["auto"]
 COARSEST_MM = 1.0
 """Length of the segments that ``auto`` begins with at most."""
 
@@ -23,19 +23,19 @@ def _known(method: str) -> str:
 class SolverConfig:
     """The energy minimisation."""
 
-    method: Annotated[str, AfterValidator(_known)] = "newton"
+    method: Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum": [*METHODS]})] = "newton"
     """newton, or the seed's closed_form."""
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
-    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d*)$")] = "offset"
+    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d{0,2})$")] = "offset"
     """offset (the smooth limit) or samples:N."""
-    tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-9
+    tolerance: Annotated[float, Number, Field(gt=0, lt=1)] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
     max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""
-    step_mm: Positive = 1.0
+    step_mm: Step = 1.0
     """Longest insertion step; shortened where the scene asks for it."""
-    finest_mm: Positive = 0.05
+    finest_mm: Step = 0.05
     """Steps in which the wire gives way are taken again, down to this length; step_mm or more: never."""
     initial: Literal["slide", "translate"] = "slide"
     """slide or translate: how the wire is moved before it relaxes."""
@@ -48,10 +48,16 @@ class SimulateConfig:
     depth: Literal["traced", "manifest"] = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
     entry: Literal["traced", "manifest"] = "traced"
-    """traced (the clamp is measured in the first 8 mm of the traced wires) or manifest (taken as written)."""
-    bending_scale: Positive = 1.0
-    """Factor on the wire's bending stiffness, for sensitivity runs."""
-    wall_scale: Positive = 1.0
+    """traced (fitted to the first 10 mm of the traces, with the manifest as prior) or manifest (taken as written)."""
+    bending_scale: Factor = 1.0
+    """Factor on the wire's bending stiffness, for sensitivity runs; the same for the whole wire, it scales forces."""
+    taper_scale: Factor = 1.0
+    """Factor on the lengths over which the wire's bending stiffness changes, for sensitivity runs."""
+    rest_curvature_scale: NonNegative = 1.0
+    """Factor on the wire's rest curvature, for sensitivity runs; 0 takes the curve off its tip."""
+    friction: NonNegative | None = None
+    """Coulomb's coefficient instead of the manifest's, for sensitivity runs."""
+    wall_scale: Factor = 1.0
     """Factor on the wall stiffness, for sensitivity runs."""
     roll_offset_deg: Finite = 0.0
     """Added to the roll of every frame, for sensitivity runs."""

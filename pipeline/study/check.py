@@ -1,39 +1,146 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.load import LoadError, Scans, Source, read_headers
-from pipeline.load.curves import read_truth
+from pipeline.load import (
+    Header,
+    LoadError,
+    Scans,
+    Source,
+    each_volume,
+    read_header,
+    require_one,
+    require_same_geometry,
+    require_whole,
+)
+from pipeline.load.curves import read_curve, read_truth
+from pipeline.load.guard import status_of
+from pipeline.load.lumens import read_lumen
+from pipeline.load.masks import mask_header
+from pipeline.load.views import read_views
+from pipeline.load.wires import read_wires
+from pipeline.model import Branches, Shapes
+from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case, not_one_per_frame
+from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
 
-
-def check(cases: Sequence[Case], config: Config) -> list[str]:
-    """Problems of all cases, each with its case's id."""
-    return [f"case {case.id!r}: {text}" for case in cases for text in check_case(case, config)]
+NEAR_MM = 20.0
+"""An entry further than this from the box of the own lumen was not meant for it."""
 
 
-def check_case(case: Case, config: Config) -> list[str]:
+def check(cases: Sequence[Case], config: Config, *, whole: bool = True) -> list[str]:
+    """Problems of all cases, a line each, with its case's id.
+
+    whole : also frames that are cut short. A run does not ask: such a frame is lost, and said, and the others are not.
+    """
+    found = [(case.id, text) for case in cases for text in check_case(case, config, whole=whole)]
+    return [f"case {name!r}: {' '.join(text.split())}" for name, text in found]
+
+
+def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
     """What would stop or spoil this case; empty when nothing is found."""
-    problems = [f"{path}: no such file or folder" for path in inputs_of(case) if not path.exists()]
-    if problems:
-        return problems
-    try:
-        scans = read_headers(case.reference, case.frames, config.load, case.spacing_mm)
-    except LoadError as error:
-        return [str(error)]
-    count = len(scans.frames) or case.frame_count
-    problems += _entry_problems(case, scans)
-    problems += not_one_per_frame(case.lists, count)
-    if case.truth:
+    problems: list[str] = []
+
+    def found(read: Callable[[], None]) -> None:
         try:
-            read_truth(case.truth, count)
+            read()
         except LoadError as error:
             problems.append(str(error))
-    return problems
+
+    for path in inputs_of(case):
+        found(lambda path=path: _require_there(path))  # type: ignore[misc]
+    if problems:
+        return problems
+    headers: list[Header] = []
+    for source in ((case.reference,) if case.reference else ()) + case.frames:
+        found(lambda source=source: headers.append(read_header(source, config.load, case.spacing_mm)))  # type: ignore[misc]
+    for header in headers:
+        if whole or (header.source == case.reference):
+            found(lambda header=header: require_whole(header, config.load))  # type: ignore[misc]
+    if not problems:
+        found(lambda: None if case.reference is None else require_one(headers[0]))
+    if not problems:
+        empty = headers.pop(0) if case.reference else None
+        scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
+        for header in scans.frames:
+            found(lambda header=header: require_same_geometry(scans.all[0], header))  # type: ignore[misc]
+        count = len(scans.frames) or case.frame_count
+        problems += _entry_problems(case, scans)
+        problems += not_one_per_frame(case.lists, count)
+        problems += _told_problems(case, count)
+    for source in case.traces:
+        found(lambda source=source: _read(read_curve(source.path)))  # type: ignore[misc]
+    if case.parameters:
+        try:
+            read_parameters(case.parameters)
+        except ParametersError as error:
+            problems += error.problems
+    return problems + list(_lumen_problems(case, config))
+
+
+def _read(_content: object) -> None:
+    """What was read is not needed: that it can be is."""
+
+
+def _require_there(path: Path) -> None:
+    if status_of(path) is None:
+        raise LoadError(f"{path}: no such file or folder")
+
+
+def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
+    """What is wrong with the user's own lumen; of a label map its header alone is read."""
+    if case.lumen is None:
+        return
+    try:
+        if case.lumen.path.name.lower().endswith((".swc", ".mrk.json", ".stl", ".vtp")):
+            found = read_lumen(case.lumen, config.segment.least_voxels)
+            assert isinstance(found, (Branches, Shapes))
+            ends = found.points_mm if isinstance(found, Shapes) else np.concatenate([found.start_mm, found.end_mm])
+            low, high = ends.min(axis=0), ends.max(axis=0)
+        else:
+            header = mask_header(case.lumen)
+            corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]])
+            low, high = corners.min(axis=0), corners.max(axis=0)
+    except LoadError as error:
+        yield str(error)
+        return
+    away = float(np.linalg.norm(np.maximum(np.maximum(low - case.entry_mm, case.entry_mm - high), 0.0)))
+    if away > NEAR_MM:
+        spans = f"{low.round(1).tolist()} to {high.round(1).tolist()} mm in LPS"
+        yield (
+            f"{case.lumen}: entry_mm {list(case.entry_mm)} lies {away:.0f} mm from the lumen, which spans {spans}; "
+            "is one of them in RAS, or in another unit than mm?"
+        )
+
+
+def _told_problems(case: Case, count: int) -> list[str]:
+    """What is wrong with the truth, the projections and another simulator's wires."""
+    problems = []
+    for told, read in ((case.truth, read_truth), (case.projections, read_views)):
+        try:
+            _read(None if told is None else read(told, count))
+        except LoadError as error:
+            problems.append(str(error))
+    return problems + _others_problems(case, count)
+
+
+def _others_problems(case: Case, count: int) -> list[str]:
+    """What is wrong with all wires of another simulator; what is wrong with some of them is for their frames to say."""
+    if case.simulated is None:
+        return []
+    try:
+        files = read_wires(case.simulated.files, count, case.simulated.space, case.simulated.unit)
+    except LoadError as error:
+        return [str(error)]
+    entry, direction = np.array(case.entry_mm), np.array(case.entry_direction)
+    wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
+    if not files or not case.simulated.files or not all(wrong):
+        return []
+    return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
 
 
 def inputs_of(case: Case) -> list[Path]:

@@ -1,5 +1,7 @@
 """A manifest for a folder of scans: what can be seen is inferred, what cannot is assumed and said."""
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,10 @@ from scipy import ndimage
 from pipeline.load import SUFFIXES, LoadError, load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import unusable
+from pipeline.load.guard import is_folder
+from pipeline.load.order import natural_key
+from pipeline.load.slices import is_dicom, is_multiframe
 from pipeline.model import Array, Volume
-from pipeline.study.manifest import natural_key
 
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
@@ -30,14 +34,28 @@ wire = "assumed"
 
 
 def _is_scan(path: Path) -> bool:
-    return path.name.lower().endswith(SUFFIXES) or (path.is_dir() and any(path.glob("*.dcm")))
+    """A volume in a file, or a folder with DICOM in it."""
+    if is_folder(path):
+        return path.name != "frames" and any(_is_dicom(p) for p in path.iterdir())
+    return path.name.lower().endswith(SUFFIXES) or (_is_dicom(path) and is_multiframe(path))
+
+
+def _is_dicom(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0 and path.name != "DICOMDIR" and is_dicom(path)
 
 
 def _scans_in(folder: Path) -> tuple[Path | None, list[Path]]:
     below = [p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p)]
-    below.sort(key=lambda p: natural_key(str(p.relative_to(folder))))
+    if not below and _is_scan(folder):
+        return None, [folder]
+    below.sort(key=lambda p: natural_key(p.relative_to(folder).as_posix()))
     reference = next((p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES), None)
     return reference, [p for p in below if p != reference]
+
+
+def _named(path: Path, base: Path | None) -> str:
+    """A path as TOML writes it: a JSON text, whatever quotes and backslashes are in it."""
+    return json.dumps((path.relative_to(base) if base else path.resolve()).as_posix(), ensure_ascii=False)
 
 
 def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
@@ -74,11 +92,16 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
 
 
 def infer_manifest(
-    folder: Path, entry: Array | None, direction: Array | None, radius_mm: float | None, config: LoadConfig
+    folder: Path,
+    entry: Array | None,
+    direction: Array | None,
+    radius_mm: float | None,
+    config: LoadConfig,
+    base: Path | None = None,
 ) -> tuple[str, tuple[str, ...]]:
     """The text of a manifest for one case from a folder of scans, and sentences that say where each guess comes from.
 
-    Raises LoadError where there is nothing to go by.
+    base : folder from which scans are named; None names them in full. Raises LoadError where there is nothing to go by.
     """
     reference, frames = _scans_in(folder)
     if not frames:
@@ -99,9 +122,9 @@ def infer_manifest(
     notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")
     text = MANIFEST.format(
         radius=radius,
-        id="".join(c if c.isalnum() or c in "._-" else "_" for c in folder.resolve().name),
-        reference=f'reference = "{reference.resolve()}"\n' if reference else "",
-        frames=", ".join(f'"{p.resolve()}"' for p in frames),
+        id=re.sub(r"[^A-Za-z0-9._-]", "_", folder.resolve().name).lstrip("._-") or "case",
+        reference=f"reference = {_named(reference, base)}\n" if reference else "",
+        frames=", ".join(_named(p, base) for p in frames),
         entry=[round(float(x), 3) for x in entry],
         direction=[round(float(x), 5) for x in direction],
     )

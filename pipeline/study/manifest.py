@@ -3,7 +3,6 @@
 Everything that is wrong with it is listed at once.
 """
 
-import re
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,131 +10,103 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from pipeline.load import Source
-from pipeline.model import OverWire, Wall, Wire
-from pipeline.ranges import Axis, Direction, Finite, Positive, Vector
+from pipeline.load.geometry import LoadError
+from pipeline.load.guard import read_text, status_of
+from pipeline.model import OverWire, Uncertainty, Wall, Wire
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
 from pipeline.status import InputError, did_you_mean
+from pipeline.study.borrowed import borrowing_problems
+from pipeline.study.others import Others, written_out
+from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, Strict, saying
 
-WHOLE_CASE = "whole_case"
-"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
-
-
-def natural_key(text: str) -> list[Any]:
-    """Sort key under which frame_2 comes before frame_10."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", text)]
-
-
-def _problem(*problems: str) -> PydanticCustomError:
-    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
-
-
-def _source(value: Any, info: ValidationInfo) -> Source:
-    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
-    if not isinstance(value, str):
-        raise ValueError("Input should be a valid string")
-    name, _, dataset = value.partition("#")
-    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
-
-
-def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
-    """A list of sources, or a pattern whose matches come in natural order."""
-    if isinstance(value, list):
-        return tuple(_source(item, info) for item in value)
-    source, base = _source(value, info), Path((info.context or {}).get("folder", ""))
-    pattern = value.partition("#")[0]
-    if not any(mark in pattern for mark in "*?["):
-        return (source,)
-    found = sorted(base.glob(pattern), key=lambda p: natural_key(p.name))
-    if not found:
-        problem = f"{info.field_name} = {value!r} matches no file below {base}"
-        raise _problem(problem)
-    return tuple(Source(path, source.dataset) for path in found)
+MANIFEST_BYTES = 16 * 2**20
 
 
 def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
-    if value not in wires:
+    if not isinstance(value, str) or value not in wires:
         problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
-        raise _problem(*[problem] * bool(wires))
+        raise saying(*[problem] * bool(wires))
     return wires[value]
 
 
-def _not_yet(value: Any, info: ValidationInfo) -> Any:
-    """Keys of the contract that `wireval calibrate`, which makes sense of them, will bring."""
-    problem = {
-        "parameters": "parameters cannot be read in this version; write the values into [wires] and [case.wall]",
-        "roll_deg": 'roll_deg = "fit" cannot be carried out in this version; give a number, or one per frame',
-    }[info.field_name or ""]
-    if value == "fit" or info.field_name == "parameters":
-        raise _problem(problem)
-    return value
-
-
-SourceText = Annotated[Source, BeforeValidator(_source)]
-Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
-
-
-class Strict(BaseModel):
-    """Unknown keys are errors; values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+def _not_written(value: Any, info: ValidationInfo) -> None:
+    """A key that is filled in here, never by the user."""
+    known = {"entry_case": 'entry = "case:ID"'}
+    raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
 
 
 class Case(Strict):
     """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
     role: Literal["validation", "calibration"] = "validation"
-    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1)
+    group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()
-    entry_mm: Vector
+    entry_mm: Point
     entry_direction: Direction
+    entry: Annotated[str, Field(pattern=r"^(case:.+)?$")] = ""
+    entry_case: Annotated["Case | None", BeforeValidator(_not_written)] = None
+    entry_sigma_mm: NonNegative | None = None
+    entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
     wire: Annotated[Wire, BeforeValidator(_wire)]
-    insertion_mm: tuple[Positive, ...] | None = None
+    insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
+    insertion_sigma_mm: NonNegative | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
-    lumen: SourceText | None = None
+    lumen: MaskText | None = None
     traces: Sources = ()
-    parameters: Annotated[Path | None, BeforeValidator(_not_yet)] = None
-    roll_deg: Annotated[Finite | tuple[Finite, ...], BeforeValidator(_not_yet)] = 0.0
-    lumen_seed_mm: tuple[Vector, ...] = Field(default_factory=lambda data: (data.get("entry_mm"),))
+    parameters: PathText | None = None
+    calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
+    own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
+    roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
+    roll_sigma_deg: NonNegative | None = None
+    push_force_N: tuple[Finite, ...] | None = None
+    push_force_sigma_N: Positive = 0.001
+    lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
+        default_factory=lambda data: (data.get("entry_mm"),)
+    )
     truth: PathText | None = None
+    projections: PathText | None = None
+    simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
     wall: Wall = Wall()
+    uncertainty: Uncertainty = Uncertainty()
     down: Axis | None = None
     catheter: OverWire | None = None
 
     @property
     def frame_count(self) -> int:
-        """Frames to report on: scans, or depths of a case without scans."""
-        return len(self.frames) or len(self.insertion_mm or ())
+        """Frames to report on: scans, or own curves or depths of a case without scans."""
+        return len(self.frames) or len(self.traces) or len(self.insertion_mm or ())
+
+    @property
+    def compared(self) -> bool:
+        """Whether the real wire is known: in scans, as own curves or from projections."""
+        return bool(self.frames or self.traces or self.projections)
+
+    @property
+    def stated_roll_deg(self) -> float | tuple[float, ...]:
+        """The roll, one for all frames or one per frame; 0 where it is to be fitted."""
+        return 0.0 if self.roll_deg == "fit" else self.roll_deg
 
     @property
     def lists(self) -> dict[str, Any]:
         """What must have one entry per frame."""
         catheter = self.catheter and self.catheter.insertion_mm
         named = {"insertion_mm": self.insertion_mm, "catheter insertion_mm": catheter}
-        return {**named, "roll_deg": self.roll_deg, "traces": self.traces}
+        return {**named, "roll_deg": self.stated_roll_deg, "traces": self.traces, "push_force_N": self.push_force_N}
 
     @model_validator(mode="after")
     def _something_to_do(self) -> "Case":
-        if not self.frames and self.insertion_mm is None:
-            raise ValueError("neither frames nor insertion_mm: give scans to compare with, or depths to simulate")
+        if not (self.frames or self.traces) and self.insertion_mm is None:
+            raise ValueError("neither frames nor insertion_mm: give scans (or traces) to compare with, or depths")
+        if self.projections and (self.frames or self.traces):
+            raise ValueError("projections beside frames or traces: one tells of the real wire; make two cases")
         if not self.frames and self.reference is None and self.lumen is None:
             raise ValueError("no frames, no reference and no lumen: there is no vessel to simulate in")
         return self
@@ -152,7 +123,7 @@ class Case(Strict):
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
         problems += self._over_the_wire()
         if problems:
-            raise _problem(*problems)
+            raise saying(*problems)
         return self
 
     def _over_the_wire(self) -> list[str]:
@@ -207,12 +178,17 @@ class ManifestTables(Strict):
         return value
 
     @model_validator(mode="after")
+    def _entries_known(self) -> "ManifestTables":
+        if problems := borrowing_problems({c.id: (c.entry, bool(c.frames or c.traces)) for c in self.case}):
+            raise saying(*problems)
+        return self
+
+    @model_validator(mode="after")
     def _unique(self) -> "ManifestTables":
-        counts = Counter(case.id for case in self.case)
-        repeats = [name for name, count in counts.items() if count > 1]
+        repeats = [name for name, count in Counter(case.id for case in self.case).items() if count > 1]
         if repeats:
             what = "this id is used more than once; ids name output folders"
-            raise _problem(*(f"case {name!r}: {what}" for name in repeats))
+            raise saying(*(f"case {name!r}: {what}" for name in repeats))
         return self
 
 
@@ -231,17 +207,20 @@ class Manifest:
 def read_manifest(path: Path) -> Manifest:
     """Read and check a manifest (not the scans); raises ManifestError with every problem found."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ManifestError([f"{path}: no such manifest"]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ManifestError([f"{path}: not valid TOML: {error}"]) from None
+        if status_of(path) is None:
+            raise ManifestError([f"{path}: no such manifest"])
+        data = tomllib.loads(read_text(path, MANIFEST_BYTES))
+    except LoadError as error:
+        raise ManifestError([str(error)]) from None
+    except (ValueError, RecursionError) as error:
+        raise ManifestError([f"{path}: not valid TOML: {str(error)[:200]}"]) from None
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
         problems = [text for item in error.errors() for text in _sentences(data, dict(item))]
         raise ManifestError([f"{path}: {text}".replace(": : ", ": ") for text in problems]) from None
-    return Manifest(path, tuple(tables.case))
+    held = {f"case:{case.id}": case for case in tables.case}
+    return Manifest(path, tuple(case.model_copy(update={"entry_case": held.get(case.entry)}) for case in tables.case))
 
 
 def _sentences(data: dict[str, Any], error: dict[str, Any]) -> Iterator[str]:
@@ -274,11 +253,8 @@ def _place(data: dict[str, Any], location: tuple[int | str, ...]) -> list[int | 
 
 def _siblings(location: tuple[int | str, ...]) -> set[str]:
     """The keys that stand beside the one at a location."""
-    tables = {
-        "case": set(Case.model_fields),
-        "wires": {item.name for item in fields(Wire)} - {"name"},
-        "wall": {item.name for item in fields(Wall)},
-        "catheter": {item.name for item in fields(OverWire)},
-    }
+    kinds = {"wires": Wire, "wall": Wall, "catheter": OverWire, "uncertainty": Uncertainty}
+    tables = {name: {item.name for item in fields(kind)} - {"name"} for name, kind in kinds.items()}
+    tables["case"] = set(Case.model_fields)
     nearest = next((part for part in reversed(location[:-1]) if part in tables), None)
     return tables[str(nearest)] if nearest else {"schema", "wires", "case"}

@@ -12,6 +12,7 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
+from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
 from pipeline.load.config import LoadConfig
 from pipeline.segment.config import SegmentConfig
@@ -30,6 +31,7 @@ class Config:
     solver: SolverConfig = field(default_factory=SolverConfig)
     simulate: SimulateConfig = field(default_factory=SimulateConfig)
     compare: CompareConfig = field(default_factory=CompareConfig)
+    budget: BudgetConfig = field(default_factory=BudgetConfig)
 
 
 class SettingsError(InputError):
@@ -121,6 +123,17 @@ def _applied(config: Config, setting: Setting) -> Config:
         reason = error.errors()[0]["msg"]
         raise SettingsError([f"{setting.source}: {setting.name} = {setting.value!r}: {reason}"]) from None
     return replace(config, **{table: replace(current, **{key: value})})
+
+
+def differing(path: Path, settings: Resolved) -> str:
+    """Which settings a run before had otherwise, by its config.resolved.toml; empty where none, or without the file."""
+    try:
+        before = resolve(read_settings(path)).config if path.exists() else settings.config
+    except SettingsError as error:
+        return str(error)
+    old, new = asdict(before), asdict(settings.config)
+    names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
+    return ", ".join(f"{table}.{key} {old[table][key]} before, {new[table][key]} now" for table, key in names)
 
 
 def to_toml(resolved: Resolved) -> str:

@@ -200,7 +200,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
         "faint_mm": verdict.faint_mm, "double_mm": verdict.double_mm,
     }  # fmt: skip
     levels = image.levels | {
-        "residual_rms": tube.residual_rms, "blur_mm": tube.sigma, "cnr": attempt.cnr(image),
+        "residual_rms": tube.residual_rms, "blur_mm": tube.sigma, "knot_mm": tube.knot_mm, "cnr": attempt.cnr(image),
         "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
     }  # fmt: skip
     return Curve(

@@ -1,7 +1,7 @@
 """Files of 3D Slicer, LPS mm: markups curves (.mrk.json), and segmentations (.seg.nrrd) through SimpleITK."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import SimpleITK as sitk
 from numpy.typing import ArrayLike, NDArray
 
 from reports.atomic import replacing, write_text
+from reports.colours import LUMEN, SIMULATED, rgb
 
 Array = NDArray[np.float64]
 _SCHEMA = (
@@ -20,24 +21,34 @@ _POSITION_DIGITS = 6  # a nanometre: below any voxel, above float noise
 
 
 def write_markups_curve(
-    path: Path, points_mm: ArrayLike, name: str, colour: tuple[float, float, float] = (0.0, 0.447, 0.698)
+    path: Path, points_mm: ArrayLike, name: str, colour: str = SIMULATED, measured_mm: Mapping[str, float] | None = None
 ) -> None:
     """Write a curve through points (n, 3), LPS mm, in order.
 
-    colour : red, green, blue from 0 to 1.
+    colour : #RRGGBB.     measured_mm : lengths that stand among its measurements, by name.
     """
     points = checked_points(points_mm, path)
     markup = {
         "type": "Curve",
+        "name": name,
         "coordinateSystem": "LPS",
         "coordinateUnits": "mm",
         "locked": True,
         "labelFormat": "%N-%d",
         "controlPoints": [_control_point(name, i, p) for i, p in enumerate(points, start=1)],
-        "measurements": [],
-        "display": {"visibility": True, "color": list(colour), "selectedColor": list(colour)},
+        "measurements": _measurements(points, measured_mm or {}),
+        "display": {"visibility": True, "color": list(rgb(colour)), "selectedColor": list(rgb(colour))},
     }
     write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
+
+
+def _measurements(points: Array, measured_mm: Mapping[str, float]) -> list[dict[str, Any]]:
+    """The length, which 3D Slicer computes itself, and what it cannot; without what is no number."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    values = {"length": float(steps.sum()), **measured_mm}
+    known = {name: round(value, _POSITION_DIGITS) for name, value in values.items() if np.isfinite(value)}
+    shown = {"enabled": True, "units": "mm", "printFormat": "%-#4.4g%s"}
+    return [{"name": name, "value": value, **shown} for name, value in known.items()]
 
 
 def checked_points(points_mm: ArrayLike, path: Path) -> Array:
@@ -84,7 +95,10 @@ def write_segmentation_nrrd(
     for key, text in _metadata(values.shape, segments).items():
         image.SetMetaData(key, text)
     with replacing(path) as temporary:
-        sitk.WriteImage(image, str(temporary), useCompression=True)
+        try:
+            sitk.WriteImage(image, str(temporary), useCompression=True)
+        except RuntimeError as error:  # of a full disk SimpleITK says no more than that it could not write
+            raise OSError(f"SimpleITK: {str(error).strip().splitlines()[-1]}") from error
 
 
 def _metadata(shape: tuple[int, ...], segments: Sequence[str]) -> dict[str, str]:
@@ -101,7 +115,7 @@ def _metadata(shape: tuple[int, ...], segments: Sequence[str]) -> dict[str, str]
             f"Segment{i}_Name": name,
             f"Segment{i}_LabelValue": str(i + 1),
             f"Segment{i}_Layer": "0",
-            f"Segment{i}_Color": "0.8350 0.3690 0.0000",
+            f"Segment{i}_Color": " ".join(f"{value:.4f}" for value in rgb(LUMEN)),
             f"Segment{i}_Extent": extent,
         }
     return common

@@ -30,12 +30,32 @@ def write_polyline_vtp(path: Path, points_mm: ArrayLike, point_arrays: Mapping[s
 
 def write_surface_vtp(path: Path, vertices_mm: ArrayLike, triangles: ArrayLike) -> None:
     """Write a triangle surface: vertices (n, 3) in LPS mm, triangles (t, 3) of vertex indices."""
+    vertices, faces = checked_surface(path, vertices_mm, triangles)
+    _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), {})
+
+
+def write_collection(folder: Path, stem: str) -> Path | None:
+    """Write ``stem``.pvd over the files ``stem``_NNN.vtp of a folder, the frame being ParaView's time; None without."""
+    root = ET.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    sets = ET.SubElement(root, "Collection")
+    for path in sorted(folder.glob(f"{stem}_[0-9]*.vtp")):
+        frame = str(int(path.stem.removeprefix(f"{stem}_")))
+        ET.SubElement(sets, "DataSet", timestep=frame, group="", part="0", file=path.name)
+    if not len(sets):
+        return None
+    collection = folder / f"{stem}.pvd"
+    write_bytes(collection, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    return collection
+
+
+def checked_surface(path: Path, vertices_mm: ArrayLike, triangles: ArrayLike) -> tuple[Array, Index]:
+    """Vertices (n, 3) and triangles (t, 3) as arrays; ValueError for another shape or an index that points nowhere."""
     vertices = checked_points(vertices_mm, path)
     faces = np.asarray(triangles, dtype=np.int64)
     inside = bool(np.all((faces >= 0) & (faces < len(vertices))))
     if faces.ndim != 2 or faces.shape[1] != 3 or not inside:
         raise ValueError(f"{path}: got triangles {faces.shape}; give (t, 3) indices into the {len(vertices)} vertices")
-    _write(path, vertices, "Polys", (faces.ravel(), 3 * np.arange(1, len(faces) + 1)), {})
+    return vertices, faces
 
 
 def read_surface_vtp(path: Path) -> tuple[Array, Index]:
@@ -59,9 +79,12 @@ def _write(
     """Write points and their cells: kind Lines or Polys; cells: vertices of all cells, and where each cell ends."""
     attributes = {"type": "PolyData", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
     root = ET.Element("VTKFile", attributes)
-    root.append(ET.Comment(" SPACE=LPS; lengths in mm "))
     counts = {"NumberOfPoints": str(len(points)), f"NumberOf{kind}": str(len(cells[1]))}
-    piece = ET.SubElement(ET.SubElement(root, "PolyData"), "Piece", counts)
+    data_set = ET.SubElement(root, "PolyData")
+    # 3D Slicer takes the axes from a text in the field data; a comment it does not read
+    space = {"type": "String", "Name": "SPACE", "NumberOfTuples": "1", "format": "ascii"}
+    ET.SubElement(ET.SubElement(data_set, "FieldData"), "Array", space).text = " ".join(str(c) for c in b"LPS\0")
+    piece = ET.SubElement(data_set, "Piece", counts)
     data = ET.SubElement(piece, "PointData")
     for name, values in point_arrays.items():
         array, n = np.asarray(values, dtype=np.float64), len(points)

@@ -1,11 +1,11 @@
 """A figure from nothing to its files, without display or pyplot: made, its panels furnished, saved as PNG and CSV."""
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,8 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from reports.atomic import write_bytes
-from reports.figures._style import BLUE, GREEN, ORANGE, SEQUENTIAL, SKY, VERMILION, Look
+from reports.colours import SIMULATED, TRACED, TRUE
+from reports.figures._style import SEQUENTIAL, Look
 from reports.tables import write_csv
 
 Array = NDArray[np.floating[Any]]
@@ -30,6 +31,14 @@ _LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
+class FrameAxis(NamedTuple):
+    """Where a panel has its frames: the value of each frame along x (``across``) or y; for marking one in a page."""
+
+    axes: Axes
+    of_frame: Mapping[int, float]
+    across: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """A figure and the numbers that it shows; ``compact`` stores it in a palette, for noisy grey scans."""
@@ -37,6 +46,30 @@ class Drawing:
     figure: Figure
     table: pd.DataFrame
     compact: bool = False
+    frames: Sequence[FrameAxis] = ()
+
+    @property
+    def marks(self) -> list[dict[str, Any]]:
+        """Each panel with frames, once drawn: its box (left, top, width, height) and their places, in percent."""
+        return [_mark(self.figure, panel) for panel in self.frames]
+
+
+def frames_of(table: pd.DataFrame, column: str) -> dict[int, float]:
+    """The value of a column for every frame of a table that has one."""
+    known = table[table[column].notna()]
+    return {int(n): float(v) for n, v in zip(known["frame"], known[column], strict=True)}
+
+
+def _mark(figure: Figure, panel: FrameAxis) -> dict[str, Any]:
+    box = panel.axes.get_position()
+    size = figure.get_size_inches() * figure.dpi
+    way = panel.axes.get_xaxis_transform() if panel.across else panel.axes.get_yaxis_transform()
+    points = [(v, 0.5) if panel.across else (0.5, v) for v in panel.of_frame.values()]
+    places = way.transform(np.array(points).reshape(-1, 2)) / size
+    where = places[:, 0] if panel.across else 1.0 - places[:, 1]
+    percent = [round(100.0 * float(v), 2) for v in (box.x0, 1.0 - box.y1, box.width, box.height)]
+    at = {str(n): round(100.0 * float(v), 2) for n, v in zip(panel.of_frame, where, strict=True)}
+    return {"box": percent, "across": panel.across, "at": at}
 
 
 def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool = True) -> Figure:
@@ -144,6 +177,6 @@ def _palette() -> NDArray[np.uint8]:
     """Greys of a scan, and the curves' colours mixed with them: a palette taken from the picture loses these."""
     greys = np.repeat(np.linspace(0.0, 255.0, _GREYS)[:, None], 3, axis=1)
     backgrounds = np.linspace(0.0, 255.0, 5)
-    colours = [255.0 * np.array(to_rgb(c)) for c in (ORANGE, SKY, GREEN, VERMILION, BLUE)]
+    colours = [255.0 * np.array(to_rgb(c)) for c in (TRACED, SIMULATED, TRUE)]
     mixed = [share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)]
     return np.concatenate([greys, mixed]).round().astype(np.uint8)

@@ -97,6 +97,17 @@ class View:
         if tip:
             axes.plot(across[-1:], up[-1:], "o", color=look["color"], markersize=tip)
 
+    def band(self, axes: Axes, points_mm: Array, covariance_mm2: Array, plane: Plane, **look: Any) -> None:
+        """Fill two standard deviations to both sides of a curve (n, 3), whose points have covariances (n, 3, 3)."""
+        seen, turn = list(plane[1:]), self.scan.direction[:, plane[1:]]
+        centre = self.coordinates(points_mm)[:, seen]
+        along = np.gradient(centre, axis=0)
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        across /= np.maximum(np.linalg.norm(across, axis=1), 1e-9)[:, None]
+        variance = np.einsum("na,ia,nij,jb,nb->n", across, turn, covariance_mm2, turn, across)
+        half = 2.0 * np.sqrt(np.maximum(variance, 0.0))[:, None] * across
+        axes.fill(*np.concatenate([centre + half, (centre - half)[::-1]]).T, **look)
+
     def dress(self, axes: Axes, plane: Plane) -> None:
         """Equal scale, limits, names of the axes; where the vertical axis runs front to back, back is down."""
         axes.set_aspect("equal")

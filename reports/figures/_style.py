@@ -4,43 +4,45 @@ from collections.abc import Iterator
 from itertools import cycle
 from typing import Any
 
+from reports.colours import BAD, TRUE
+from reports.colours import SIMULATED as SIMULATED
+from reports.colours import TRACED as TRACED
 from reports.schema import ERRORS
 
 Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
-ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
-BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
-SIMULATED, TRACED, TRUTH = BLUE, ORANGE, GREEN
-PALETTE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY)
+PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
+INK, GREY = "#222222", "#767676"
+PALETTE = (SIMULATED, TRACED, TRUE, PURPLE, BROWN, BAD)
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {
-    "load": "#BFBFBF",
-    "segment": GREEN,
-    "trace": ORANGE,
-    "simulate": BLUE,
-    "compare": PURPLE,
-    "report": YELLOW,
+    "load": "#C8C8C8",
+    "segment": GREY,
+    "trace": TRACED,
+    "simulate": SIMULATED,
+    "compare": "#E3B5E6",
+    "report": INK,
 }
 # the styles that columns of the schema name, in the order in which they are drawn: the later lie over the earlier
 LINES: dict[str, Look] = {
     "simulated high": {"color": SIMULATED, "linewidth": 0.9, "marker": "^", "markersize": 3},
-    "truth": {"color": TRUTH, "linewidth": 3.5, "alpha": 0.6},
+    "truth": {"color": TRUE, "linewidth": 3.5},
     "simulated": {"color": SIMULATED, "marker": "o", "markersize": 4},
     "floor": {"color": TRACED, "linewidth": 1.0},
     "traced": {"color": TRACED, "marker": "o", "markersize": 4},
     "traced high": {"color": TRACED, "linestyle": ":", "marker": "^", "markersize": 4},
-    "traced tip": {"color": VERMILION, "linestyle": "--", "marker": "s", "markersize": 4},
-    "truth tip": {"color": TRUTH, "linestyle": "--", "linewidth": 1.0},
-    "overlap": {"color": VERMILION, "marker": "s", "markersize": 4},
+    "traced tip": {"color": INK, "linestyle": "--", "marker": "s", "markersize": 4},
+    "truth tip": {"color": TRUE, "linestyle": "--", "linewidth": 1.0},
+    "overlap": {"color": PURPLE, "marker": "s", "markersize": 4},
 }
 # colour, line style and marker of the trivial predictors, in the order of their columns
 _PREDICTOR_LINES: tuple[tuple[str, Any, str], ...] = (
     (PURPLE, "--", "s"),
     (GREY, ":", "v"),
-    (GREEN, "-.", "D"),
-    ("black", (0, (1, 3)), "x"),
-    (SKY, (0, (5, 1)), "P"),
-    (VERMILION, (0, (3, 1, 1, 1)), "*"),
-    (YELLOW, (0, (6, 3)), "X"),
+    (BROWN, "-.", "D"),
+    (INK, (0, (1, 3)), "x"),
+    (ROSE, (0, (5, 1)), "P"),
+    (SLATE, (0, (3, 1, 1, 1)), "*"),
+    (TRACED, (0, (6, 3)), "X"),
 )
 
 

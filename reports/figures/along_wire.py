@@ -5,7 +5,7 @@ import pandas as pd
 from scipy.interpolate import interp1d
 
 from reports.case_files import CaseFiles
-from reports.figures._drawing import Drawing, heat_map, new_figure, whole_numbers
+from reports.figures._drawing import Drawing, FrameAxis, heat_map, new_figure, whole_numbers
 from reports.tables import has
 
 _CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
@@ -16,6 +16,12 @@ def error_along_wire(case: CaseFiles) -> Drawing | None:
     failed = set(case.errors["frame"]) - set(case.good["frame"])
     points = case.points[~case.points["frame"].isin(failed)]
     return _along_wire(points, "error_mm", "distance to the traced curve, mm")
+
+
+def error_over_u(case: CaseFiles) -> Drawing | None:
+    """The error across the traced wire over its uncertainty, of frames that are ok."""
+    points = case.points[case.points["frame"].isin(case.good["frame"])]
+    return _along_wire(points, "error_over_u", "error over u (beyond 2: the model's)")
 
 
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
@@ -59,7 +65,8 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     whole_numbers(axes.yaxis)
     row_of, place = np.nonzero(np.isfinite(grid))
     table = {"frame": frames[row_of], "arc_mm": place * step, column: grid[row_of, place]}
-    return Drawing(figure, pd.DataFrame(table))
+    rows = FrameAxis(axes, {int(n): float(n) for n in frames}, across=False)
+    return Drawing(figure, pd.DataFrame(table), frames=[rows])
 
 
 def _step(points: pd.DataFrame) -> float:

@@ -9,8 +9,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, plain_decades
-from reports.figures._style import BLUE, GREY, PALETTE, Look
+from reports.figures._style import GREY, PALETTE, Look
 from reports.tables import has
 
 _STYLES = tuple(zip((*PALETTE, "black", GREY), "osD^vPX*", strict=True))
@@ -79,7 +80,7 @@ def orders(bench: BenchFiles) -> Drawing | None:
         order, aim, unit = mine["order"].iloc[0], mine["aim"].iloc[0], mine["unit"].iloc[0]
         sizes, errors = mine["size"].to_numpy(float), mine["error"].to_numpy(float)
         level = np.exp(np.mean(np.log(errors) - order * np.log(sizes)))
-        axes.plot(sizes, errors, "o", color=BLUE, markersize=5, label="measured")
+        axes.plot(sizes, errors, "o", color=SIMULATED, markersize=5, label="measured")
         axes.plot(sizes, level * sizes**order, ":", color="0.4", linewidth=1.0, label="fitted order")
         axes.set_title(f"{title}\norder {order:.3f} (aim: {aim})", loc="left", fontsize=9)
         axes.set_xlabel(size)

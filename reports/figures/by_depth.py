@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.case_files import CaseFiles
-from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
-from reports.figures._style import GREY, SIMULATED, TRACED, VERMILION, Look, lines, predictors
+from reports.colours import BAD, SIMULATED, TRACED
+from reports.figures._drawing import Drawing, FrameAxis, frames_of, legend, new_figure, plain, positive_axis
+from reports.figures._style import GREY, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
 
@@ -32,7 +33,7 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
         axes.fill_between(*floor, color=TRACED, alpha=0.15, linewidth=0)
     _mark_failed(axes, case)
     _finish({axes: "distance, mm"})
-    return Drawing(figure, _table(case, shown))
+    return Drawing(figure, _table(case, shown), frames=_depths(case, axes))
 
 
 def tip_by_depth(case: CaseFiles) -> Drawing | None:
@@ -43,12 +44,12 @@ def tip_by_depth(case: CaseFiles) -> Drawing | None:
     figure, (top, tips), (bottom, angles) = _two_panels(good, 4.6, "tip_by_depth", "tip_angle_by_depth")
     wrong = good[good["branch_ok"].eq(other=False).fillna(value=False).astype(bool)]
     if len(wrong):
-        _line(top, wrong, "tip_mm", "tips in different branches", marker="X", linestyle="", color=VERMILION)
+        _line(top, wrong, "tip_mm", "tips in different branches", marker="X", linestyle="", color=BAD)
     positive_axis(top, [good[column] for column in tips])
     bottom.set_ylim(bottom=0.0)
     _mark_failed(top, case)
     _finish({top: "tip distance, mm", bottom: "tip angle, degrees"})
-    return Drawing(figure, _table(case, [*tips, *angles, "branch_ok"]))
+    return Drawing(figure, _table(case, [*tips, *angles, "branch_ok"]), frames=_depths(case, top, bottom))
 
 
 def truth_by_depth(case: CaseFiles) -> Drawing | None:
@@ -60,7 +61,7 @@ def truth_by_depth(case: CaseFiles) -> Drawing | None:
     positive_axis(top, [good[column] for column in traced])
     positive_axis(bottom, [good[column] for column in simulated])
     _finish({top: "traced to true wire, mm", bottom: "simulated wire, mm"})
-    return Drawing(figure, _table(case, ["rms_mm", *traced, *simulated]))
+    return Drawing(figure, _table(case, ["rms_mm", *traced, *simulated]), frames=_depths(case, top, bottom))
 
 
 def skill_by_depth(case: CaseFiles) -> Drawing | None:
@@ -70,13 +71,14 @@ def skill_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure = new_figure(3.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
-    left.axhline(0.0, color=VERMILION, linewidth=1.0, linestyle="--", label="no better than the centreline")
+    left.axhline(0.0, color=BAD, linewidth=1.0, linestyle="--", label="no better")
     shown = _lines(left, good, "skill_by_depth")
     left.set_ylim(min(-0.1, float(good["skill"].clip(lower=-1.0).min()) - 0.05), 1.02)
     _finish({left: "skill (1 is perfect)"})
     table = _pooled(case.statistics)
     _dots(right, table)
-    return Drawing(figure, pd.concat([good[["frame", "insertion_mm", *shown]], table]))
+    numbers = pd.concat([good[["frame", "insertion_mm", *shown]], table])
+    return Drawing(figure, numbers, frames=_depths(case, left))
 
 
 def forces_by_depth(case: CaseFiles) -> Drawing | None:
@@ -88,12 +90,17 @@ def forces_by_depth(case: CaseFiles) -> Drawing | None:
     top.axhline(0.0, color="0.6", linewidth=0.8)
     bottom.set_ylim(bottom=0.0)
     _finish({top: "push force, N", bottom: "deepest overlap\nwith the wall, mm"})
-    return Drawing(figure, _table(case, [*forces, *overlaps]))
+    return Drawing(figure, _table(case, [*forces, *overlaps]), frames=_depths(case, top, bottom))
 
 
 def _by_depth(table: pd.DataFrame) -> pd.DataFrame:
     # a withdrawn wire visits a depth twice: the order of the frames is kept and the line goes back
     return table[table["insertion_mm"].notna()]
+
+
+def _depths(case: CaseFiles, *panels: Axes) -> list[FrameAxis]:
+    """The depth of every frame, for these panels."""
+    return [FrameAxis(axes, frames_of(case.errors, "insertion_mm")) for axes in panels]
 
 
 def _table(case: CaseFiles, columns: Sequence[str]) -> pd.DataFrame:
@@ -125,7 +132,7 @@ def _mark_failed(axes: Axes, case: CaseFiles) -> None:
     failed = _by_depth(case.errors.drop(case.good.index))
     if len(failed):
         look: Look = {"transform": axes.get_xaxis_transform(), "label": "frame without result"}
-        axes.plot(failed["insertion_mm"], [0.02] * len(failed), "x", color=VERMILION, **look)
+        axes.plot(failed["insertion_mm"], [0.02] * len(failed), "x", color=BAD, **look)
 
 
 def _finish(panels: Mapping[Axes, str]) -> None:
@@ -143,7 +150,9 @@ def _pooled(statistics: Mapping[str, Any]) -> pd.DataFrame:
     """Pooled error of the simulation, with its interval, and of every predictor that has one."""
     numbers = ["rms_mm", "rms_low_mm", "rms_high_mm"]
     rows = [("simulated", *(statistics.get(name) for name in numbers))]
-    rows += [(label, statistics.get(column), None, None) for column, label, *_ in predictors()]
+    for column in ERRORS.shown("predictors", "rivals"):
+        label = column.shown.get("predictors") or column.shown.get("rivals")
+        rows.append((label, statistics.get(column.name), None, None))
     table = pd.DataFrame(rows, columns=["predictor", *numbers])
     table[numbers] = table[numbers].apply(pd.to_numeric)
     return table[table["rms_mm"].notna()].reset_index(drop=True)

@@ -1,4 +1,4 @@
-"""Scan, lumen and wires seen along the array axes: a few frames large, every frame small, a case without scans."""
+"""Scan, lumen and wires seen along the array axes: a few frames, or the wires of a case without scans."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,42 +9,42 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.patheffects import withStroke
 
-from reports.case_files import GOOD, CaseFiles, thinned
-from reports.figures._drawing import Drawing, new_figure
-from reports.figures._planes import PLANES, WIDTH_INCH, Plane, View, around, points_table, whole
-from reports.figures._style import GREEN, ORANGE, SKY, VERMILION, Look
+from reports.case_files import WORST, CaseFiles, thinned
+from reports.colours import SIMULATED, TRACED, TRUE
+from reports.figures._drawing import Drawing
+from reports.figures._planes import PLANES, Plane, View, around, points_table, whole
+from reports.figures._style import Look
 from reports.frames_file import FrameArrays, ScanCrop
 
-_LARGE: dict[str, Look] = {
-    "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.8},
-    "true": {"color": GREEN, "linestyle": ":", "linewidth": 1.2},
-    "simulated": {"color": SKY, "linestyle": (0, (4, 2)), "linewidth": 1.2},
-}
-_SMALL: dict[str, Look] = {
-    "traced": {"color": ORANGE, "linestyle": "-", "linewidth": 1.6},
-    "simulated": {"color": SKY, "linestyle": "--", "linewidth": 1.0},
+_BAND: Look = {"facecolor": SIMULATED, "alpha": 0.3, "linewidth": 0}
+_RIM: Look = {"path_effects": [withStroke(linewidth=3.2, foreground="white", alpha=0.75)]}
+"""A curve of any colour stands out from every grey of a scan."""
+_LOOKS: dict[str, Look] = {
+    "traced": {"color": TRACED, "linestyle": "-", "linewidth": 1.8, **_RIM},
+    "true": {"color": TRUE, "linestyle": ":", "linewidth": 1.4},
+    "simulated": {"color": SIMULATED, "linestyle": (0, (4, 2)), "linewidth": 1.4},
 }
 _MAX_FAILED = 3
 _TIP_WINDOW_MM = 10.0
-_COLUMNS = 6  # of the sheet of every frame
-_MAX_FRAMES = 36
-_TITLE_INCH = 0.24
-_PANEL_INCH = (0.9, 3.0)
 _MAX_WIRES = 12  # of a case without scans
 
 
 def projections(case: CaseFiles) -> Drawing | None:
     """First, middle, last and worst frame."""
-    good = case.good[case.good["rms_mm"].notna()]
+    good = case.good[case.good[WORST].notna()]
     if case.scan is None or good.empty:
         return None
     numbers = good["frame"].astype(int).tolist()
-    worst = int(good["rms_mm"].to_numpy().argmax())
+    worst = int(good[WORST].to_numpy().argmax())
     titles: dict[int, list[str]] = {}
     for title, place in (("first", 0), ("middle", len(numbers) // 2), ("last", -1), ("worst", worst)):
         titles.setdefault(numbers[place], []).append(title)
     chosen = [(n, " and ".join(titles[n])) for n in sorted(titles) if n in case.frames]
+    frames = [case.read_frame(n) for n, _ in chosen]
+    if not any(frame.mips or "traced" in frame.curves for frame in frames):
+        return None
     return _draw(case, case.scan, chosen)
 
 
@@ -56,40 +56,6 @@ def failed_projections(case: CaseFiles) -> Drawing | None:
     chosen = zip(failed["frame"].tolist(), failed["status"].tolist(), strict=True)
     with_picture = [(n, title) for n, title in chosen if n in case.frames and case.read_frame(n).mips]
     return _draw(case, case.scan, with_picture[:_MAX_FAILED])
-
-
-def every_frame(case: CaseFiles) -> Drawing | None:
-    """Up to 36 frames, evenly thinned, each with its status or error; the traced and the simulated wire."""
-    table = case.errors[case.errors["frame"].isin(case.frames)]
-    if case.scan is None or len(table) < 2:
-        return None
-    table = table.iloc[thinned(len(table), _MAX_FRAMES)]
-    frames = [case.read_frame(number) for number in table["frame"].tolist()]
-    if not any(frame.mips for frame in frames):
-        return None
-    view = around(case.scan, [f.curves[name] for f in frames for name in _SMALL if name in f.curves])
-    plane = max(PLANES, key=lambda plane: float(view.size[plane.across] * view.size[plane.up]))
-    rows, width = -(-len(frames) // _COLUMNS), WIDTH_INCH / _COLUMNS
-    height = float(np.clip(width * view.size[plane.up] / view.size[plane.across], *_PANEL_INCH))
-    # thirty small panels without labels: a fixed lattice needs no fitting, which is most of the drawing time
-    figure = new_figure(rows * (height + _TITLE_INCH), WIDTH_INCH, fitted=False)
-    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
-    step = _TITLE_INCH / (height + _TITLE_INCH) / rows
-    figure.subplots_adjust(0.005, 0.005, 0.995, 1.0 - step, 0.04, _TITLE_INCH / height)
-    for axes in panels:
-        axes.set_axis_off()
-    for axes, frame, status, rms in zip(panels, frames, table["status"], table["rms_mm"], strict=False):
-        view.show(axes, frame, plane)
-        for name in _SMALL:
-            if name in frame.curves:
-                view.draw(axes, frame.curves[name], plane, **_SMALL[name])
-        axes.set_xlim(view.low[plane.across], view.high[plane.across])
-        axes.set_ylim(view.low[plane.up], view.high[plane.up])
-        axes.set_aspect("equal")
-        good = status in GOOD
-        text = f"{frame.frame}: {rms:.2f} mm" if good and np.isfinite(rms) else f"{frame.frame}: {status}"
-        axes.set_title(text, fontsize=8, loc="left", pad=2, color="black" if good else VERMILION)
-    return Drawing(figure, table[["frame", "status", "insertion_mm", "rms_mm"]], compact=True)
 
 
 def simulated_wires(case: CaseFiles) -> Drawing | None:
@@ -139,10 +105,7 @@ def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) ->
         row[0].set_title(f"frame {number} ({title})", loc="left", fontsize=9)
     handles, labels = rows[0][0].get_legend_handles_labels()
     if handles:
-        legend = figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
-        legend.get_frame().set_facecolor("0.3")  # the line colours are chosen for the dark of the scan
-        for text in legend.get_texts():
-            text.set_color("white")
+        figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
     return Drawing(figure, pd.concat([_table(frame) for frame in frames]), compact=True)
 
 
@@ -150,8 +113,10 @@ def _panel(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:
     if plane.along not in frame.mips:
         axes.set_facecolor("0.25")
     view.show(axes, frame, plane)
+    if frame.median_mm is not None and frame.covariance_mm2 is not None:
+        view.band(axes, frame.median_mm, frame.covariance_mm2, plane, **_BAND)
     for label, points in frame.curves.items():
-        view.draw(axes, points, plane, tip=3, label=label, **_LARGE[label])
+        view.draw(axes, points, plane, tip=3, label=label, **_LOOKS[label])
     view.dress(axes, plane)
 
 

@@ -12,28 +12,27 @@ from reports.tables import has
 
 def run_time(case: CaseFiles) -> Drawing | None:
     """Stacked seconds per frame, and the totals of the case."""
-    stages = [s for s in STAGE_COLOURS if has(case.errors, f"{s}_s")]
-    totals = {s: case.result.get("seconds", {}).get(s) for s in STAGE_COLOURS}
-    known = {s: float(v) for s, v in totals.items() if v is not None and np.isfinite(v) and v > 0}
-    if not stages and not known:
+    names = {stage: f"{stage}_s" for stage in STAGE_COLOURS if has(case.timings, f"{stage}_s")}
+    if not names:
         return None
+    whole = case.timings["frame"].isna()
+    frames, totals = case.timings[~whole], case.timings[whole]
+    known = {stage: float(totals[name].sum()) for stage, name in names.items() if totals[name].sum() > 0}
     figure = new_figure(3.6)
     left, right = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
-    if stages:
-        _stacked(left, case.errors, stages)
+    if len(frames):
+        _stacked(left, frames, list(names))
     else:
         left.remove()
     _totals(right, known)
-    per_frame = case.errors[["frame", *(f"{s}_s" for s in stages)]]
-    in_all = pd.DataFrame([{f"{s}_s": v for s, v in known.items()}], index=["case"])
-    return Drawing(figure, pd.concat([per_frame, in_all]))
+    return Drawing(figure, case.timings[["case", "frame", *names.values()]])
 
 
-def _stacked(axes: Axes, errors: pd.DataFrame, stages: list[str]) -> None:
-    base = np.zeros(len(errors))
+def _stacked(axes: Axes, frames: pd.DataFrame, stages: list[str]) -> None:
+    base = np.zeros(len(frames))
     for stage in stages:
-        seconds = errors[f"{stage}_s"].fillna(0.0).to_numpy()
-        axes.bar(errors["frame"], seconds, bottom=base, color=STAGE_COLOURS[stage], label=stage, width=0.85)
+        seconds = frames[f"{stage}_s"].fillna(0.0).to_numpy()
+        axes.bar(frames["frame"], seconds, bottom=base, color=STAGE_COLOURS[stage], label=stage, width=0.85)
         base = base + seconds
     axes.set_xlabel("frame")
     axes.set_ylabel("seconds")

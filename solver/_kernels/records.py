@@ -72,7 +72,7 @@ Closed form. share : of its own step.     next_check : iteration at which it is 
 """
 PLACE = record(
     *((name, float) for name in ("inserted", "roll", "energy", "shrink", "last_step", "last_turn", "rise", "resigned")),
-    *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm")),
+    *((name, float) for name in ("seen_depth", "seen_roll", "seen_catheter", "seen_calm", "seen_pivot")),
     *((name, float) for name in ("push", "torque", "dissipated", "calm", "rubbed")),
     *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
     ("snaps", np.int64),
@@ -85,7 +85,7 @@ resigned : 1 where short steps to where a rough one led failed: then long ones a
 push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
 by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.
 seen_depth, seen_roll, seen_catheter : where a rough step led that is being taken again; nan where there is none.
-seen_calm : what calm was before it.
+seen_calm : what calm was before it.     seen_pivot : the least with which it counts that both ways agree.
 catheter, goal, next : its tip, where it is to go, and where this step takes it, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
 """

@@ -59,6 +59,9 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     # a wire that went no further than its base was pushed did not snap: the trapezium rule left that of its work
     if doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change:
         note_snap(problem, at, moved, (reached[0], books.missing))
+        # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
+        if min(handle.report[1].pivot, report.pivot) > tol.SOFT:
+            at.seen_pivot = math.inf
     trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
     at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
     return CONVERGED
@@ -109,6 +112,8 @@ def doubt(books: Books, used: int, shrink: float, pivot: float) -> bool:
 def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, float]) -> None:
     """Keep the wire that a rough step led to, for that of shorter steps to be held against it."""
     at.seen_depth, at.seen_roll, at.seen_catheter, at.seen_calm = reached[0], reached[1], at.next, at.calm
+    # to which side a straight wire turns that touched nothing may be decided by rounding: both ways agree by chance
+    at.seen_pivot = tol.LOOSE if at.energy > 0.0 else tol.FREE
     for n in range(k + 1):
         store3(problem.scratch.seen, n, load3(problem.state.x[CURRENT], n))
 
@@ -129,7 +134,7 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
     left = abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) + abs(at.next - at.seen_catheter)
     if left < tol.MATCH_DEPTH_MM:
         same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
-        at.calm = at.seen_calm + ahead if same and at.resigned == 0.0 and report.pivot > tol.LOOSE else 0.0
+        at.calm = at.seen_calm + ahead if same and at.resigned == 0.0 and report.pivot > at.seen_pivot else 0.0
         at.seen_depth, at.resigned = math.nan, 0.0
 
 

@@ -141,3 +141,15 @@ def test_real_trees_give_a_way(real_data: Path, name: str) -> None:
     assert way.tubes[0].length_mm > 35
     inner = way.tubes[0].points_mm[8:-8]
     assert np.all(way.distance(inner) < -0.4)
+
+
+@pytest.mark.parametrize("name", ["text.mha", "tiny.mha", "flat.mha"])
+def test_a_background_that_is_none_is_refused(tmp_path: Path, name: str) -> None:
+    """Not a traceback of SimpleITK or scipy."""
+    path = tmp_path / name
+    if name == "text.mha":
+        path.write_text("hello")
+    else:
+        sitk.WriteImage(sitk.Image([4 if name == "tiny.mha" else 20] * 3, sitk.sitkInt16), str(path))
+    with pytest.raises(ValueError, match=rf"{name}: .*allowed"):
+        background_scene(path)

@@ -32,7 +32,7 @@ def check(outcomes: dict[int, batch.Outcome[int, None]], folder: Path) -> None:
     assert sorted(outcomes) == list(range(8))
     assert outcomes[2].error == "RuntimeError: burst pipe"
     assert "in work" in outcomes[2].log
-    assert outcomes[3].error == LOST
+    assert (outcomes[3].error, outcomes[3].status) == (LOST, "worker_lost")
     assert [job for job, outcome in sorted(outcomes.items()) if not outcome.error] == [0, 1, 4, 5, 6, 7]
     assert sorted(p.name for p in folder.glob("done *")) == [f"done {j}" for j in (0, 1, 4, 5, 6, 7)]
 

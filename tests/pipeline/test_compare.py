@@ -10,6 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.arrays.polyline import at_arc, resample, samples, tip_tangent, to_length
 from pipeline.compare import compare, compare_truth, point_to_curve, rms
+from pipeline.compare.branches import branches_of
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.metrics import Way, scored
 from pipeline.model import Curve, Lumen, arc_length
 from solver import Solution, Status
 from solver.grid import Grid
@@ -115,9 +118,15 @@ def test_the_segment_length_cannot_flatter() -> None:
 def test_a_wire_too_short_is_seen_by_coverage_tip_and_the_way_back() -> None:
     result = compare(simulated(line(10.0)), traced(line(20.0)), open_space())
     assert result["rms_mm"] == pytest.approx(0.0, abs=1e-12)
-    assert result["coverage"] == pytest.approx(0.5)
+    assert result["coverage"] == pytest.approx(3 / 21), "of 10 to 20 mm the 1 mm that is near enough"
     assert result["tip_mm"] == pytest.approx(10.0)
     assert result["hausdorff_mm"] == pytest.approx(10.0)
+
+
+def test_coverage_is_what_the_simulated_wire_comes_near_to() -> None:
+    """A wire of the right length in the wrong place covers nothing; by its length alone it covered all."""
+    assert compare(simulated(line(20.0, 1.5)), traced(line(20.0)), open_space())["coverage"] == 0.0
+    assert compare(simulated(line(20.0, 0.9)), traced(line(20.0)), open_space())["coverage"] == 1.0
 
 
 def test_tips_with_a_wall_between_them_are_in_different_branches() -> None:
@@ -127,6 +136,66 @@ def test_tips_with_a_wall_between_them_are_in_different_branches() -> None:
     lumen = Lumen(grid)
     assert not compare(simulated(line(20.0, 4.0)), traced(line(20.0, -4.0)), lumen)["branch_ok"]
     assert compare(simulated(line(20.0, 4.0)), traced(line(20.0, 5.0)), lumen)["branch_ok"]
+
+
+def tubes(*paths: np.ndarray, voxel: float = 0.4, radius: float = 1.5) -> Lumen:
+    """Round vessels along polylines, as a lumen."""
+    low = np.min([path.min(axis=0) for path in paths], axis=0) - 2 * radius
+    high = np.max([path.max(axis=0) for path in paths], axis=0) + 2 * radius
+    axes = [np.arange(a, b, voxel) for a, b in zip(low, high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    near = [point_to_curve(points.reshape(-1, 3), path)[0].reshape(points.shape[:3]) for path in paths]
+    return Lumen(Grid((np.min(near, axis=0) - radius).astype(np.float32), np.full(3, voxel), low))
+
+
+FORK = np.array([0.0, 0.0, 0.0]), np.array([12.0, 0.0, 0.0]), np.array([22.0, 8.0, 0.0]), np.array([22.0, -8.0, 0.0])
+
+
+def test_branches_are_those_of_the_graph() -> None:
+    """Two branches behind a fork are two, and neither is the vessel before it; at the fork all are one."""
+    start, fork, left, right = FORK
+    found = branches_of(tubes(np.array([start, fork, left]), np.array([fork, right])).distance, start)
+    assert not found.at(left) & found.at(right)
+    assert not found.at(0.5 * (fork + left)) & found.at(0.5 * (fork + right))
+    assert not found.at(0.5 * start + 0.5 * fork) & found.at(left)
+    apart = fork + np.array([2.0, 0.0, 0.0])  # here the two lumens part
+    assert found.at(apart) >= found.at(left) | found.at(right)
+    assert found.at(left) == found.at(0.4 * fork + 0.6 * left)
+
+
+def test_a_sac_on_the_wall_makes_no_two_vessels_of_one() -> None:
+    """A straight line between the tips crossed the wall beside the neck, and they were called in different branches."""
+    vessel, sac = np.array([[0.0, 0, 0], [24.0, 0, 0]]), np.array([[12.0, 2.0, 0], [12.0, 2.6, 0]])
+    lumen = tubes(vessel, sac)
+    found = branches_of(lumen.distance, vessel[0])
+    assert found.at(np.array([8.0, 0.5, 0])) & found.at(np.array([16.0, -0.5, 0]))
+    bend = np.array([[0.0, 0, 0], [10.0, 0, 0], [10.0, 10.0, 0]])
+    one = branches_of(tubes(bend).distance, bend[0])
+    assert one.at(np.array([5.0, 1.0, 0])) & one.at(np.array([11.0, 6.0, 0])), "their straight line leaves the bend"
+
+
+def test_the_tip_along_and_across_the_vessel_and_the_depth_that_is_off() -> None:
+    axis = line(30.0)
+    way = Way(axis, branches_of(tubes(axis).distance, axis[0]))
+    deeper = line(21.0, 0.4)
+    result = compare(simulated(deeper), traced(line(20.0, 0.0)), open_space(), way=way)
+    assert (result["tip_along_mm"], result["tip_across_mm"]) == pytest.approx((1.0, 0.4))
+    straight = compare(simulated(line(20.0) + np.array([0.7, 0.3, 0.0])), traced(line(20.0)), open_space(), way=way)
+    assert straight["depth_offset_mm"] == pytest.approx(0.7)
+    assert straight["arc_rms_mm"] ** 2 - 0.7**2 == pytest.approx(0.3**2), "what one offset leaves"
+
+
+def test_the_side_of_the_vessel_counts_where_it_is_known() -> None:
+    axis = line(30.0)
+    way = Way(axis, branches_of(tubes(axis).distance, axis[0]))
+
+    def agrees(first: float, second: float) -> float:
+        return compare(simulated(line(20.0, first)), traced(line(20.0, second)), open_space(), way=way)["side_ok"]
+
+    assert agrees(0.8, 0.3) == 1.0
+    assert agrees(0.8, -0.3) == 0.0
+    assert np.isnan(agrees(0.8, 0.05)), "nearer to the axis than 0.1 mm nobody knows"
+    assert np.isnan(compare(simulated(line(20.0, 1.0)), traced(line(20.0, 1.0)), open_space())["side_ok"]), "no axis"
 
 
 def test_truth_errors_do_not_apply_where_there_is_no_curve() -> None:
@@ -142,3 +211,26 @@ def test_rms_of_nothing_is_not_zero() -> None:
 def test_an_empty_curve_is_refused() -> None:
     with pytest.raises(ValueError, match="need 2 of each"):
         compare(simulated(line(5.0)), Curve(np.zeros((0, 3)), np.zeros(0)), open_space())
+
+
+def test_the_clamps_reach_counts_in_no_score() -> None:
+    """A wire that is wrong in its first 10 mm alone is right; one that is wrong beyond is not made better by them."""
+    arc = np.linspace(0.0, 30.0, 61)
+    bent = np.column_stack([arc, np.where(arc < 9.0, 1.0, 0.0), 0 * arc])
+    result = compare(simulated(line(30.0)), traced(bent), open_space())
+    assert result["rms_mm"] == pytest.approx(0.0, abs=1e-12)
+    assert result.arc_mm[0] == pytest.approx(10.0)
+    whole = compare(simulated(line(30.0)), traced(bent), open_space(), CompareConfig(skip_mm=0.0))
+    assert whole["rms_mm"] > 0.4  # 9 of 30 mm are 1 mm off
+
+
+def test_of_a_wire_hardly_longer_than_the_reach_its_end_counts() -> None:
+    for length, first in ((11.0, 9.0), (3.0, 1.5), (12.0, 10.0), (40.0, 10.0)):
+        assert scored(samples(length, 0.5), 10.0)[0] == pytest.approx(first)
+
+
+def test_the_distal_errors_are_of_the_last_millimetres() -> None:
+    arc = np.linspace(0.0, 40.0, 81)
+    curve = np.column_stack([arc, np.where(arc > 35.0, 1.0, 0.0), 0 * arc])
+    result = compare(simulated(line(40.0)), traced(curve), open_space())
+    assert result["distal10_rms_mm"] > result["distal20_rms_mm"] > result["rms_mm"] > 0.0

@@ -14,7 +14,6 @@ import SimpleITK as sitk
 from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
-from pipeline.load.files import read_mha_box
 from pipeline.run.store import file_hash
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
@@ -70,7 +69,6 @@ def test_a_crop_of_an_mha_is_the_crop_of_all_of_it(tmp_path: Path, kind: type, c
     crop = load(read_header(path), box)
     assert crop.values.dtype == kind
     np.testing.assert_array_equal(crop.values, values[1:5, 0:6, 2:9])
-    assert (read_mha_box(path, box) is None) == compressed
 
 
 def test_big_endian_and_detached_data_are_read(tmp_path: Path) -> None:
@@ -116,7 +114,7 @@ def test_a_key_opens_no_header_of_a_series(tmp_path: Path, monkeypatch: pytest.M
     """Every frame and every point of a sweep asks for the hash of its folder."""
     for name in ("a.dcm", "b"):
         (tmp_path / name).write_bytes(name.encode())
-    monkeypatch.delattr("pipeline.load.dicom.frames_of")
+    monkeypatch.delattr("pipeline.load.dicom.dataset")
     assert file_hash(tmp_path) == file_hash(tmp_path)
 
 
@@ -191,8 +189,7 @@ def test_an_hdf5_dataset_without_spacing_names_what_is_missing(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("damage", "found"),
-    [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "cannot reshape")],
+    ("damage", "found"), [(lambda path: path.write_bytes(path.read_bytes()[:500]), "truncated"), (None, "3 numbers")]
 )
 def test_a_damaged_hdf5_file_is_said(tmp_path: Path, damage: object, found: str) -> None:
     path = tmp_path / "study.h5"

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.study.manifest import ManifestError, natural_key, read_manifest
+from pipeline.load.order import natural_key
+from pipeline.study.manifest import ManifestError, read_manifest
 
 GOOD = """
 schema = 1
@@ -57,7 +58,7 @@ def test_natural_order() -> None:
     [
         (("radius_mm", "radus_mm"), "unknown key; did you mean 'radius_mm'?"),
         (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
-        (("radius_mm = 0.18", "radius_mm = -1"), "greater than 0; found -1"),
+        (("radius_mm = 0.18", "radius_mm = -1"), "greater than or equal to 0.001; found -1"),
         (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
         (('frames = "frames/*.mha"', 'frames = "nothing/*.mha"'), "matches no file"),
         (('frames = "frames/*.mha"', ""), "neither frames nor insertion_mm"),
@@ -65,8 +66,8 @@ def test_natural_order() -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
-        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fit"'), "cannot be carried out in this version"),
-        (('wire = "soft"', 'wire = "soft"\nparameters = "x.toml"'), "cannot be read in this version"),
+        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "Input should be 'fit'; found 'fitted'"),
+        (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "unknown key 'calibrated'; write parameters = FILE"),
         *(
             (("entry_mm", f"catheter = {{ {keys} }}\nentry_mm"), expected)
             for keys, expected in (
@@ -121,3 +122,21 @@ def test_broken_toml_and_no_file(tmp_path: Path) -> None:
     assert "not valid TOML" in problems(tmp_path, "schema = = 1")
     with pytest.raises(ManifestError, match="no such manifest"):
         read_manifest(tmp_path / "nothing.toml")
+
+
+SECOND = GOOD.split("[[case]]")[1].replace("run1", "run2")
+
+
+def test_a_clamp_is_borrowed_from_another_case(tmp_path: Path) -> None:
+    first, second = read_manifest(written(tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run1"\n')).cases
+    assert second.entry_case is not None
+    assert second.entry_case.id == "run1"
+    assert first.entry_case is None
+
+
+def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) -> None:
+    assert "no such case; did you mean 'run1'?" in problems(
+        tmp_path, f'{GOOD}\n[[case]]{SECOND}\nentry = "case:run3"\n'
+    )
+    assert "shows no clamp" in problems(tmp_path, f'{GOOD}\nentry = "case:run1"\n')
+    assert "unknown key" in problems(tmp_path, f"{GOOD}\nentry_case = {{}}\n")

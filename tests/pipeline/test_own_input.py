@@ -12,10 +12,12 @@ from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
 from pipeline.load.curves import read_curve
+from pipeline.load.geometry import Mask
 from pipeline.load.lumens import read_lumen
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
+from tests.fuzz.inputs import markups, stl, tetrahedra, vtp
 
 RADIUS, LENGTH = 1.5, 12.0
 START = np.array([3.0, -2.0, 1.0])
@@ -104,6 +106,107 @@ def test_label_map(tmp_path):
     sitk.WriteImage(image, str(tmp_path / "label.nrrd"))
     error = errors(lumen_in(tmp_path / "label.nrrd"), within=0.3)
     assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
+
+
+def labels(path, values, voxel, origin):
+    image = sitk.GetImageFromArray(values.T)
+    image.SetSpacing([voxel] * 3)
+    image.SetOrigin(origin.tolist())
+    sitk.WriteImage(image, str(path))
+
+
+def mask(path, **which):
+    config = SegmentConfig()
+    return given_lumen(read_lumen(Mask(path, **which), config.least_voxels), config)
+
+
+def test_one_label_of_several_by_number(tmp_path):
+    """As nnU-Net and TotalSegmentator write them."""
+    distance, voxel, origin = capsule()
+    values = np.where(distance < 0, 2, 0).astype(np.uint8)
+    values[distance > 0.7] = 1
+    values[:3] = 3
+    labels(tmp_path / "seg.nii.gz", values, voxel, origin)
+    error = errors(mask(tmp_path / "seg.nii.gz", label=2), within=0.3)
+    assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
+    with pytest.raises(LoadError, match=r"4 different values, 0, 1, 2, 3.*name one"):
+        mask(tmp_path / "seg.nii.gz")
+    with pytest.raises(LoadError, match="0 labelled voxels"):
+        mask(tmp_path / "seg.nii.gz", label=7)
+    with pytest.raises(LoadError, match="no label named 'artery'"):
+        mask(tmp_path / "seg.nii.gz", label="artery")
+
+
+@pytest.mark.parametrize("top", [1.0, 255.0])
+def test_a_probability_has_its_wall_at_a_half(tmp_path, top):
+    """0 to 255 was taken as everything but 0: nearly twice the lumen."""
+    distance, voxel, origin = capsule()
+    share = top / (1 + np.exp(distance / 0.15))
+    kind = np.float32 if top == 1.0 else np.uint8
+    labels(tmp_path / "p.nrrd", share.astype(kind), voxel, origin)
+    error = errors(mask(tmp_path / "p.nrrd"), within=0.3)
+    assert np.sqrt(np.mean(error**2)) < 0.15 * voxel
+    wider = errors(mask(tmp_path / "p.nrrd", level=0.2), within=0.3)
+    assert np.median(wider) < -0.1
+
+
+def test_layers_and_names_of_a_segmentation(tmp_path):
+    """3D Slicer puts segments that overlap into layers, which stand beside each other voxel by voxel."""
+    distance, voxel, origin = capsule()
+    first, second = (distance < -0.6).astype(np.uint8), np.where(distance < 0, 5, 0).astype(np.uint8)
+    both = np.stack([first, second]).astype(np.uint8)
+    head = "NRRD0004\ntype: uint8\ndimension: 4\nspace: left-posterior-superior\n"
+    head += f"sizes: 2 {' '.join(map(str, distance.shape))}\nkinds: list domain domain domain\nencoding: raw\n"
+    head += f"space directions: none ({voxel},0,0) (0,{voxel},0) (0,0,{voxel})\n"
+    head += f"space origin: ({','.join(map(str, origin))})\n"
+    for k, (name, value) in enumerate((("core", 1), ("artery", 5))):
+        head += f"Segment{k}_Name:={name}\nSegment{k}_Layer:={k}\nSegment{k}_LabelValue:={value}\n"
+    (tmp_path / "s.seg.nrrd").write_bytes(head.encode() + b"\n" + both.tobytes(order="F"))
+    for which in ("artery", 5):
+        error = errors(mask(tmp_path / "s.seg.nrrd", label=which), within=0.3)
+        assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
+    with pytest.raises(LoadError, match=r"2 layers.*one of artery, core"):
+        mask(tmp_path / "s.seg.nrrd")
+    with pytest.raises(LoadError, match="did you mean 'artery'"):
+        mask(tmp_path / "s.seg.nrrd", label="atery")
+
+
+def test_a_centreline_of_vmtk(tmp_path):
+    points = START + np.array([[LENGTH * k / 4, 0, 0] for k in range(5)])
+    radius = (
+        f'<PointData><DataArray type="Float64" Name="MaximumInscribedSphereRadius" format="ascii">{f"{RADIUS} " * 5}'
+    )
+    text = vtp(points, lines=range(5)).decode().replace("<Points>", f"{radius}</DataArray></PointData><Points>")
+    (tmp_path / "c.vtp").write_text(text)
+    assert np.abs(errors(lumen_in(tmp_path / "c.vtp"))).max() < 1e-5
+    (tmp_path / "c.vtp").write_text(text.replace(f"{RADIUS} ", "-1 ", 1))
+    with pytest.raises(LoadError, match="one finite radius above 0 for each point"):
+        lumen_in(tmp_path / "c.vtp")
+
+
+def test_a_curve_says_its_unit(tmp_path):
+    """.mrk.json in metres was read as mm."""
+    points = np.array([[0.0, 0, 0], [0, 0, 0.01], [0, 0, 0.03]])
+    (tmp_path / "a.mrk.json").write_bytes(markups(points, coordinateUnits="m"))
+    np.testing.assert_allclose(read_curve(tmp_path / "a.mrk.json").points_mm, 1000 * points)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(0.001, "is it in metres"), (1000.0, "another unit than mm"), (1e9, "another unit than mm")]
+)
+def test_a_surface_in_another_unit_is_refused(tmp_path, factor, said):
+    points, faces = tetrahedra(1, 9.0)
+    (tmp_path / "a.stl").write_bytes(stl(points * factor, faces))
+    with pytest.raises(LoadError, match=said):
+        lumen_in(tmp_path / "a.stl")
+
+
+def test_a_surface_of_thousands_of_shells_is_refused(tmp_path):
+    """It was a hang."""
+    points, faces = tetrahedra(5000, 20.0, 0.001)
+    (tmp_path / "a.stl").write_bytes(stl(points, faces))
+    with pytest.raises(LoadError, match="remove what covers itself"):
+        lumen_in(tmp_path / "a.stl")
 
 
 def test_curves_come_back_as_they_were_written(tmp_path):

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import io
+import re
+import time
 from pathlib import Path
 
+from pipeline.run.case import Job
 from pipeline.run.log import CaseProgress
+from pipeline.run.watch import EVERY_S, Watch, share_done
+from pipeline.study.manifest import Case
+from pipeline.study.settings import resolve
 
 
 class Terminal(io.StringIO):
@@ -27,14 +33,49 @@ def test_lines_elsewhere_and_everything_in_the_log(tmp_path: Path) -> None:
     assert "compiling" in log
 
 
-def test_a_bar_on_a_terminal(tmp_path: Path) -> None:
-    stream = Terminal()
-    progress = CaseProgress("a", tmp_path / "log.txt", stream)
-    for i in range(3):
-        progress("trace", i + 1, 3, "ok")
-    progress.close()
-    assert "a trace" in stream.getvalue()
-    assert "[a] trace 1/3" not in stream.getvalue()
+def jobs(tmp_path: Path, count: int) -> list[Job]:
+    cases = [Case.model_construct(id=f"c{n}") for n in range(count)]
+    return [Job(case, resolve([]), tmp_path) for case in cases]
+
+
+def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path) -> None:
+    stream, batch = Terminal(), jobs(tmp_path, 2)
+    watch = Watch(batch, stream=stream)
+    batch[0].folder.mkdir(parents=True)
+    with watch.shown():
+        CaseProgress("c0", batch[0].folder / "log.txt", quiet=watch.bar)("trace", 3, 3, "ok 12.0 mm")
+        done, heard = watch.now()
+        assert 0 < done < 1
+        assert heard == "[c0] trace 3/3  ok 12.0 mm"
+        time.sleep(3 * EVERY_S)
+        watch.finished(batch[0])
+        assert watch.now()[0] == 1.0
+        time.sleep(3 * EVERY_S)
+    assert "0/2 [c0] trace 3/3" in stream.getvalue(), "the name of a case is no markup"
+    assert "1/2" in stream.getvalue()
+
+
+def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:
+    stream, batch = io.StringIO(), jobs(tmp_path, 2)
+    watch = Watch(batch, stream=stream)
+    with watch.shown():
+        for job in batch:
+            watch.finished(job)
+    first, last = stream.getvalue().splitlines()
+    assert re.fullmatch(r"1/2 in 0 s, about 0 s left: c0 finished", first)
+    assert re.fullmatch(r"2/2 in 0 s: c1 finished", last)
+    silent = Watch(batch, silent=True, stream=stream)
+    silent.finished(batch[0])
+    assert len(stream.getvalue().splitlines()) == 2
+    assert not Watch(batch, lines=True, stream=Terminal()).bar
+
+
+def test_the_share_that_is_done_only_grows() -> None:
+    logs = ["", "0 s  kernels", "[a] segment 1/1  x", "[a] trace 1/4  x", "[a] trace 4/4  x", "[a] compare 2/2  x"]
+    shares = [share_done("\n".join(logs[: n + 1])) for n in range(len(logs))]
+    assert shares == sorted(shares)
+    assert shares[0] == 0.0
+    assert shares[-1] <= 1.0
 
 
 def test_quiet_means_the_log_alone(tmp_path: Path) -> None:
@@ -43,4 +84,6 @@ def test_quiet_means_the_log_alone(tmp_path: Path) -> None:
     progress("trace", 1, 1, "ok")
     progress.say("x")
     assert stream.getvalue() == ""
+    CaseProgress("a", tmp_path / "verbose.txt", stream, verbose=True)("simulate", 1, 1, "converged")
+    assert stream.getvalue() == "[a] simulate 1/1  converged\n"
     assert "trace 1/1" in (tmp_path / "log.txt").read_text(encoding="utf-8")

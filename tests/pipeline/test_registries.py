@@ -15,12 +15,13 @@ from pipeline.arrays.polyline import to_length
 from pipeline.cli import main
 from pipeline.compare import metrics, nulls
 from pipeline.compare.metrics import Pair
-from pipeline.compare.nulls import Clues
+from pipeline.compare.nulls import Clues, Seen
 from pipeline.model import Array
 from pipeline.run.case import Job
 from pipeline.study.manifest import read_manifest
 from pipeline.study.settings import resolve
 from reports.schema import ERRORS, SUMMARY, Column
+from tests.studies import metrics_page
 
 MANIFEST = """
 schema = 1
@@ -58,6 +59,12 @@ def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path)
     assert job_key(tmp_path) in keys
 
 
+def test_every_metric_is_defined_in_one_place() -> None:
+    """Name, unit, formula and pooling stand in columns.toml; the page is made of them."""
+    assert not [name for name in metrics.METRICS if not ERRORS[name].formula]
+    assert metrics_page.PAGE.read_text(encoding="utf-8") == metrics_page.text(), "python -m tests.studies.metrics_page"
+
+
 class Scaled:
     """A metric that is no function."""
 
@@ -90,7 +97,7 @@ def as_before() -> Iterator[None]:
         registry.update(entries)
 
 
-def straight_on(clues: Clues, depth_mm: float, _previous: Array | None) -> Array:
+def straight_on(clues: Clues, depth_mm: float, _seen: Seen) -> Array:
     """A wire that ignores the vessel."""
     return to_length(np.array([clues.clamp.entry_mm, clues.clamp.entry_mm + clues.clamp.direction]), depth_mm)
 

@@ -26,6 +26,7 @@ from reports import tables
 from reports.html import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY
 from solver import Status
+from tests.studies.trees import differences
 
 SIZE, FRAMES = 64, 4
 
@@ -126,11 +127,7 @@ def test_a_case_that_was_cut_off_is_finished_by_the_same_command(finished: Path,
     shutil.copytree(finished, out)
     (out / "cases" / "bifurcation" / "result.json").unlink()
     assert run(study, out) == 0
-    pd.testing.assert_frame_equal(without_times(errors_of(finished)), without_times(errors_of(out)))
-
-
-def without_times(table: pd.DataFrame) -> pd.DataFrame:
-    return table.drop(columns=[name for name in table.columns if name.endswith("_s")])
+    assert differences(finished, out) == []
 
 
 def test_another_manifest_into_the_same_folder_is_refused(
@@ -156,12 +153,7 @@ def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -
     table = pd.read_csv(out / "sweep.csv")
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
-    turned = json.loads(
-        (out / "sweep" / "simulate.roll_offset_deg=60" / "cases" / "bifurcation" / "result.json").read_text(
-            encoding="utf-8"
-        )
-    )
-    assert turned["counters"]["trace"]["reused"] == FRAMES
+    assert reused_traces(out / "sweep" / "simulate.roll_offset_deg=60") == FRAMES
     assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
@@ -178,8 +170,8 @@ def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) 
 
 
 def reused_traces(out: Path) -> float:
-    text = (out / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8")
-    return float(json.loads(text)["counters"]["trace"].get("reused", 0))
+    text = (out / "cases" / "bifurcation" / "provenance.json").read_text(encoding="utf-8")
+    return float(json.loads(text)["reused"].get("trace", 0))
 
 
 def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path: Path) -> None:
@@ -190,11 +182,11 @@ def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path:
     out = tmp_path / "out"
     assert run(folder, out) == 0
     assert reused_traces(out) == 0
-    assert run(folder, out, "--set", "simulate.wall_scale=2") == 0
+    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2") == 0
     assert reused_traces(out) == FRAMES
     labels[tuple(np.argwhere(labels)[0])] = 0
     with_lumen(study, folder, labels, like)
-    assert run(folder, out) == 0
+    assert run(folder, out, "--resume") == 0
     assert reused_traces(out) == 0
 
 
@@ -305,16 +297,19 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
 
 
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
-    both = two_cases(study, tmp_path / "study")
-    assert run(both, tmp_path / "pool", "-j", "2", "--no-cache") == 0
+    """Shards are merged by copying folders together; their tables are those of a run of all cases, byte by byte."""
+    both, sweep = two_cases(study, tmp_path / "study"), ("--sweep", "simulate.wall_scale=2")
+    assert run(both, tmp_path / "pool", "-j", "2", "--no-cache", *sweep) == 0
     for shard in ("1/2", "2/2"):
-        assert run(both, tmp_path / "shards", "--shard", shard) == 0
+        assert run(both, tmp_path / shard[0], "--shard", shard, *sweep) == 0
+        shutil.copytree(tmp_path / shard[0], tmp_path / "shards", dirs_exist_ok=True)
     assert main(["report", str(tmp_path / "shards")]) == 0
-    for out in ("pool", "shards"):
-        for case in ("bifurcation", "second"):
-            table = tables.read(tmp_path / out / "cases" / case / "errors.csv", ERRORS)
-            pd.testing.assert_frame_equal(without_times(table), without_times(errors_of(finished)))
-        assert len(pd.read_csv(tmp_path / out / "summary.csv")) == 2
+    assert differences(tmp_path / "pool" / "cases", tmp_path / "shards" / "cases") == []
+    for name in ("summary.csv", "overall.csv", "sweep.csv"):
+        assert (tmp_path / "shards" / name).read_bytes() == (tmp_path / "pool" / name).read_bytes(), name
+    assert len(pd.read_csv(tmp_path / "pool" / "timings.csv")) == 2
+    table = tables.read(tmp_path / "pool" / "cases" / "second" / "errors.csv", ERRORS)
+    pd.testing.assert_frame_equal(table, errors_of(finished))
 
 
 def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> None:
@@ -332,8 +327,8 @@ def test_a_wire_that_cannot_enter_is_a_failed_frame(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No point of it is there to be compared with or drawn; the case must not end as crashed."""
-    clamp = simulate._clamp
-    monkeypatch.setattr(simulate, "_clamp", lambda run, frames: aside(clamp(run, frames)))
+    clamp = simulate.clamp_of
+    monkeypatch.setattr(simulate, "clamp_of", lambda run, known: aside(clamp(run, known)))
     assert run(study, tmp_path) == 1
     assert set(errors_of(tmp_path)["status"]) == {"entry_outside"}
     assert (tmp_path / "cases" / "bifurcation" / "report.html").exists()
@@ -460,6 +455,7 @@ def test_points_cut_short_hide_no_other_case(
     result.write_text(result.read_text().replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
     points.write_bytes(points.read_bytes()[:-200])
+    (out / "cases" / "other" / "ledger.json").unlink()
     assert main(["report", str(out)]) == 1
     assert "other: its page cannot be drawn" in capsys.readouterr().err
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]
@@ -528,3 +524,18 @@ def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("wireval ")
     assert main([]) == 2
+
+
+def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, study: Path, tmp_path: Path) -> None:
+    """The same scans twice, the second with the clamp of the first: it is the first's to the last bit."""
+    head, case = (study / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
+    second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
+    manifest = study / "borrowed.toml"
+    manifest.write_text(f"{head}[[case]]{case}\n[[case]]{second}", encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", "--until", "compare"]) == 0
+    own, borrowed = (
+        json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
+    )
+    assert any("blind to this case's scans" in line for line in borrowed["assumptions"])
+    np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])

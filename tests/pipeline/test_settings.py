@@ -9,7 +9,8 @@ import pytest
 
 from pipeline.commands import complain
 from pipeline.model import Curve, Lumen
-from pipeline.run.store import Store, digest, file_hash, key_of
+from pipeline.run.cache import Store
+from pipeline.run.store import digest, file_hash, key_of
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
@@ -45,9 +46,9 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
         ("solver.segment_mm=wide", "valid number"),
         ("segment_mm=1", "no setting; write table.key=value"),
         ("simulate.entry=foo", "'traced' or 'manifest'"),
-        ("solver.segment_mm=-3", "greater than 0"),
-        ("compare.sample_mm=0", "greater than 0"),
-        ("segment.outer_mm=nan", "finite"),
+        ("solver.segment_mm=-3", "greater than"),
+        ("compare.sample_mm=0", "greater than"),
+        ("segment.outer_mm=nan", "greater than or equal to 0.1"),
         ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
 )
@@ -115,7 +116,7 @@ def test_a_lumen_and_a_curve_come_back_as_they_were(tmp_path: Path) -> None:
 def test_a_damaged_entry_counts_as_absent(tmp_path: Path, kept: int) -> None:
     store = Store(tmp_path)
     store.put("trace", "ab" * 32, Curve(np.eye(3), np.ones(3)))
-    entry = store.entries()[0]
+    ((entry, _, _),) = store.entries()
     entry.write_bytes(entry.read_bytes()[:kept])
     assert store.get("trace", "ab" * 32) is None
     assert store.entries() == []

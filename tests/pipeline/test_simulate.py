@@ -14,8 +14,8 @@ from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
-from pipeline.simulate import guide_wire, insertion_of, simulate
-from pipeline.simulate.config import SolverConfig
+from pipeline.simulate import altered, guide_wire, insertion_of, simulate
+from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
 from solver import GuideWire, Insertion, Solution, VesselWall
 from solver.grid import Grid
@@ -130,6 +130,25 @@ def test_scales_reach_the_wire(case: Case) -> None:
     )
     number = replace(case.wire, bending_stiffness_N_mm2=2.0)
     assert guide_wire(number, 1.0, bending_scale=0.5).bending_stiffness_N_mm2 == 1.0
+
+
+def test_what_a_sensitivity_run_may_change_beyond_common_factors(case: Case) -> None:
+    """A taper twice as long, a tip without its curve: numbers and profiles alike, values and lengths apart."""
+    changed = altered(case.wire, SimulateConfig(taper_scale=2.0, rest_curvature_scale=0.0))
+    before, after = (np.array(wire.bending_stiffness_N_mm2) for wire in (case.wire, changed))
+    np.testing.assert_allclose(after, before * (2.0, 1.0))
+    assert not np.any(np.atleast_2d(changed.rest_curvature_per_mm)[:, -1])
+    number = replace(case.wire, bending_stiffness_N_mm2=2.0, rest_curvature_per_mm=0.1)
+    assert altered(number, SimulateConfig(taper_scale=2.0)).bending_stiffness_N_mm2 == 2.0
+    assert altered(number, SimulateConfig(rest_curvature_scale=3.0)).rest_curvature_per_mm == pytest.approx(0.3)
+    assert altered(case.wire, SimulateConfig()) == replace(
+        case.wire,
+        bending_stiffness_N_mm2=[tuple(k) for k in case.wire.bending_stiffness_N_mm2],
+        rest_curvature_per_mm=[tuple(k) for k in case.wire.rest_curvature_per_mm],
+    )
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    rubbing = insertion_of(case.wire, case.wall, wide_open(), clamp, config=SimulateConfig(friction=0.2))
+    assert rubbing.wall.friction == 0.2
 
 
 def test_one_roll_stands_for_all_frames_and_a_list_for_each() -> None:

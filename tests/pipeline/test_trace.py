@@ -55,8 +55,9 @@ def scans(cnr, seed=0):
 def test_what_is_measured_is_never_summed():
     frame, reference, lumen = scans(8)
     curve = trace(frame, lumen, *vessel()[4:], reference=reference)
-    assert {"cnr", "blur_mm", "gain", "noise", "residual_rms", "inflation", "inflation_tip"} == set(curve.levels)
-    assert {"noise", "blur_mm", "scanner_blur_mm"} == set(lumen.levels)
+    keys = {"cnr", "blur_mm", "gain", "noise", "residual_rms", "inflation", "inflation_tip", "knot_mm"}
+    assert keys == set(curve.levels)
+    assert {"noise", "blur_mm", "scanner_blur_mm", "least_filling"} == set(lumen.levels)
     log = Log(lambda *_: None)
     for _ in range(3):
         log.count("trace", curve.counters, curve.levels)

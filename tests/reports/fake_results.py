@@ -18,12 +18,11 @@ from scipy.ndimage import gaussian_filter
 
 from reports import export, frames_file, tables
 from reports.frames_file import FrameArrays, ScanCrop
-from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, SWEEP
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, TIMINGS
 
 SPACING = np.full(3, 0.4)
 ORIGIN = np.array([-20.0, -14.0, -6.0])
 SHAPE = (90, 80, 130)
-STAGES = ("load", "segment", "trace", "simulate", "compare")
 
 
 @dataclass(frozen=True)
@@ -66,10 +65,16 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
     tables.write(out / "failures.csv", FAILURES, failures)
     if sweep:
         tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
-    overall = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31, "cases": 2, "groups": 1}
-    run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance(), "overall": overall}
+    tables.write(out / OVERALL_FILE, SUMMARY, [_overall(summaries)])
+    run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance()}
     (out / "run.json").write_text(json.dumps(run, indent=1))
     return out
+
+
+def _overall(summaries: list[dict[str, Any]]) -> dict[str, Any]:
+    counts = {name: sum(row[name] for row in summaries) for name in ("frames", "frames_ok", "frames_failed")}
+    ends = {"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31}
+    return {"case": "(all)", **counts, **ends, "insertions": 4, "interval": "wide: 4 insertions"}
 
 
 def _depths(case: FakeCase) -> np.ndarray:
@@ -83,9 +88,9 @@ def _errors(case: FakeCase) -> list[dict[str, Any]]:
         rows.append(_row(case, frame, float(depth), rng))
         if case.simulated_only:
             kept = ("frame", "insertion_mm", "roll_deg", "max_penetration_mm", "push_force_N", "joints")
-            rows[-1] = {k: rows[-1][k] for k in (*kept, "iterations", "simulate_s")} | {"status": "simulated"}
+            rows[-1] = {k: rows[-1][k] for k in (*kept, "iterations")} | {"status": "simulated"}
         if frame in case.failed:
-            rows[-1] = {"frame": frame, "status": "no_wire", "insertion_mm": depth, "load_s": 0.2}
+            rows[-1] = {"frame": frame, "status": "no_wire", "insertion_mm": depth}
     return rows
 
 
@@ -119,10 +124,6 @@ def _row(case: FakeCase, frame: int, depth: float, rng: np.random.Generator) -> 
         "push_force_N": 0.02 + 0.004 * frame**1.2 * rng.uniform(0.9, 1.1),
         "joints": int(depth) + 1,
         "iterations": int(rng.integers(12, 90)),
-        "load_s": 0.2 + 0.02 * rng.random(),
-        "trace_s": 0.25 + 0.05 * rng.random(),
-        "simulate_s": 0.04 + 0.1 * (frame == case.frames // 2),
-        "compare_s": 0.01,
     }
     if case.truth:
         row |= {"trace_mean_mm": 0.025 * rng.uniform(0.7, 1.3), "trace_max_mm": 0.09 * rng.uniform(0.7, 1.3)}
@@ -134,14 +135,12 @@ def _row(case: FakeCase, frame: int, depth: float, rng: np.random.Generator) -> 
 def _statistics(case: FakeCase, rows: list[dict[str, Any]]) -> dict[str, Any]:
     ok = [r for r in rows if r["status"] in ("ok", "simulated")]
     counts = {"frames": case.frames, "frames_ok": len(ok), "frames_failed": case.frames - len(ok)}
-    seconds = {f"{s}_s": sum(r.get(f"{s}_s", 0.0) for r in rows) for s in STAGES} | {"segment_s": 2.4}
-    totals = {**seconds, "total_s": sum(seconds.values()) + 3.0, "peak_memory_MiB": 812.0}
     forces = {
         "max_penetration_mm": max((r["max_penetration_mm"] for r in ok), default=None),
         "push_force_max_N": max((r["push_force_N"] for r in ok), default=None),
     }
     if case.simulated_only or not ok:
-        return {**counts, **totals, **forces}
+        return {**counts, **forces}
 
     def pooled(name: str) -> float:
         values = [r[name] for r in ok if r[name] is not None]
@@ -157,7 +156,7 @@ def _statistics(case: FakeCase, rows: list[dict[str, Any]]) -> dict[str, Any]:
     shape |= {"skill": skill, "skill_low": skill - 0.08, "skill_high": skill + 0.03}
     if case.truth:
         shape |= {"trace_mean_median_mm": 0.026, "trace_tip_median_mm": 0.11, "truth_rms_mm": 0.98 * rms}
-    return {**counts, **shape, **nulls, **forces, **totals}
+    return {**counts, **shape, **nulls, **forces}
 
 
 def _status(case: FakeCase) -> str:
@@ -180,6 +179,7 @@ def _failure(case: FakeCase, frame: int) -> dict[str, Any]:
 def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statistics: dict[str, Any]) -> None:
     folder.mkdir(parents=True)
     tables.write(folder / "errors.csv", ERRORS, rows)
+    tables.write(folder / "timings.csv", TIMINGS, list(_timings(case)))
     frames = list(_frames(case))
     frames_file.write_frames(folder / "frames.h5", _scan(case), frames)
     if not case.simulated_only:
@@ -197,7 +197,6 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "sentence": "two frames have no result" if case.failed else "every frame is ok",
         "frames": [_frame_status(case, row) for row in rows],
         "summary": {k: v for k, v in statistics.items() if v is not None and v == v},
-        "seconds": {s: statistics[f"{s}_s"] for s in STAGES} | {"report": 3.0},
         "assumptions": ["voxel spacing taken as 0.5 mm: the file gives none"] if case.simulated_only else [],
         "warnings": ["roll is unknown and was taken as 0"] if case.failed else [],
         "wire": {"name": "micro014", "radius_mm": 0.18, "bending_stiffness_N_mm2": [[0, 0.5], [30, 5.0]]},
@@ -212,6 +211,14 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "provenance": _provenance(),
     }
     (folder / "result.json").write_text(json.dumps(result, indent=1))
+
+
+def _timings(case: FakeCase) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng(case.seed + 2)
+    seconds = {"load_s": 0.2, "trace_s": 0.25, "simulate_s": 0.04, "compare_s": 0.01}
+    yield {"case": case.name, "segment_s": 2.4, **{name: case.frames * s for name, s in seconds.items()}}
+    for frame in range(case.frames):
+        yield {"case": case.name, "frame": frame, **{name: s * rng.uniform(0.8, 1.2) for name, s in seconds.items()}}
 
 
 def _frame_status(case: FakeCase, row: dict[str, Any]) -> dict[str, Any]:
@@ -302,6 +309,7 @@ def _sweep(cases: tuple[FakeCase, ...]) -> Iterator[dict[str, Any]]:
                     yield {
                         "parameter": parameter,
                         "value": f"{value:g}",
+                        "unchanged": "0" if "roll" in parameter else "1",
                         "case": case.name,
                         "rms_mm": rms,
                         "tip_median_mm": 2 * rms,

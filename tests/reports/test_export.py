@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -128,3 +129,121 @@ def test_segmentations_keep_axes_and_geometry(tmp_path: Path) -> None:
 def test_a_segmentation_under_another_name_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"\.seg\.nrrd"):
         export.write_segmentation_nrrd(tmp_path / "l.nrrd", np.zeros((2, 2, 2)), [1] * 3, [0] * 3, np.eye(3))
+
+
+def _quad(folder: Path) -> tuple[np.ndarray, np.ndarray]:
+    folder.mkdir(exist_ok=True)
+    return np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def test_stl_reads_back_and_says_lps(tmp_path: Path) -> None:
+    vertices, triangles = _quad(tmp_path)
+    export.write_surface_stl(tmp_path / "s.stl", vertices, triangles)
+    content = (tmp_path / "s.stl").read_bytes()
+    assert b"SPACE=LPS" in content[:80]
+    assert not content.startswith(b"solid")  # the mark of the text form
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+    back = np.frombuffer(content[84:], kind)
+    assert len(back) == int.from_bytes(content[80:84], "little") == 4
+    np.testing.assert_allclose(back["corners"], vertices[triangles])
+    np.testing.assert_allclose(np.linalg.norm(back["normal"], axis=1), 1.0, rtol=1e-6)
+    centre = vertices.mean(axis=0)
+    assert np.all(np.einsum("ij,ij->i", back["normal"], back["corners"].mean(axis=1) - centre) > 0)
+
+
+def test_vtp_says_lps_where_slicer_looks(tmp_path: Path) -> None:
+    """A text array SPACE in the field data, vtkMRMLModelStorageNode::GetCoordinateSystemFromFieldData."""
+    export.write_polyline_vtp(tmp_path / "w.vtp", np.eye(3))
+    array = ET.parse(tmp_path / "w.vtp").find("./PolyData/FieldData/Array[@Name='SPACE']")
+    assert array is not None
+    assert bytes(int(code) for code in (array.text or "").split()) == b"LPS\0"
+
+
+def test_markups_keep_to_the_published_schema(tmp_path: Path) -> None:
+    """What these files use of Slicer's markups-schema-v1.0.3.json: types, lengths, ranges, choices."""
+    measured = {"rms distance to the traced wire": 0.25, "unknown": float("nan")}
+    export.write_markups_curve(tmp_path / "w.mrk.json", np.eye(3), "wire", "#D55E00", measured)
+    markup = json.loads((tmp_path / "w.mrk.json").read_text(encoding="utf-8"))["markups"][0]
+    assert markup["type"] in ("Fiducial", "Line", "Angle", "Curve", "ClosedCurve", "Plane", "ROI")
+    assert markup["coordinateSystem"] in ("LPS", "RAS")
+    assert markup["coordinateUnits"] in ("mm", "um")
+    assert all(isinstance(markup[key], str) for key in ("name", "labelFormat"))
+    for point in markup["controlPoints"]:
+        assert len(point["position"]) == 3
+        assert len(point["orientation"]) == 9
+        assert all(isinstance(point[key], bool) for key in ("selected", "locked", "visibility"))
+        assert point["positionStatus"] in ("undefined", "preview", "defined")
+    for key in ("color", "selectedColor"):
+        assert markup["display"][key] == pytest.approx([0xD5 / 255, 0x5E / 255, 0.0])
+    shown = {m["name"]: (m["value"], m["units"], m["enabled"]) for m in markup["measurements"]}
+    assert shown == {
+        "length": (pytest.approx(2 * np.sqrt(2)), "mm", True),
+        "rms distance to the traced wire": (0.25, "mm", True),
+    }
+
+
+def _view(folder: Path) -> Path:
+    vertices, triangles = _quad(folder)
+    export.write_surface_vtp(folder / "lumen.vtp", vertices, triangles)
+    export.write_segmentation_nrrd(folder / "lumen.seg.nrrd", np.ones((2, 2, 2)), [1] * 3, [0] * 3, np.eye(3))
+    for frame in (0, 2, 10):
+        for kind in ("traced", "simulated"):
+            export.write_polyline_vtp(folder / f"wire_{kind}_{frame:03d}.vtp", np.eye(3), {"arc_mm": [0, 1, 2]})
+            export.write_markups_curve(folder / f"wire_{kind}_{frame:03d}.mrk.json", np.eye(3), kind)
+    return folder
+
+
+def test_a_collection_has_every_frame_as_time(tmp_path: Path) -> None:
+    path = export.write_collection(_view(tmp_path), "wire_traced")
+    assert path is not None
+    sets = ET.parse(path).findall("./Collection/DataSet")
+    assert [(s.get("timestep"), s.get("file")) for s in sets] == [
+        (str(frame), f"wire_traced_{frame:03d}.vtp") for frame in (0, 2, 10)
+    ]
+    assert export.write_collection(tmp_path, "wire_true") is None
+    assert not (tmp_path / "wire_true.pvd").exists()
+
+
+def test_the_scene_opens_everything_with_names_and_colours(tmp_path: Path) -> None:
+    path = export.write_scene(_view(tmp_path), shown=2)
+    assert path is not None
+    nodes = {node.get("id"): node for node in ET.parse(path).getroot()}
+    assert len(nodes) == 3 * 14  # a thing, its display, its storage; no identifier twice
+    files, seen = set(), set()
+    for identifier, node in nodes.items():
+        assert identifier is not None
+        assert identifier.startswith(f"vtkMRML{node.tag}Node")
+        if "references" in node.attrib:
+            found = dict(part.split(":") for part in node.attrib["references"].strip(";").split(";"))
+            display, storage = nodes[found["display"]], nodes[found["storage"]]
+            files.add(storage.attrib["fileName"])
+            if display.attrib["visibility"] == "true":
+                seen.add(node.attrib["name"])
+            if "traced" in node.attrib["name"]:
+                assert display.attrib["color"] == "0.8353 0.3686 0.0000"
+    assert files == {p.name for p in tmp_path.iterdir()} - {"scene.mrml"}
+    assert seen == {"lumen", "lumen, segmented", "traced 002", "simulated 002"}
+    assert export.write_scene(tmp_path / "nothing", 0) is None
+
+
+def test_vtk_reads_what_is_written(tmp_path: Path) -> None:
+    vtk = pytest.importorskip("vtk", reason="vtk is not installed: no second reader of .vtp and .stl")
+    vertices, triangles = _quad(tmp_path)
+    export.write_surface_vtp(tmp_path / "s.vtp", vertices, triangles)
+    export.write_surface_stl(tmp_path / "s.stl", vertices, triangles)
+    export.write_polyline_vtp(tmp_path / "w.vtp", np.eye(3), {"error_mm": [0.5, np.nan, 1.0]})
+    for name, kind in (("s.vtp", vtk.vtkXMLPolyDataReader), ("s.stl", vtk.vtkSTLReader)):
+        reader = kind()
+        reader.SetFileName(str(tmp_path / name))
+        reader.Update()
+        edges = vtk.vtkFeatureEdges()
+        edges.SetInputData(reader.GetOutput())
+        edges.FeatureEdgesOff()
+        edges.ManifoldEdgesOff()
+        edges.Update()
+        assert (reader.GetOutput().GetNumberOfPolys(), edges.GetOutput().GetNumberOfCells()) == (4, 0)
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(str(tmp_path / "w.vtp"))
+    reader.Update()
+    assert reader.GetOutput().GetFieldData().GetAbstractArray("SPACE").GetValue(0) == "LPS"
+    assert reader.GetOutput().GetPointData().GetArray("error_mm").GetValue(2) == 1.0

@@ -14,11 +14,12 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.figures import RunFiles, _drawing, _planes, _style, figures_of
+from reports.colours import TRACED
+from reports.figures import RunFiles, _drawing, _planes, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
-from reports.schema import ERRORS, POINTS, SUMMARY, SWEEP
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -34,6 +35,7 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
         "result": {},
         "errors": tables.read_if_there(None, ERRORS),
         "points": tables.read_if_there(None, POINTS),
+        "timings": tables.read_if_there(None, TIMINGS),
         "scan": None,
         "frames": (),
     }
@@ -60,7 +62,7 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
-    absent = {"failed_projections", "simulated_wires"} | ({"every_frame"} if count == 1 else set())
+    absent = {"failed_projections", "simulated_wires", "views", "budget", "error_over_u", "release_frames"}
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None
@@ -75,6 +77,22 @@ def _heat_case(tmp_path: Path) -> CaseFiles:
     }
     tables.write(tmp_path / "points.csv.gz", POINTS, columns)
     return _empty_case(tmp_path, points=tables.read(tmp_path / "points.csv.gz", POINTS))
+
+
+def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
+    """Two changed values that are equally bad were a flat line: what lies between them was not drawn."""
+    rows = [{"parameter": "(plain)", "value": "", "case": c, "rms_mm": 0.1} for c in ("a", "b", "(all)")]
+    for value in ("-15", "15"):
+        changed = {"parameter": "simulate.roll_offset_deg", "value": value, "unchanged": "0"}
+        rows += [{**changed, "case": c, "rms_mm": 0.25} for c in ("a", "b")]
+        rows.append({**changed, "case": "(all)", "rms_mm": 0.25, "rms_ratio_low": 2.0, "rms_ratio_high": 3.0})
+    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
+    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
+    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
+    assert drawing is not None
+    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    assert lines["to the traced wire"].get_xydata().tolist() == [[-15.0, 0.25], [0.0, 0.1], [15.0, 0.25]]
+    assert lines["unchanged"].get_xydata().tolist() == [[0.0, 0.1]]
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
@@ -125,11 +143,47 @@ def test_views_follow_the_curves_and_stay_in_the_crop() -> None:
         np.testing.assert_allclose(outside.size, 50.0)
 
 
+def test_a_band_is_two_sigma_to_both_sides_however_the_scan_is_turned() -> None:
+    scan = ScanCrop(np.full(3, 0.5), np.zeros(3), TURN, (40, 40, 40))
+    curve = np.linspace(0.0, 10.0, 21)[:, None] * np.array([1.0, 2.0, 2.0]) / 3.0
+    for plane in _planes.PLANES:
+        axes = Figure().subplots()
+        _planes.whole(scan).band(axes, curve, np.tile(0.2**2 * np.eye(3), (21, 1, 1)), plane, alpha=0.5)
+        outline = axes.patches[0].get_xy()[:42]
+        width = np.linalg.norm(outline[:21] - outline[21:][::-1], axis=1)
+        np.testing.assert_allclose(width, 4 * 0.2, rtol=1e-9)
+
+
+def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
+    rows = [{"source": n, "sigma": "", "u_mm": u, "distal_u_mm": 2 * u} for n, u in (("roll", 0.1), ("error", 0.2))]
+    tables.write(tmp_path / "budget.csv", BUDGET, rows)
+    case = _empty_case(tmp_path)
+    drawing = CASE_FIGURES["budget"](case)
+    assert drawing is not None
+    (left,) = drawing.figure.axes
+    assert [bar.get_width() for bar in left.patches] == [0.1, 0.2, 0.2, 0.4]
+    entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
+    tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.3}])
+    both = CASE_FIGURES["budget"](case)
+    assert both is not None
+    assert len(both.figure.axes) == 2
+
+
+def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
+    errors = {"frame": [0, 1], "status": ["ok", "ok"], "insertion_mm": [5.0, 9.0], "release": [np.nan, 0.7]}
+    tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(errors | {"release_real": [np.nan, 0.3]}))
+    drawing = CASE_FIGURES["release_frames"](_empty_case(tmp_path, errors=tables.read(tmp_path / "errors.csv", ERRORS)))
+    assert drawing is not None
+    assert drawing.table["frame"].tolist() == [1]
+    lines = drawing.figure.axes[0].get_lines()
+    assert [list(line.get_ydata()) for line in lines] == [[0.7], [0.3]]
+
+
 def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=9, failed=(0,)),))
     path = out / "cases" / "c" / "errors.csv"
     errors = tables.read(path, ERRORS)
-    errors.loc[errors["frame"] == 3, "rms_mm"] = 99.0
+    errors.loc[errors["frame"] == 3, "p95_mm"] = 99.0
     tables.write(path, ERRORS, errors)
     case = read_case(path.parent)
     drawing = CASE_FIGURES["projections"](case)
@@ -144,17 +198,6 @@ def test_projections_choose_first_middle_last_and_worst(tmp_path: Path) -> None:
         "frame 8 (last)",
     ]
     assert any(axes.get_title(loc="left") == "frame 0 (no_wire)" for axes in failed.figure.axes)
-
-
-def test_the_sheet_of_frames_names_each_and_thins_long_insertions(tmp_path: Path) -> None:
-    out = write_run(tmp_path / "out", (FakeCase("c", frames=41, failed=(0,)),))
-    drawing = CASE_FIGURES["every_frame"](read_case(out / "cases" / "c"))
-    assert drawing is not None
-    titles = [axes.get_title(loc="left") for axes in drawing.figure.axes]
-    assert len(titles) == 36
-    assert titles[0] == "0: no_wire"
-    assert titles[-1].startswith("40: 0.")
-    assert len(drawing.table) == 36
 
 
 def test_failed_frames_are_marked_and_their_values_not_drawn(tmp_path: Path) -> None:
@@ -217,13 +260,13 @@ def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Pat
         figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
-        axes.plot([0, 110], [40, 40], color=_style.ORANGE, linewidth=6)
+        axes.plot([0, 110], [40, 40], color=TRACED, linewidth=6)
         path = tmp_path / f"{compact}.png"
         _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
     assert pixels[0, 0].tolist() == [255, 255, 255]
-    assert np.any(np.all(pixels == (np.array(to_rgba(_style.ORANGE)[:3]) * 255).round(), axis=-1))
+    assert np.any(np.all(pixels == (np.array(to_rgba(TRACED)[:3]) * 255).round(), axis=-1))
     assert np.abs(pixels.astype(int) - exact).max() <= 24
     assert sizes[1] < 0.6 * sizes[0]

@@ -57,6 +57,9 @@ def _pages(run: Path) -> list[Path]:
     return [run / "index.html", *(f / "report.html" for f in find_cases(run))]
 
 
+PAGES = ("case", "run", "simulators", "calibration", "bench")
+
+
 def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     assert [s["figure"] for s in declared("case")] == list(CASE_FIGURES)
     assert {s["figure"] for s in declared("run")} == set(RUN_FIGURES)
@@ -64,8 +67,8 @@ def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     for path in Path(figures.__file__).parent.glob("[a-z]*.py"):
         module = importlib.import_module(f"reports.figures.{path.stem}")
         written |= {n for n, f in vars(module).items() if _draws(f) and not n.startswith("_")}
-    assert written == {s["figure"] for page in ("case", "run", "bench") for s in declared(page)}
-    for page in ("case", "run", "bench"):
+    assert written == {s["figure"] for page in PAGES for s in declared(page)}
+    for page in PAGES:
         for section in declared(page):
             assert section["read"].endswith(".")
             assert section["bad"].startswith(("Bad:", "Look"))
@@ -79,19 +82,21 @@ def test_every_link_leads_somewhere(run: Path) -> None:
     for page in _pages(run):
         links = _Links(page)
         for link in links.found:
+            if link.startswith("data:"):
+                continue
             if link.startswith("#"):
                 assert link[1:] in links.ids, (page, link)
             else:
-                assert (page.parent / unquote(link)).exists(), (page, link)
+                assert (page.parent / unquote(link).partition("#")[0]).exists(), (page, link)
 
 
 def test_each_kind_of_case_has_its_sections(run: Path) -> None:
     ids = {f.name: set(_Links(f / "report.html").ids) for f in find_cases(run)}
     always = {"forces_by_depth", "contact_along_wire", "run_time", "frames", "settings", "provenance", "cite"}
-    compared = {"error_by_depth", "projections", "every_frame", "error_along_wire", "tip_by_depth", "skill_by_depth"}
+    compared = {"error_by_depth", "projections", "viewer", "error_along_wire", "tip_by_depth", "skill_by_depth"}
     assert all(always <= found for found in ids.values())
     assert all(compared <= found for name, found in ids.items() if name != "aneurysm")
-    assert not compared & ids["aneurysm"]
+    assert compared & ids["aneurysm"] == {"viewer"}
     assert {name for name, found in ids.items() if "truth_by_depth" in found} == {"cow-seed-100"}
     assert {name for name, found in ids.items() if "simulated_wires" in found} == {"aneurysm"}
     assert {name for name, found in ids.items() if "failed_projections" in found} == {FAILED}
@@ -247,3 +252,22 @@ def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
     render_case(out / "cases" / "c")
     assert not list(figures.glob("error_along_wire*"))
     assert (figures / "contact_along_wire.png").exists()
+
+
+def test_cases_come_worst_first_and_a_tall_map_leaves_the_first_screen(tmp_path: Path) -> None:
+    cases = tuple(FakeCase(f"c{i:02d}", frames=2, error_mm=0.1 + 0.01 * i, simulated_only=False) for i in range(3))
+    out = write_run(tmp_path / "out", (*cases, FakeCase("bad", frames=3, failed=(1,), error_mm=0.05)))
+    text = render_index(out).read_text(encoding="utf-8")
+    table = text[text.index('<h2 id="cases">') :]
+    assert re.findall(r'<tr[^>]*><td class="text">(?:<a[^>]*>)?(\w+)', table)[:4] == ["bad", "c02", "c01", "c00"]
+    shutil.rmtree(out)
+    many = tmp_path / "many"
+    for i in range(45):
+        folder = many / "cases" / f"c{i:02d}"
+        folder.mkdir(parents=True)
+        tables.write(folder / "errors.csv", ERRORS, [{"frame": 0, "status": "ok", "rms_mm": 0.1, "p95_mm": 0.2}])
+        (folder / "result.json").write_text(json.dumps({"case": folder.name, "status": "ok"}))
+    rows = [{"case": f"c{i:02d}", "status": "ok", "frames": 1, "frames_ok": 1, "rms_mm": 0.1} for i in range(45)]
+    tables.write(many / "summary.csv", SUMMARY, rows)
+    ids = re.findall(r'<h2 id="(\w+)"', render_index(many).read_text(encoding="utf-8"))
+    assert ids.index("planned_within") < ids.index("cases") < ids.index("case_frame_map")

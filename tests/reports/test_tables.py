@@ -14,25 +14,33 @@ from hypothesis import strategies as st
 
 from reports import tables
 from reports.atomic import replacing
-from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, Table
+from reports.schema import ERRORS, FAILURES, POINTS, SUMMARY, TIMINGS, Table
 
 # the contract that other people's scripts rely on, typed again on purpose: a rename must be seen here
 ERRORS_HEADER = (
-    "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,back_rms_mm,hausdorff_mm,arc_rms_mm,"
-    "arc_max_mm,tip_mm,tip_angle_deg,branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,"
-    "null_min_bending_rms_mm,null_previous_rms_mm,skill,coverage,trace_sigma_mm,max_penetration_mm,"
-    "push_force_N,joints,iterations,num_mm,snaps,uncertain,least_pivot,"
-    "load_s,segment_s,trace_s,simulate_s,compare_s,trace_mean_mm,"
+    "frame,status,insertion_mm,roll_deg,rms_mm,mean_mm,p95_mm,max_mm,distal10_rms_mm,distal20_rms_mm,back_rms_mm,"
+    "hausdorff_mm,arc_rms_mm,arc_max_mm,tip_mm,tip_angle_deg,tip_along_mm,tip_across_mm,depth_offset_mm,side_ok,"
+    "branch_ok,null_centreline_rms_mm,null_shortest_rms_mm,null_min_bending_rms_mm,null_previous_rms_mm,"
+    "null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,null_pinned_rms_mm,null_neighbours_rms_mm,skill,"
+    "skill_strongest,strongest_null,coverage,trace_sigma_mm,max_penetration_mm,push_force_N,joints,iterations,"
+    "num_mm,snaps,uncertain,least_pivot,u_input_mm,u_val_mm,share_beyond_2u,release,release_real,log_score_bits,"
+    "energy_score_mm,released,released_at_mm,trace_mean_mm,"
     "trace_max_mm,trace_tip_mm,truth_rms_mm,truth_tip_mm"
 )
-POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N"
+POINTS_HEADER = "frame,arc_mm,x_mm,y_mm,z_mm,error_mm,foot_arc_mm,contact_force_N,u_val_mm,error_over_u"
 SUMMARY_HEADER = (
-    "case,group,role,status,frames,frames_ok,frames_failed,rms_mm,rms_low_mm,rms_high_mm,mean_mm,p95_mm,"
-    "max_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,"
-    "null_min_bending_rms_mm,null_previous_rms_mm,skill,skill_low,skill_high,branch_ok_fraction,coverage,"
-    "trace_mean_median_mm,trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,num_mm,load_s,"
-    "segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
+    "case,group,role,status,frames,frames_ok,frames_failed,insertions,interval,effective_frames,rms_mm,"
+    "release_frames,rms_calm_mm,releases_both,releases_missed,releases_spurious,rms_low_mm,rms_high_mm,mean_mm,"
+    "p95_mm,max_mm,distal10_rms_mm,distal20_rms_mm,tip_median_mm,tip_low_mm,tip_high_mm,arc_rms_mm,"
+    "arc_offset_rms_mm,null_centreline_rms_mm,null_shortest_rms_mm,null_min_bending_rms_mm,null_previous_rms_mm,"
+    "skill,skill_low,skill_high,skill_strongest,skill_strongest_low,skill_strongest_high,strongest_null,"
+    "null_another_rms_mm,frame_spacing_mm,branch_ok_fraction,coverage,within_1mm,trace_mean_median_mm,"
+    "trace_tip_median_mm,truth_rms_mm,max_penetration_mm,push_force_max_N,tip_along_median_mm,"
+    "tip_across_median_mm,depth_offset_mm,side_ok,null_roll_unknown_rms_mm,null_no_tip_curve_rms_mm,"
+    "null_pinned_rms_mm,null_neighbours_rms_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
+    "energy_score_mm"
 )
+TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log"
 
 
@@ -44,10 +52,12 @@ def test_headers_are_the_contract(tmp_path: Path) -> None:
     tables.write(tmp_path / "errors.csv", ERRORS, [])
     tables.write(tmp_path / "summary.csv", SUMMARY, [])
     tables.write(tmp_path / "failures.csv", FAILURES, [])
+    tables.write(tmp_path / "timings.csv", TIMINGS, [])
     tables.write(tmp_path / "points.csv.gz", POINTS, {})
     assert _header(tmp_path / "errors.csv") == ERRORS_HEADER
     assert _header(tmp_path / "summary.csv") == SUMMARY_HEADER
     assert _header(tmp_path / "failures.csv") == FAILURES_HEADER
+    assert _header(tmp_path / "timings.csv") == TIMINGS_HEADER
     assert gzip.decompress((tmp_path / "points.csv.gz").read_bytes()).decode() == POINTS_HEADER + "\n"
 
 

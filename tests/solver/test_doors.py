@@ -175,6 +175,10 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
             "friction": [v for v in NOT_NUMBERS if v is not None] + HUGE + [-0.1],
         },
     ),
+    "shifted": (
+        lambda **a: WALL.shifted(**a),
+        {"offset_mm": ["x", None, 0.1, TUBE[:2], np.where(TUBE < 0, np.nan, 0.0), TUBE < 0, 1e9 * TUBE]},
+    ),
     "to_depths": (
         to_depths,
         {

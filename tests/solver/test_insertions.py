@@ -186,7 +186,7 @@ def test_a_snap_is_the_same_event_beside_others() -> None:
 
     found = both(make, [np.arange(1.0, 31.0)] * 8, [10.0 * n for n in range(8)])
     assert sum(len(s.snaps) for solutions in found for s in solutions) > 3
-    assert 3 < sum(s.uncertain for solutions in found for s in solutions) < 80
+    assert 3 < sum(s.uncertain for solutions in found for s in solutions) < 100
 
 
 def test_a_wire_that_is_moved_elsewhere_is_refused_and_ways_before_are_over() -> None:
@@ -245,6 +245,26 @@ def test_a_wall_made_from_another_shares_its_grid() -> None:
     assert other.field.coefficients is wall.field.coefficients
     with pytest.raises(ValueError, match="stiffness_N_mm2"):
         wall.like(stiffness_N_mm2=-1.0)
+
+
+def test_a_wall_shifted_by_a_smooth_offset_is_the_wall_of_the_sum() -> None:
+    wall = bend_wall()
+    x, y, z = np.indices(wall.distance.shape)
+    offset = 0.05 * np.sin(0.4 * x + 1.0) * np.cos(0.3 * y) * np.cos(0.2 * z)
+    values = np.asarray(wall.distance.values)
+    shifted, whole = wall.shifted(offset), VesselWall(wall.distance.with_values(values + offset), 1.0)
+    points = wall.distance.to_mm(np.random.default_rng(0).uniform(-2.0, np.array(wall.distance.shape) + 1.0, (200, 3)))
+    pairs = zip(shifted.look_up(points), whole.look_up(points), (1e-5, 1e-4, 1e-3), strict=True)
+    for got, wanted, rounding in pairs:  # coefficients are float32: 1e-6 mm
+        np.testing.assert_allclose(got, wanted, atol=rounding)
+    assert shifted.field.slope == pytest.approx(whole.field.slope, rel=1e-4)
+    assert np.array_equal(np.asarray(wall.distance.values), values), "the wall that it is made from stays"
+    wires = [
+        next(Insertion(GuideWire(1.0, 0.18, 10.0), one, [0, 0, 0], [0, 0, 1]).to_depths([50.0]))
+        for one in (shifted, whole, wall)
+    ]
+    np.testing.assert_allclose(wires[0].joints_mm, wires[1].joints_mm, atol=1e-4)
+    assert np.abs(wires[0].joints_mm - wires[2].joints_mm).max() > 0.01
 
 
 def test_one_insertion_twice_and_no_threads_are_refused() -> None:

@@ -14,8 +14,8 @@ TARGET = Path(__file__).resolve().parents[2] / "reports" / "pictures"
 
 
 def figure(out: Path, name: str) -> Image.Image:
-    """One figure of the run's only case."""
-    return Image.open(next(out.glob(f"cases/*/figures/{name}.png"))).convert("RGB")
+    """One figure of the run's first case."""
+    return Image.open(min(out.glob(f"cases/*/figures/{name}.png"))).convert("RGB")
 
 
 def rows_of(picture: Image.Image, least_gap: int = 8) -> list[int]:

@@ -32,6 +32,7 @@ def run_stages(run: Context, until: Stage = "report") -> Known:
     for stage, step in STEPS.items():
         if STAGES.index(stage) > STAGES.index(until):
             break
+        run.log.begins(stage)
         try:
             known = step(run, known)
         except StageError as error:

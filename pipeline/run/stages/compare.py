@@ -4,25 +4,40 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from pipeline.compare import compare, compare_truth
-from pipeline.compare.nulls import Clues, score
+from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
+from pipeline.run.stages.budget import budgeted
+from pipeline.run.stages.entries import four_entries
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.run.stages.views import compare_in_views
 from pipeline.status import FrameStatus
 
 
 def compare_frames(run: Context, known: Known) -> Known:
     """Errors of every frame with both curves, beside those of the trivial predictors."""
+    if run.case.projections:
+        with run.log.timed("compare"):
+            return replace(known, frames=compare_in_views(run, known))
     with run.log.timed("compare"):
         clues = _clues(run, known)
-    frames = []
-    for frame, previous in zip(known.frames, _trusted_before(known.frames), strict=True):
+        simulated = simulated_rivals(run, known) if clues else {}
+    frames, before = [], _trusted_before(known.frames)
+    after = [*_trusted_before(known.frames[::-1])][::-1]
+    for frame, previous, following in zip(known.frames, before, after, strict=True):
         with run.log.timed("compare", frame.index):
-            done = _compared(run, known, frame, clues, previous)
+            tip = frame.curve.points_mm[-1] if frame.curve is not None and frame.traced else None
+            seen = Seen(previous, following, tip, simulated.get(frame.index, {}))
+            done = _compared(run, known, frame, clues, seen)
             if frame.truth_mm is not None:
                 truth = compare_truth(frame.truth_mm, frame.curve, frame.simulated, run.config.compare)
                 done = replace(done, truth=truth)
             frames.append(done)
-    return replace(known, frames=tuple(frames))
+    known = replace(known, frames=tuple(frames))
+    if clues is not None and run.config.compare.simulated_nulls:
+        with run.log.timed("compare"):
+            known = replace(known, entries=four_entries(run, known, clues.way))
+    return budgeted(run, known)
 
 
 def _clues(run: Context, known: Known) -> Clues | None:
@@ -44,17 +59,16 @@ def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:
         last = frame.trusted_curve or last
 
 
-def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, previous: Array | None) -> Frame:
-    assert known.scans is not None
-    if frame.ok and not known.scans.frames:
+def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, seen: Seen) -> Frame:
+    if frame.ok and not run.case.compared:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)
     if frame.curve is None or not frame.traced or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
         return frame
     assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
-    errors = compare(frame.simulated, curve, known.lumen, settings)
+    errors = compare(frame.simulated, curve, known.lumen, settings, None if clues is None else clues.way)
     if clues is None:
         return replace(frame, comparison=errors)
-    nulls = score(clues, frame.depth_mm, previous, curve.points_mm, settings.sample_mm)
+    nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings)
     return replace(frame, comparison=errors, nulls_rms_mm=nulls)

@@ -2,17 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.budget import Budget
 from pipeline.compare import Comparison
 from pipeline.load import Crop, Scans
-from pipeline.model import Array, Clamp, Curve, Lumen, Volume
+from pipeline.load.views import View
+from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
+from pipeline.run.cache import Store
 from pipeline.run.log import Log, Stage
-from pipeline.run.store import Store, key_of
+from pipeline.run.store import key_of
 from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
@@ -28,6 +31,8 @@ class Frame:
     expected_mm : depth that the manifest states.     depth_mm : depth that was simulated.
     catheter_mm : depth of the tip of a catheter over the wire.
     num_mm : estimated distance of the simulated wire from the one of endlessly short segments.
+    view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
+    one (k, 2) on the plane through the isocentre.
     projections : maximum-intensity projections of the scan along the array axes.
     """
 
@@ -41,9 +46,12 @@ class Frame:
     roll_deg: float = 0.0
     catheter_mm: float = 0.0
     curve: Curve | None = None
-    simulated: Solution | None = None
+    simulated: Solution | OtherWire | None = None
     num_mm: float = float("nan")
     comparison: Comparison | None = None
+    view: View | None = None
+    in_view_mm: tuple[Array, ...] = ()
+    budget: Budget | None = None
     registration: Registration | None = None
     truth_mm: Array | None = None
     truth: dict[str, float] = field(default_factory=dict)
@@ -52,8 +60,9 @@ class Frame:
 
     @property
     def ok(self) -> bool:
-        """Traced, simulated to its depth, converged and compared (or simulated, in a case without scans)."""
-        return self.status in (FrameStatus.OK.identifier, FrameStatus.SIMULATED.identifier)
+        """Traced, simulated to its depth, converged and compared (or simulated, or what the roll was fitted on)."""
+        good = FrameStatus.OK, FrameStatus.SIMULATED, FrameStatus.ROLL_FITTED
+        return self.status in (status.identifier for status in good)
 
     @property
     def traced(self) -> bool:
@@ -66,9 +75,14 @@ class Frame:
         return self.curve if self.traced and self.stage not in ("load", "trace") else None
 
     @property
+    def solved(self) -> Solution | None:
+        """The simulated wire where it is this project's own, with all that the solver knows of it."""
+        return self.simulated if isinstance(self.simulated, Solution) else None
+
+    @property
     def uncertain(self) -> bool:
         """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
-        return self.simulated is not None and (self.simulated.uncertain or self.num_mm > AGREED_MM)
+        return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
@@ -84,12 +98,19 @@ Result = TypeVar("Result", Lumen, Curve)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known of a case so far. clamp : the one that was simulated; failure : why the case went no further."""
+    """What is known of a case so far.
+
+    clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
+    failure : why the case went no further.
+    """
 
     scans: Scans | None = None
     lumen: Lumen | None = None
     clamp: Clamp | None = None
+    segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()
+    sources: tuple[dict[str, Any], ...] = ()
+    entries: tuple[dict[str, Any], ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""
 
@@ -131,5 +152,9 @@ class Context:
             self.store.put(stage, key, result)
         else:
             result = cast(Result, kept)
-        self.log.count(stage, {"reused": 1} if kept else result.counters, result.levels)
+            self.log.reused[stage] = self.log.reused.get(stage, 0) + 1
+            for crop in (item for item in inputs if isinstance(item, Crop)):
+                self.log.count("load", crop.counters)
+        # the work behind a result, whenever it was done: a run that was interrupted says the same as one that was not
+        self.log.count(stage, result.counters, result.levels)
         return result

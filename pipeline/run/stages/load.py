@@ -5,6 +5,7 @@ from dataclasses import replace
 from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
+from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.study.manifest import not_one_per_frame
 
@@ -19,13 +20,18 @@ def open_case(run: Context, known: Known) -> Known:
     wrong = not_one_per_frame(case.lists, count)
     if wrong:
         raise LoadError(f"case {case.id!r}: {wrong[0]}")
-    offset = run.config.simulate.roll_offset_deg
-    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(case.roll_deg, count))]
+    run.log.assumptions += [case.calibrated] * bool(case.calibrated)
+    run.log.warnings += [case.own_parameters] * bool(case.own_parameters)
+    offset, rolls = run.config.simulate.roll_offset_deg, case.stated_roll_deg
+    frames = [Frame(i, roll_deg=roll + offset) for i, roll in enumerate(each_frame(rolls, count))]
     if case.catheter:
         tips = each_frame(case.catheter.insertion_mm, count)
         frames = [replace(f, catheter_mm=tip) for f, tip in zip(frames, tips, strict=True)]
     if case.insertion_mm:
         frames = [replace(f, expected_mm=mm) for f, mm in zip(frames, case.insertion_mm, strict=True)]
+    if case.projections:
+        views = read_views(case.projections, count)
+        frames = [replace(f, view=view) for f, view in zip(frames, views, strict=True)]
     if case.truth:
         truth = read_truth(case.truth, count)
         frames = [replace(f, truth_mm=points) for f, points in zip(frames, truth, strict=True)]

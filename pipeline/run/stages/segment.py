@@ -16,7 +16,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
     case, config, log = run.case, run.config, run.log
     if case.lumen is not None:
         with log.timed("segment"):
-            lumen = given_lumen(read_lumen(case.lumen.path, config.segment.least_voxels), config.segment)
+            lumen = given_lumen(read_lumen(case.lumen, config.segment.least_voxels), config.segment)
         log.assumptions += lumen.warnings
         return replace(known, lumen=lumen)
     assert known.scans is not None

@@ -8,8 +8,12 @@ import numpy as np
 
 from pipeline.model import Clamp
 from pipeline.run.log import Log
+from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.simulate import LEVELS, insertion_of, measured_clamp, simulate
+from pipeline.run.stages.others import frames_of_others
+from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.simulate import LEVELS, altered, insertion_of, simulate
+from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from solver import Snap, Solution
@@ -22,10 +26,25 @@ NEARLY_MM = 1.0
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
-    lumen, case, config, log = known.lumen, run.case, run.config, run.log
+    known = with_fitted_roll(run, known)
+    clamp = clamp_of(run, known)
+    known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
+    if run.case.simulated is None:
+        return _replayed(run, known)
+    try:
+        # the predictors that are simulations need segments of some length: those that the solver would choose
+        segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
+    except StageError:
+        segment = float("nan")
+    return replace(known, frames=frames_of_others(run, known), segment_mm=segment)
+
+
+def _replayed(run: Context, known: Known) -> Known:
+    """The solver's own wires."""
+    lumen, clamp, case, config, log = known.lumen, known.clamp, run.case, run.config, run.log
     assert lumen is not None
-    clamp = _clamp(run, known.frames)
-    frames = [_with_depth(frame, config.simulate.depth) for frame in known.frames]
+    assert clamp is not None
+    frames = list(known.frames)
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
     if case.catheter is not None:
         log.warnings += [_cut_short(f) for f in replay if f.catheter_mm > f.depth_mm + NEARLY_MM]
@@ -41,7 +60,8 @@ def simulate_frames(run: Context, known: Known) -> Known:
         return list(_noted(log, replay, found, len(frames)))
 
     try:
-        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, case.wire.rest_curvature_per_mm))
+        curvature = altered(case.wire, config.simulate).rest_curvature_per_mm
+        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, curvature))
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
@@ -51,7 +71,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         found = replace(frame, simulated=wire, num_mm=float(num_mm))
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
     log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
-    return replace(known, frames=tuple(frames), clamp=clamp)
+    return replace(known, frames=tuple(frames), segment_mm=resolved.segment_mm)
 
 
 def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
@@ -110,24 +130,15 @@ def _told(frame: int, snap: Snap) -> str:
     )
 
 
-def _clamp(run: Context, frames: Sequence[Frame]) -> Clamp:
-    """The clamp of the simulation: measured in the scans, or the manifest's."""
-    case = run.case
-    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
-    given = Clamp(np.array(case.entry_mm), np.array(case.entry_direction), axis, down)
-    if run.config.simulate.entry == "manifest":
-        return given
-    clamp = measured_clamp([curve for f in frames if (curve := f.trusted_curve) is not None], given)
-    run.log.assumptions += [clamp.note] * bool(clamp.note)
-    run.log.warnings += [clamp.warning] * bool(clamp.warning)
-    return clamp
+def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
+    return tuple(_with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)
 
 
-def _with_depth(frame: Frame, source: str) -> Frame:
+def _with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
     """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known."""
     depth = frame.expected_mm
     if source == "traced" and frame.curve is not None and frame.traced:
-        depth = frame.curve.length_mm
+        depth = depth_from(clamp, frame.curve)
     found = replace(frame, depth_mm=depth)
     if not np.isnan(depth):
         return found

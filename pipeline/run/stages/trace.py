@@ -12,6 +12,7 @@ from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
 from pipeline.trace import of_length, trace
 
@@ -20,9 +21,10 @@ def trace_frames(run: Context, known: Known) -> Known:
     """Every frame's wire, each with the previous one as a prior."""
     assert known.scans is not None
     assert known.lumen is not None
-    if not known.scans.frames:
-        return known
     given = _given_traces(run)
+    if not known.scans.frames:
+        pairs = zip(known.frames, given, strict=True) if given else ()
+        return replace(known, frames=tuple(_as_given(run, *pair) for pair in pairs) or known.frames)
     work = _Tracing(run, known, own_curves=bool(given))
     frames: list[Frame] = []
     for frame, header in zip(known.frames, known.scans.frames, strict=True):
@@ -77,25 +79,42 @@ class _Tracing:
         log.count("trace", counters_of(registration))
         self.window = self.window or grey_window(shown)
         pictures = projections(shown, self.window)
-        expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
-        if given is None:
-            curve = self.run.stored(
-                "trace",
-                trace,
-                here,
-                self.lumen,
-                self.run.case.entry_mm,
-                self.run.case.entry_direction,
-                of_frame=frame.index,
-                reference=self.reference,
-                previous=previous,
-                expected_mm=expected,
-                config=settings,
-            )
-        else:
-            curve = of_length(given, expected, settings)
-        done = replace(frame, registration=registration, projections=pictures, curve=curve)
-        return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
+        done = replace(frame, registration=registration, projections=pictures)
+        if given is not None:
+            return _as_given(self.run, done, given)
+        curve = self.run.stored(
+            "trace",
+            trace,
+            here,
+            self.lumen,
+            self.run.case.entry_mm,
+            self.run.case.entry_direction,
+            of_frame=frame.index,
+            reference=self.reference,
+            previous=previous,
+            expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
+            config=settings,
+        )
+        return _traced(done, curve)
+
+
+def _traced(frame: Frame, curve: Curve) -> Frame:
+    """The frame with its curve, failed where the curve is not to be trusted."""
+    done = replace(frame, curve=curve)
+    return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
+
+
+def _as_given(run: Context, frame: Frame, curve: Curve) -> Frame:
+    """The frame with the user's own curve; one that does not begin at the entry says what it may be instead."""
+    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
+    odd = oddity(curve.points_mm, entry, direction)
+    if odd:
+        return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
+    if (curve.points_mm[0] - entry) @ direction < 0:  # with a part in the introducer
+        points = begun(curve.points_mm, entry, direction)
+        curve = Curve(points, np.full(len(points), np.nan), note=curve.note)
+    expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
+    return _traced(frame, of_length(curve, expected, run.config.trace))
 
 
 def _given_traces(run: Context) -> list[Curve]:

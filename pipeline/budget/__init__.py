@@ -1,0 +1,25 @@
+"""budget: how much of an error is what the inputs may be, the trace and the segments, and how much is the model's.
+
+After ASME V&V 20: the insertion is replayed by an ensemble whose inputs are drawn from what they may be. Its spread,
+the trace's and the segments' make u_val; an error within 2 u_val says nothing of the model, one beyond it does.
+"""
+
+from pipeline.budget.ensemble import Scene, replayed
+from pipeline.budget.frame import Budget, Seen, frame_budget
+from pipeline.budget.inputs import SOURCES, Nominal, Sigmas, alone, drawn, sigmas_of
+from pipeline.budget.shapes import releases
+
+__all__ = [
+    "SOURCES",
+    "Budget",
+    "Nominal",
+    "Scene",
+    "Seen",
+    "Sigmas",
+    "alone",
+    "drawn",
+    "frame_budget",
+    "releases",
+    "replayed",
+    "sigmas_of",
+]

@@ -1,0 +1,67 @@
+"""The insertion replayed many times with other inputs, and how far that spreads the wires."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from pipeline.arrays.polyline import at_arc
+from pipeline.budget.inputs import Member
+from pipeline.budget.surface import around, displaced
+from pipeline.model import Array, Lumen, OverWire, Wall, Wire
+from pipeline.simulate import insertion_of, together, wall_of
+from pipeline.simulate.config import SolverConfig
+from solver import VesselWall
+
+NARROWEST_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What all members share.
+
+    solver : with the length of the segments.     wires : nominal ones, about which the lumen is looked at.
+    catheter_mm : of the tip of a catheter in each frame.     seed : of the lumens' surfaces.
+    """
+
+    wire: Wire
+    wall: Wall
+    lumen: Lumen
+    solver: SolverConfig
+    wires: Sequence[Array]
+    catheter: OverWire | None = None
+    catheter_mm: Sequence[float] | None = None
+    seed: int = 0
+
+    def vessel(self) -> VesselWall:
+        """The lumen's wall around the nominal wires."""
+        return wall_of(around(self.lumen.distance, list(self.wires)), self.solver.hull)
+
+
+def replayed(scene: Scene, members: Sequence[Member], arc_mm: Sequence[Array]) -> list[Array]:
+    """The wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that came to no rest.
+
+    Members that share a lumen go side by side; one lumen is held at a time.
+    """
+    vessel = scene.vessel()
+    found: list[list[Array]] = [[] for _ in arc_mm]
+    for (number, sigma), group in groupby(members, key=lambda member: (member.lumen, member.lumen_mm)):
+        own = list(group)
+        for wires in _together(scene, displaced(vessel, number, sigma, scene.seed), own):
+            for frame, wire, arc in zip(found, wires, arc_mm, strict=True):
+                frame.append(np.full((len(arc), 3), np.nan) if wire is None else at_arc(wire, arc))
+    return [np.array(frame) for frame in found]
+
+
+def _together(scene: Scene, vessel: VesselWall, members: Sequence[Member]) -> Iterator[list[Array | None]]:
+    """The joints (k, 3) of each member's wires."""
+    insertions = []
+    for one in members:
+        # where hull and wall meet, a lumen narrower by so much is a wire thicker by it
+        wire = replace(scene.wire, radius_mm=max(scene.wire.radius_mm + one.narrower_mm, NARROWEST_MM))
+        own = wire, scene.wall, vessel, one.clamp, scene.solver, one.config, scene.catheter
+        insertions.append(insertion_of(*own))
+    depths, rolls = [one.depth_mm.tolist() for one in members], [one.roll_deg.tolist() for one in members]
+    for wires in together(insertions, depths, rolls, scene.catheter_mm):
+        yield [wire.joints_mm if wire.converged and len(wire.joints_mm) > 1 else None for wire in wires]

@@ -1,0 +1,156 @@
+"""What the inputs may be: one standard deviation of each, stated in the manifest or a default, and draws."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pipeline.model import Array, Clamp, Wire
+from pipeline.simulate.config import SimulateConfig
+
+LUMEN_VOXELS, LUMEN_BIAS_VOXELS = 0.12, 0.05
+"""Standard deviation of the lumen's surface, place by place (measured: 0.11), and of what is common to all."""
+INSERTION_MM = 0.5
+"""Of a depth that is read from a scale on the wire's shaft."""
+TIP_VOXELS = 0.25
+"""Of a traced tip, along the wire, beyond what the trace states, as in ``simulate.clamp``."""
+ROLL_DEG = 5.0
+REST_CURVATURE, TAPER, WALL_STIFFNESS = 0.05, 0.1, 0.5
+"""Relative; of the last two the logarithm's."""
+UNITS = {"roll_deg": " degrees", "lumen_mm": " mm", "lumen_bias_mm": " mm", "friction": ""}
+FRICTION = 0.3
+"""Relative to the coefficient that is stated: where none is, none is drawn, and what friction does is model error."""
+
+SOURCES = (
+    *("clamp", "depth", "roll", "lumen", "lumen_bias"),
+    *("rest_curvature", "taper", "wall_stiffness", "friction"),
+)
+"""The inputs that are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sigmas:
+    """One standard deviation of every input.
+
+    clamp : (6, 6) covariance, see ``Clamp``.     depth : (frames,), mm.     said : by source, in words.
+    lumen, lumen_bias in mm, roll in degrees, the others as of ``Uncertainty``.
+    """
+
+    clamp: Array
+    depth: Array
+    roll: float
+    lumen: float
+    lumen_bias: float
+    rest_curvature: float
+    taper: float
+    wall_stiffness: float
+    friction: float
+    said: dict[str, str]
+
+
+class Nominal(NamedTuple):
+    """The insertion about which inputs are drawn.
+
+    depth_mm, roll_deg : (frames,).     config : with the friction.     traced : the depths are the traces', so that
+    the tip stays where it is seen when the clamp is moved.
+    """
+
+    clamp: Clamp
+    depth_mm: Array
+    roll_deg: Array
+    config: SimulateConfig
+    traced: bool
+
+
+class Member(NamedTuple):
+    """One insertion of the ensemble: its inputs.
+
+    narrower_mm : common to the whole lumen.     lumen : number of the lumen's surface, and lumen_mm its deviation.
+    """
+
+    clamp: Clamp
+    depth_mm: Array
+    roll_deg: Array
+    config: SimulateConfig
+    narrower_mm: float
+    lumen: int
+    lumen_mm: float
+
+
+def sigmas_of(
+    stated: Mapping[str, float | None], nominal: Nominal, wire: Wire, depth_mm: Array, voxel_mm: float
+) -> Sigmas:
+    """The standard deviations of a case: what is stated, else the defaults.
+
+    stated : keys of ``Uncertainty``, and roll_deg.     depth_mm : (frames,) of the depths.
+    """
+    friction, curved = nominal.config.friction or 0.0, bool(np.any(wire.rest_curvature_per_mm))
+    defaults = {
+        # a wire that is straight at rest may be rolled at will
+        "roll_deg": ROLL_DEG * curved,
+        "lumen_mm": LUMEN_VOXELS * voxel_mm,
+        "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
+        "rest_curvature": REST_CURVATURE * curved,
+        "taper": TAPER * isinstance(wire.bending_stiffness_N_mm2, list),
+        "wall_stiffness": WALL_STIFFNESS,
+        "friction": FRICTION * friction,
+    }
+    values, said = {}, {}
+    for name, default in defaults.items():
+        given, source = stated.get(name), _source(name)
+        values[source] = default if given is None else given
+        said[source] = (
+            f"{values[source]:.3g}{UNITS.get(name, ' (relative)')}, {'default' if given is None else 'stated'}"
+        )
+    clamp = nominal.clamp
+    known = clamp.covariance is not None
+    said["clamp"] = f"{clamp.sigma_mm:.3f} mm across and {clamp.sigma_deg:.2f} degrees" if known else "exact"
+    said["depth"] = f"{float(np.median(depth_mm)):.2f} mm, {'traced' if nominal.traced else 'manifest'}"
+    covariance = np.array(clamp.covariance) if known else np.zeros((6, 6))
+    return Sigmas(covariance, depth_mm, **values, said=said)
+
+
+def _source(name: str) -> str:
+    """A key of ``Uncertainty`` as a source: without its unit."""
+    return name.removesuffix("_mm").removesuffix("_deg")
+
+
+def drawn(nominal: Nominal, sigmas: Sigmas, count: int, per_lumen: int, seed: int = 0) -> list[Member]:
+    """Members of an ensemble. per_lumen : how many of them share one draw of the lumen's surface.
+
+    The first so many of a larger ensemble are those of a smaller one: every member has its own generator.
+    """
+    members = []
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        clamp, along = _moved(nominal.clamp, sigmas.clamp, rng)
+        depth = nominal.depth_mm + sigmas.depth * rng.standard_normal(len(sigmas.depth)) - along * nominal.traced
+        roll, narrower, curvature, taper, wall, friction = rng.standard_normal(6)
+        old = nominal.config
+        config = replace(
+            old,
+            rest_curvature_scale=old.rest_curvature_scale * max(1.0 + sigmas.rest_curvature * curvature, 0.0),
+            taper_scale=old.taper_scale * float(np.exp(sigmas.taper * taper)),
+            wall_scale=old.wall_scale * float(np.exp(sigmas.wall_stiffness * wall)),
+            friction=max((old.friction or 0.0) + sigmas.friction * friction, 0.0),
+        )
+        bias, rolls = sigmas.lumen_bias * narrower, nominal.roll_deg + sigmas.roll * roll
+        surface = number // per_lumen if sigmas.lumen else 0
+        members.append(Member(clamp, np.maximum(depth, 0.1), rolls, config, bias, surface, sigmas.lumen))
+    return members
+
+
+def _moved(clamp: Clamp, covariance: Array, rng: np.random.Generator) -> tuple[Clamp, float]:
+    """A clamp drawn about another, and how far its entry lies along the wire, mm."""
+    variances, axes = np.linalg.eigh(covariance)
+    step = axes @ (np.sqrt(np.maximum(variances, 0.0)) * rng.standard_normal(6))
+    direction = clamp.direction + step[3:]
+    moved = replace(clamp, entry_mm=clamp.entry_mm + step[:3], direction=direction / np.linalg.norm(direction))
+    return moved, float(step[:3] @ clamp.direction)
+
+
+def alone(sigmas: Sigmas, source: str) -> Sigmas:
+    """The standard deviations of one input, all others exact; the same draws of it are made."""
+    exact: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in SOURCES if name != source}
+    return replace(sigmas, **exact)

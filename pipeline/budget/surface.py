@@ -1,0 +1,50 @@
+"""Lumens whose surface lies a little elsewhere: a smooth random field added to the distance."""
+
+import numpy as np
+
+from pipeline.model import Array
+from solver import Grid, VesselWall
+
+KNOT_VOXELS = 1.9
+"""Between the knots of the cubic splines that a field is made of: it is correlated as a Gaussian of 0.82 of that. A
+segmented circle of Willis is off by 0.11 voxels (standard deviation), correlated as one of 1.55."""
+MEAN_SQUARE = 151.0 / 315.0
+"""Of the weights of a cubic B-spline, summed over its knots, the mean over a cell; in space its third power."""
+ROOM_MM = 6.0
+"""How far beyond the wires the lumen is looked at: a member that goes elsewhere may do so by that much."""
+
+
+def around(distance: Grid, wires: list[Array]) -> Grid:
+    """The part of the distance around some wires (n, 3)."""
+    points = np.concatenate(wires)
+    corners = np.array(np.meshgrid(*zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)))
+    index = distance.to_index(corners.reshape(3, -1).T)
+    low = np.clip(np.floor(index.min(axis=0)), 0, np.array(distance.shape) - 1).astype(int)
+    high = np.clip(np.ceil(index.max(axis=0)) + 1, low + 1, distance.shape).astype(int)
+    return distance.crop((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+
+def _weights(count: int, knot: float) -> Array:
+    """Cubic B-splines (count, knots), ``knot`` voxels apart, at each of ``count`` voxels."""
+    knots = int(np.ceil(count / knot)) + 3
+    t = np.abs(np.arange(count)[:, None] / knot - (np.arange(knots)[None] - 1.0))
+    return np.where(t < 1.0, 2.0 / 3.0 - t * t + 0.5 * t**3, np.maximum(2.0 - t, 0.0) ** 3 / 6.0)
+
+
+def offset_field(grid: Grid, rng: np.random.Generator) -> Array:
+    """A smooth random field (nx, ny, nz) of standard deviation 1, as smooth in mm along all axes."""
+    knot_mm = KNOT_VOXELS * float(np.mean(grid.spacing_mm))
+    pairs = zip(grid.shape, grid.spacing_mm, strict=True)
+    weights = [_weights(n, max(knot_mm / h, 1.0)).astype(np.float32) for n, h in pairs]
+    field = rng.standard_normal([w.shape[1] for w in weights], dtype=np.float32)
+    for w in weights:  # contracts the first axis and puts the new one last: after three all are in place
+        field = np.tensordot(field, w, (0, 1))
+    return np.asarray(field / np.float32(MEAN_SQUARE**1.5))
+
+
+def displaced(wall: VesselWall, number: int, sigma_mm: float, seed: int) -> VesselWall:
+    """The wall with its surface drawn anew, the same for the same number."""
+    if sigma_mm == 0.0:
+        return wall
+    rng = np.random.default_rng([seed, 1, number])
+    return wall.shifted(np.float32(sigma_mm) * offset_field(wall.distance, rng))

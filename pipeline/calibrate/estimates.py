@@ -1,0 +1,160 @@
+"""What the traces show of every parameter: value, standard deviation, profile, and whether it is seen at all.
+
+A parameter counts as seen where its standard deviation is small enough and the profile of the objective rises to both
+sides: a wall that may be as stiff as it likes has a standard deviation only by accident.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.calibrate.fit import Linear, Problem
+from pipeline.calibrate.residuals import Evidence
+from pipeline.calibrate.search import Fit, fitted, held_at_prior
+from pipeline.calibrate.trials import replayed
+from pipeline.calibrate.unknowns import Unknown
+from pipeline.model import Array
+from pipeline.simulate.config import SolverConfig
+
+OFFSETS = (-2.0, 2.0)
+"""Where profiles are looked at in standard deviations, beside those at which a parameter counts as seen."""
+RISE = 1.0
+"""Rise of the objective (minus twice the log-posterior) at one standard deviation."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter. value : as fitted; used : as it goes on, the prior where it is not seen.     sd : of the posterior.
+
+    profile : (value, rise of the objective with all others following).     why : where it is not seen.
+    """
+
+    unknown: Unknown
+    value: float
+    sd: float
+    used: float
+    seen: bool
+    why: str
+    profile: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameError:
+    """Root mean square distance of a frame's wire to its trace, across, mm: as stated and as calibrated."""
+
+    case: str
+    frame: int
+    depth_mm: float
+    before_mm: float
+    after_mm: float
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Parameters, their correlations (of those that were free at first), errors of each frame, and the fit.
+
+    scale : factor on the traces' covariance that the residuals ask for; where traces state none it is found so.
+    """
+
+    estimates: tuple[Estimate, ...]
+    correlation: Array
+    frames: tuple[FrameError, ...]
+    fit: Fit
+    scale: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters as they go on, by name."""
+        return self.fit.values
+
+
+def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: SolverConfig) -> Calibration:
+    """Fit everything; what is not seen stays at its prior and the rest is fitted again."""
+    whole = fitted(free, evidence, solver)
+    profiles = profiles_of(whole)
+    found = [_judged(u, whole, p) for u, p in zip(whole.problem.free, profiles, strict=True)]
+    unseen = [e.unknown.name for e in found if not e.seen]
+    last = held_at_prior(whole, unseen) if unseen else whole
+    estimates = tuple(replace(e, used=last.values[e.unknown.name]) for e in found)
+    n = len(whole.problem.free)
+    covariance = whole.linear.covariance[:n, :n]
+    deviations = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviations, deviations)
+    return Calibration(estimates, correlation, tuple(_errors(last)), last, last.linear.scale)
+
+
+def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]) -> Estimate:
+    """Whether a parameter is seen."""
+    value, sd = fit.values[unknown.name], fit.sd[unknown.name]
+    near = [(v, rise) for v, rise in profile if abs(abs(v - value) - unknown.enough) < 1e-6 * unknown.enough]
+    flat = [v for v, rise in near if not rise >= RISE]
+    why = ""
+    if sd > unknown.enough:
+        why = f"known to {sd:.3g} only; {unknown.enough:g} or less counts as seen"
+    elif flat:
+        why = f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"
+    elif np.isclose(value, unknown.high) or (np.isclose(value, unknown.low) and unknown.logarithmic):
+        why = f"it runs to the end of its range, {unknown.shown(value):.3g}"
+    return Estimate(unknown, value, sd, value, not why, why, profile)
+
+
+def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:
+    """For each free parameter the rise of the objective at values of it, all other numbers following.
+
+    They follow along the covariance, then once more by the residuals there with the derivatives of the minimum.
+    """
+    linear, problem, covariance = fit.linear, fit.problem, fit.linear.covariance
+    asked: list[tuple[int, Array]] = []
+    for k, unknown in enumerate(problem.free):
+        spread = float(np.sqrt(covariance[k, k]))
+        for offset in (-unknown.enough, *(n * spread for n in OFFSETS), unknown.enough):
+            value = linear.x[k] + offset
+            if unknown.low <= value <= unknown.high:
+                along = covariance[:, k] / covariance[k, k] * (value - linear.x[k])
+                asked.append((k, problem.clipped(linear.x + along)))
+    first = problem.residuals([x for _, x in asked], linear.weights, linear.scale)
+    second = [_followed(problem, linear, k, x, r) for (k, x), r in zip(asked, first, strict=True)]
+    again = problem.residuals(second, linear.weights, linear.scale)
+    found: list[list[tuple[float, float]]] = [[] for _ in problem.free]
+    for (k, x), r, y, s in zip(asked, first, second, again, strict=True):
+        least = min(problem.value(x, r), problem.value(y, s))
+        found[k].append((float(x[k]), least - linear.value))
+    return [tuple(own) for own in found]
+
+
+def _followed(problem: Problem, linear: Linear, fixed: int, x: Array, residual: Sequence[Array]) -> Array:
+    """The vector after one step with one entry fixed."""
+    means, sigmas = problem.prior
+    inverse = np.where(sigmas > 0, 1.0 / np.where(sigmas > 0, sigmas, 1.0) ** 2, 1e12)
+    right = inverse * (means - x)
+    for jacobian, r in zip(linear.jacobian, residual, strict=True):
+        right = right + jacobian.T @ r
+    others = np.arange(len(x)) != fixed
+    moved = x.copy()
+    moved[others] += np.linalg.solve(linear.normal[np.ix_(others, others)], right[others])
+    return problem.clipped(moved)
+
+
+def _errors(last: Fit) -> list[FrameError]:
+    """Errors of all frames with the clamps fitted to stated and to calibrated parameters."""
+    free = {u.name: u.prior for u in last.problem.free}
+    stated = Problem((), last.problem.held | free, last.problem.evidence, last.problem.solver)
+    before = stated.solved(np.zeros(len(stated.prior[0])))
+    found: list[FrameError] = []
+    for n, one in enumerate(last.problem.evidence):
+        pairs = [(one.trial, p.points(x)[n]) for p, x in ((stated, before.x), (last.problem, last.linear.x))]
+        rows = [
+            one.rows(wires, pair[1]) for wires, pair in zip(replayed(pairs, last.problem.solver), pairs, strict=True)
+        ]
+        ends = np.cumsum(one.counts)
+        for i, (end, count) in enumerate(zip(ends, one.counts, strict=True)):
+            rms = [
+                float(np.sqrt(np.mean(np.sum(r.across_mm[end - count : end] ** 2, axis=1)))) if r.rests[i] else np.nan
+                for r in rows
+            ]
+            seen = one.trial.seen[i]
+            weight = float(last.linear.weights[n][i])
+            found.append(FrameError(one.trial.name, seen.index, seen.curve.length_mm, rms[0], rms[1], weight))
+    return found

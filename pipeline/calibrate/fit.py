@@ -1,0 +1,181 @@
+"""Levenberg and Marquardt over all insertions at once: shared parameters, and each insertion's clamp, wall and depths.
+
+Derivatives are difference quotients of whole insertions, which go side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.calibrate.residuals import Evidence, Rows, weights_of
+from pipeline.calibrate.trials import DEEPER_MM, OWN, OWN_STEPS, Point, replayed
+from pipeline.calibrate.unknowns import ROLL, WALL, Unknown
+from pipeline.model import Array
+from pipeline.simulate.config import SolverConfig
+
+ROUNDS, SETTLED = 12, 0.15
+"""Most rounds; it ends where a step is smaller than this part of the standard deviations."""
+DAMPINGS = (1.0, 10.0)
+"""Tried side by side, in units of the present damping."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The problem about a vector x (p,): whitened derivatives of every insertion, weights, and their scale.
+
+    normal : (p, p) with the priors.     right : (p,), minus half the gradient.     value : of the objective.
+    """
+
+    x: Array
+    jacobian: list[Array]
+    normal: Array
+    right: Array
+    value: float
+    weights: list[Array]
+    scale: float
+
+    @property
+    def covariance(self) -> Array:
+        """Of the posterior (p, p)."""
+        return np.asarray(np.linalg.inv(self.normal))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted: the free unknowns, the values of the others, the insertions.
+
+    A vector holds the free unknowns, then OWN numbers and a depth for each frame of every insertion.
+    """
+
+    free: tuple[Unknown, ...]
+    held: dict[str, float]
+    evidence: tuple[Evidence, ...]
+    solver: SolverConfig
+
+    @property
+    def stated(self) -> bool:
+        """All traces state how far they are off."""
+        return all(one.stated for one in self.evidence)
+
+    def parts(self) -> list[slice]:
+        """Where each insertion's own numbers stand."""
+        found, first = [], len(self.free)
+        for one in self.evidence:
+            found.append(slice(first, first + OWN + len(one.trial.seen)))
+            first = found[-1].stop
+        return found
+
+    @property
+    def prior(self) -> tuple[Array, Array]:
+        """Means and standard deviations (p,) of the priors."""
+        own = np.concatenate([one.trial.sigmas for one in self.evidence])
+        means = np.concatenate([[u.prior for u in self.free], np.zeros(len(own))])
+        return means, np.concatenate([[u.sd for u in self.free], own])
+
+    def points(self, x: Array) -> list[Point]:
+        """A vector as each insertion takes it."""
+        shared = self.held | {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
+        return [Point(shared, x[part]) for part in self.parts()]
+
+    def clipped(self, x: Array) -> Array:
+        """A vector within the bounds."""
+        n = len(self.free)
+        inside = np.clip(x[:n], [u.low for u in self.free], [u.high for u in self.free])
+        return np.concatenate([inside, x[n:]])
+
+    def residuals(self, xs: Sequence[Array], weights: list[Array], scale: float) -> list[list[Array]]:
+        """Whitened residuals of each insertion at several vectors."""
+        pairs = [(one.trial, p) for x in xs for one, p in zip(self.evidence, self.points(x), strict=True)]
+        wires = replayed(pairs, self.solver)
+        found, count = [], len(self.evidence)
+        for k in range(len(xs)):
+            own = []
+            for i, one in enumerate(self.evidence):
+                rows = one.rows(wires[k * count + i], pairs[k * count + i][1])
+                own.append(one.whitened(rows.across_mm, np.nan_to_num(rows.force_N), weights[i], scale))
+            found.append(own)
+        return found
+
+    def value(self, x: Array, residual: Sequence[Array]) -> float:
+        """The objective: minus twice the logarithm of the posterior."""
+        means, sigmas = self.prior
+        free = sigmas > 0
+        return float(sum(r @ r for r in residual) + np.sum(((x - means)[free] / sigmas[free]) ** 2))
+
+    def columns(self, index: int) -> dict[int, float]:
+        """Entries of a vector that move an insertion's wires, each with its step; depths, moved together, apart."""
+        trial, part = self.evidence[index].trial, self.parts()[index]
+        found = {k: u.step for k, u in enumerate(self.free) if self._concerns(u, index)}
+        return found | {part.start + k: OWN_STEPS[k] for k in range(OWN) if trial.sigmas[k] > 0}
+
+    def _concerns(self, unknown: Unknown, index: int) -> bool:
+        trial = self.evidence[index].trial
+        if unknown.name == ROLL:
+            return not trial.roll_free
+        return not unknown.name.startswith(WALL) or unknown.stated_N_mm2 == trial.wall.stiffness_N_mm2
+
+    def linear(self, x: Array) -> Linear:
+        """The problem about a vector, all its difference quotients side by side."""
+        here, pairs, steps = self.points(x), [], []
+        for i, one in enumerate(self.evidence):
+            part, columns = self.parts()[i], self.columns(i)
+            deeper = x + DEEPER_MM * (np.arange(len(x)) >= part.start + OWN) * (np.arange(len(x)) < part.stop)
+            changed = [x + step * (np.arange(len(x)) == k) for k, step in columns.items()]
+            pairs += [(one.trial, self.points(v)[i]) for v in (x, *changed, deeper)]
+            steps.append(columns)
+        wires, base, slopes = iter(replayed(pairs, self.solver)), [], []
+        points = iter(pair[1] for pair in pairs)
+        for i, (one, columns) in enumerate(zip(self.evidence, steps, strict=True)):
+            still, _ = next(wires), next(points)
+            base.append(one.rows(still, here[i]))
+            across, push = np.zeros((*base[-1].across_mm.shape, len(x))), np.zeros((len(still), len(x)))
+            for k, step in columns.items():
+                across[:, :, k], push[:, k] = one.slopes(still, next(wires), (here[i], next(points)), step)
+            change, more = one.slopes(still, next(wires), (here[i], next(points)), DEEPER_MM)
+            first = self.parts()[i].start + OWN
+            for f, end in enumerate(np.cumsum(one.counts)):
+                run = slice(end - one.counts[f], end)
+                across[run, :, first + f], push[f, first + f] = change[run], more[f]
+            slopes.append((across, push))
+        return self._assembled(x, base, slopes)
+
+    def _assembled(self, x: Array, base: Sequence[Rows], slopes: Sequence[tuple[Array, Array]]) -> Linear:
+        """Normal equations of what was looked at."""
+        surprise = [one.surprise(rows) for one, rows in zip(self.evidence, base, strict=True)]
+        weights, scale = weights_of(surprise, stated=self.stated)
+        means, sigmas = self.prior
+        free = sigmas > 0
+        inverse = np.where(free, 1.0 / np.where(free, sigmas, 1.0) ** 2, 1e12)
+        normal, right, jacobians, residuals = np.diag(inverse), inverse * (means - x), [], []
+        for one, rows, (across, push), weight in zip(self.evidence, base, slopes, weights, strict=True):
+            r = one.whitened(rows.across_mm, np.nan_to_num(rows.force_N), weight, scale)
+            j = one.whitened(across, push, weight, scale)
+            normal, right = normal + j.T @ j, right + j.T @ r
+            jacobians.append(j)
+            residuals.append(r)
+        return Linear(x, jacobians, normal, right, self.value(x, residuals), weights, scale)
+
+    def solved(self, x: Array, rounds: int = ROUNDS) -> Linear:
+        """The problem about the vector at which the objective is least, from a first one."""
+        damping = 1e-3
+        about = self.linear(self.clipped(x))
+        for _ in range(rounds):
+            n, deviations = len(self.free), np.sqrt(np.diag(about.covariance))
+            damped = [about.normal + damping * d * np.diag(np.diag(about.normal)) for d in DAMPINGS]
+            tried = [self.clipped(about.x + np.linalg.solve(m, about.right)) for m in damped]
+            values = [
+                self.value(v, r) for v, r in zip(tried, self.residuals(tried, about.weights, about.scale), strict=True)
+            ]
+            best = int(np.argmin(values))
+            if not values[best] < about.value:
+                damping *= 30.0
+                if damping > 1e4:
+                    break
+                continue
+            damping = max(damping * (0.1 if best == 0 else 3.0), 1e-6)
+            step, fell = tried[best] - about.x, about.value - values[best]
+            about = self.linear(tried[best])
+            if np.all(np.abs(step[:n]) < SETTLED * deviations[:n]) and fell < 1.0:
+                break
+        return about

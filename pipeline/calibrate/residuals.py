@@ -1,0 +1,183 @@
+"""How far the solver's wires lie from the traces of an insertion, weighed by what traces and measured forces are off.
+
+A point of a trace is compared with the wire's point at the same distance from the tip, across the wire: a length that
+is a little off is taken up by the frame's own depth.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+
+from pipeline.arrays.polyline import at_arc
+from pipeline.calibrate.trials import Point, Trial, depths_at
+from pipeline.model import Array, arc_length
+from pipeline.simulate.evidence import Sight, covariance_of_traces
+from solver import Solution
+
+FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 1.5  # the trace's own ends are left out
+TANGENT_MM = 0.25
+WALL_VOXELS, WALL_BELL_MM = 0.1, 3.0
+"""How far a segmented wall is off from place to place, one standard deviation, and over what length."""
+MODEL_VOXELS, MODEL_BELL_MM = 0.15, 6.0
+"""How far a wire may lie off in a frame of its own though all parameters are right: where it sticks by friction, and
+what a contact that opens or closes decides. The true rod and the solver are apart by 0.003 to 0.04 mm so."""
+LOST_MM = 1.0
+"""Stands for the distance of a wire that came to no rest: its frame says nothing, but is no better than others."""
+FORCE_SHARE = 0.03
+"""Part of a push force that the model may be off by itself."""
+FARTHEST_MM, OUTLYING = 0.6, 4.0
+"""A wire that a difference quotient's step moves farther snaps: it tells no direction. A frame whose mean square is so
+many times that of the median frame is weighed down to it: a release must not decide."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Residuals: across (points, 3) mm, force (frames,) N, NaN where unknown, and which frames are at rest."""
+
+    across_mm: Array
+    force_N: Array
+    rests: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """An insertion's traces as what is fitted."""
+
+    trial: Trial
+    _roots: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def sights(self) -> list[Sight]:
+        """Points of every frame."""
+        found = []
+        for frame in self.trial.seen:
+            arc = np.arange(FIRST_MM, max(frame.curve.length_mm - LAST_MM, FIRST_MM + 1e-6), EVERY_MM)
+            sigma = np.interp(arc, arc_length(frame.curve.points_mm), frame.curve.sigma_mm)
+            knot = frame.curve.levels.get("knot_mm", np.nan)
+            found.append(Sight(frame.index, arc, at_arc(frame.curve.points_mm, arc), sigma, knot))
+        return found
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """Points of every frame (frames,)."""
+        return np.array([len(sight.arc_mm) for sight in self.sights], dtype=np.int64)
+
+    @cached_property
+    def stated(self) -> bool:
+        """The traces state how far they are off."""
+        return any(bool(np.isfinite(sight.sigma_mm).all()) for sight in self.sights)
+
+    @cached_property
+    def traced(self) -> Array:
+        """Covariance (points, points) of one component by what the traces are off."""
+        return covariance_of_traces(self.sights, self.trial.voxel_mm)
+
+    @cached_property
+    def modelled(self) -> Array:
+        """Covariance (points, points) of one component by what wall and model are off, not the traces."""
+        arc = np.concatenate([sight.arc_mm for sight in self.sights])
+        bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / WALL_BELL_MM) ** 2)
+        wall = (WALL_VOXELS * self.trial.voxel_mm) ** 2 * bell
+        frame = np.repeat(np.arange(len(self.counts)), self.counts)
+        bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / MODEL_BELL_MM) ** 2)
+        # a clamped wire is where it is held
+        free = 1.0 - np.exp(-arc / MODEL_BELL_MM)
+        own = (MODEL_VOXELS * self.trial.voxel_mm) ** 2 * bell * np.outer(free, free)
+        return np.asarray(wall + np.where(frame[:, None] == frame[None, :], own, 0.0))
+
+    def root(self, scale: float) -> Array:
+        """Lower Cholesky factor (points, points) of the covariance of one component, that of the traces times scale."""
+        if self._roots.get("scale") != scale:
+            self._roots.update(scale=scale, root=cholesky(scale * self.traced + self.modelled, lower=True))
+        return np.asarray(self._roots["root"])
+
+    def rows(self, wires: Sequence[Solution], point: Point) -> Rows:
+        """Traces less wires, across the wires."""
+        across, push, rests = [], [], np.zeros(len(wires), bool)
+        depths = depths_at(self.trial, point)
+        for i, (sight, wire, depth) in enumerate(zip(self.sights, wires, depths, strict=True)):
+            rests[i] = wire.converged and len(wire.joints_mm) > 2
+            if not rests[i]:
+                across.append(np.full((len(sight.arc_mm), 3), LOST_MM / np.sqrt(3.0)))
+                push.append(np.nan)
+                continue
+            here, tangent = along(wire, self._arc(i, depth))
+            away = sight.points_mm - here
+            across.append(away - np.sum(away * tangent, axis=1)[:, None] * tangent)
+            push.append(wire.push_force_N)
+        force = np.array(push) if self.trial.force_N is None else self.trial.force_N - np.array(push)
+        return Rows(
+            np.concatenate(across), force if self.trial.force_N is not None else np.full(len(wires), np.nan), rests
+        )
+
+    def slopes(
+        self, wires: Sequence[Solution], moved: Sequence[Solution], points: tuple[Point, Point], step: float
+    ) -> tuple[Array, Array]:
+        """Derivatives of wires (points, 3) and forces (frames,): 0 for a frame that snaps."""
+        depths = zip(depths_at(self.trial, points[0]), depths_at(self.trial, points[1]), strict=True)
+        change, push = [], np.zeros(len(wires))
+        for i, (a, b, (here, there)) in enumerate(zip(wires, moved, depths, strict=True)):
+            n = len(self.sights[i].arc_mm)
+            if not (a.converged and b.converged and min(len(a.joints_mm), len(b.joints_mm)) > 2):
+                change.append(np.zeros((n, 3)))
+                continue
+            old, tangent = along(a, self._arc(i, here))
+            way = along(b, self._arc(i, there))[0] - old
+            snaps = float(np.abs(way).max()) > FARTHEST_MM
+            way = way - np.sum(way * tangent, axis=1)[:, None] * tangent
+            change.append(np.zeros((n, 3)) if snaps else way / step)
+            push[i] = 0.0 if snaps else (b.push_force_N - a.push_force_N) / step
+        return np.concatenate(change), push
+
+    def _arc(self, frame: int, depth_mm: float) -> Array:
+        """Where the points of a frame are on a wire of some depth: as far from the tip as on the trace."""
+        return np.asarray(self.sights[frame].arc_mm + depth_mm - self.trial.seen[frame].curve.length_mm)
+
+    def surprise(self, rows: Rows) -> Array:
+        """Mean squares (frames,) of each frame's residuals by its own covariance, about 1 where all is as expected."""
+        squares, first = [], 0
+        for n in self.counts:
+            own = self.traced[first : first + n, first : first + n]
+            mine = rows.across_mm[first : first + n]
+            squares.append(float(np.sum(mine * np.linalg.solve(own, mine))) / (2 * n))
+            first += n
+        return np.array(squares)
+
+    def whitened(self, values: Array, force: Array, weights: Array, scale: float) -> Array:
+        """Numbers of variance 1 (3 points + frames, ...) from values (points, 3, ...) and forces (frames, ...)."""
+        heavy = np.repeat(np.sqrt(weights), self.counts)
+        flat = heavy[:, None] * values.reshape(len(values), -1)
+        across = solve_triangular(self.root(scale), flat, lower=True)
+        return np.concatenate(
+            [across.reshape(3 * len(values), *values.shape[2:]), force * self._force_weight(weights, force)]
+        )
+
+    def _force_weight(self, weights: Array, like: Array) -> Array:
+        """Roots of the weights of the measured forces, 0 where there is none."""
+        given = self.trial.force_N
+        if given is None:
+            return np.zeros((len(weights),) + (1,) * (like.ndim - 1))
+        sigma = np.hypot(self.trial.force_sigma_N, FORCE_SHARE * np.abs(np.nan_to_num(given)))
+        each = np.where(np.isfinite(given), np.sqrt(weights) / sigma, 0.0)
+        return each.reshape(-1, *(1,) * (like.ndim - 1))
+
+
+def along(wire: Solution, arc_mm: Array) -> tuple[Array, Array]:
+    """Points and tangents (n, 3) of a wire at arc lengths from its clamp, straight on beyond its ends."""
+    curve = wire.joints_mm
+    arc = np.maximum(arc_mm, 0.0)
+    tangent = at_arc(curve, arc + TANGENT_MM) - at_arc(curve, np.maximum(arc - TANGENT_MM, 0.0))
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    return at_arc(curve, arc) + np.minimum(arc_mm, 0.0)[:, None] * tangent, tangent
+
+
+def weights_of(surprises: Sequence[Array], *, stated: bool) -> tuple[list[Array], float]:
+    """Weights of the frames of each insertion, and the factor on the traces' covariance: at least 1 where stated."""
+    middle = float(np.median(np.concatenate(surprises)))
+    scale = max(middle, 1.0 if stated else 0.01)
+    return [np.minimum(1.0, OUTLYING * scale / np.maximum(own, 1e-12)) for own in surprises], scale

@@ -1,0 +1,137 @@
+"""From nothing known of the roll to the least objective: rolls all around without friction, the best ones followed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.calibrate.fit import Linear, Problem
+from pipeline.calibrate.residuals import Evidence
+from pipeline.calibrate.trials import OWN
+from pipeline.calibrate.unknowns import BENDING, FRICTION, ROLL, Unknown
+from pipeline.model import Array
+from pipeline.simulate.config import SolverConfig
+
+ROLLS_DEG = np.arange(-180.0, 180.0, 15.0)
+MOST_STARTS, FIRST_ROUNDS = 3, 4
+AS_GOOD = 4.0
+"""Rise of the objective, minus twice the log-posterior, up to which another roll is as good."""
+FIRST_FRICTION = 0.03
+"""Where friction starts from 0, which is the end of its range, its derivative is one-sided."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The problem and its solution.     starts : roll, degrees, and objective of each that was followed."""
+
+    problem: Problem
+    linear: Linear
+    starts: tuple[tuple[float, float], ...]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Shared parameters by name, those that are held with them."""
+        free = {u.name: float(v) for u, v in zip(self.problem.free, self.linear.x, strict=False)}
+        return self.problem.held | free
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviations of the free parameters."""
+        deviations = np.sqrt(np.diag(self.linear.covariance))
+        return {u.name: float(v) for u, v in zip(self.problem.free, deviations, strict=False)}
+
+
+def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: SolverConfig) -> Fit:
+    """The parameters at which the solver's wires lie nearest to the traces."""
+    slippery = tuple(u for u in free if u.name not in (FRICTION, BENDING))
+    first = Problem(slippery, {FRICTION: 0.0}, tuple(evidence), solver)
+    followed = [first.solved(x, FIRST_ROUNDS) for x in _starts(first)]
+    # objectives at scales of their own cannot be compared
+    weights, scale = followed[0].weights, min(one.scale for one in followed)
+    values = [
+        first.value(one.x, r)
+        for one, r in zip(followed, first.residuals([f.x for f in followed], _even(weights), scale), strict=True)
+    ]
+    best = followed[int(np.argmin(values))]
+    whole = Problem(tuple(free), {}, tuple(evidence), solver)
+    known = dict(zip((u.name for u in slippery), best.x, strict=False))
+    begin = [known.get(u.name, max(u.prior, FIRST_FRICTION) if u.name == FRICTION else u.prior) for u in free]
+    solved = whole.solved(np.concatenate([begin, best.x[len(slippery) :]]))
+    rolls = [one.x[[u.name for u in slippery].index(ROLL)] for one in followed]
+    return Fit(whole, solved, tuple((float(r), float(v)) for r, v in zip(rolls, values, strict=True)))
+
+
+def held_at_prior(fit: Fit, names: Sequence[str]) -> Fit:
+    """The fit again with some parameters as the manifest states them."""
+    keep = [k for k, u in enumerate(fit.problem.free) if u.name not in names]
+    held = {u.name: u.prior for u in fit.problem.free if u.name in names}
+    problem = replace(fit.problem, free=tuple(fit.problem.free[k] for k in keep), held=fit.problem.held | held)
+    x = np.concatenate([fit.linear.x[keep], fit.linear.x[len(fit.problem.free) :]])
+    return Fit(problem, problem.solved(x), fit.starts)
+
+
+@dataclass(frozen=True)
+class OwnRoll:
+    """The roll of one insertion, degrees, how well it is known, and others at which the wire lies as well."""
+
+    roll_deg: float
+    sd_deg: float
+    rivals_deg: tuple[float, ...]
+
+
+def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
+    """The roll at which a wire lies as it was traced; all else but the clamp is as stated."""
+    problem = Problem((), {FRICTION: friction}, (one,), solver)
+    still = Problem((), {FRICTION: 0.0}, (one,), solver)
+    means, _ = problem.prior
+    xs = [np.where(np.arange(len(means)) == OWN - 1, roll, means) for roll in ROLLS_DEG]
+    even = [np.ones(len(one.trial.seen))]
+    found = np.array([float(own[0] @ own[0]) for own in still.residuals(xs, even, 1.0)])
+    solved = [problem.solved(xs[k]) for k in _valleys(found)]
+    scale = min(one.scale for one in solved)
+    ends = problem.residuals([one.x for one in solved], even, scale)
+    values = np.array([problem.value(one.x, r) for one, r in zip(solved, ends, strict=True)])
+    best = int(np.argmin(values))
+    sd = float(np.sqrt(solved[best].covariance[OWN - 1, OWN - 1]))
+    rolls = [float(one.x[OWN - 1]) for one in solved]
+    as_good = [r for r, v in zip(rolls, values, strict=True) if v - values[best] < AS_GOOD]
+    rivals = [r for r in as_good if abs((r - rolls[best] + 180.0) % 360.0 - 180.0) > max(3.0 * sd, 1.0)]
+    return OwnRoll(rolls[best], sd, tuple(rivals))
+
+
+def _valleys(values: Array) -> list[int]:
+    """The lowest of the places (n,) on a circle that are no higher than their neighbours."""
+    low = [k for k in range(len(values)) if values[k] <= min(values[k - 1], values[(k + 1) % len(values)])]
+    return sorted(low, key=lambda k: float(values[k]))[:MOST_STARTS]
+
+
+def _even(weights: Sequence[Array]) -> list[Array]:
+    return [np.ones_like(w) for w in weights]
+
+
+def _starts(problem: Problem) -> list[Array]:
+    """Vectors to begin with: everything as stated, but the roll from where the objective has its lowest valleys."""
+    means, _ = problem.prior
+    if all(np.all(np.asarray(one.trial.wire.rest_curvature_per_mm) == 0.0) for one in problem.evidence):
+        return [means]
+    at = [u.name for u in problem.free].index(ROLL)
+    xs = []
+    for roll in ROLLS_DEG:
+        x = means.copy()
+        x[at] = roll
+        for one, part in zip(problem.evidence, problem.parts(), strict=True):
+            x[part.start + OWN - 1] = roll if one.trial.roll_free else 0.0
+        xs.append(x)
+    even = [np.ones(len(one.trial.seen)) for one in problem.evidence]
+    found = problem.residuals(xs, even, 1.0)
+    each = np.array([[float(r @ r) for r in own] for own in found])
+    free = np.array([one.trial.roll_free for one in problem.evidence])
+    together = each[:, ~free].sum(axis=1)
+    chosen = []
+    for k in _valleys(together):
+        x = xs[k].copy()
+        for i, part in enumerate(problem.parts()):
+            if free[i]:
+                x[part.start + OWN - 1] = ROLLS_DEG[int(np.argmin(each[:, i]))]
+        chosen.append(x)
+    return chosen

@@ -1,0 +1,102 @@
+"""An insertion that is fitted, and the solver's wires for it under many parameters at once."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.calibrate.unknowns import FRICTION, ROLL, bent, wall_factor
+from pipeline.model import Array, Clamp, OverWire, Wall, Wire
+from pipeline.simulate import inserted
+from pipeline.simulate.clamp import Prior, Seen, depth_from, moved
+from pipeline.simulate.config import SolverConfig
+from pipeline.simulate.resolution import lengths_mm
+from solver import Insertion, Insertions, Solution, VesselWall
+
+LUMEN_VOXELS = 0.15
+"""How far the wall may stand off where it was segmented, one standard deviation: it hides in the wall's stiffness."""
+OWN = 7
+"""Unknowns of an insertion itself: the clamp's place (3) and tilts (2), the wall's offset, its own roll."""
+OWN_STEPS = np.array([0.05] * 3 + [np.radians(0.5)] * 2 + [0.02, 1.0])
+DEEPER_MM = 0.1
+UNKNOWN_ROLL_DEG = 104.0
+"""Standard deviation of a roll of which nothing is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An insertion with its traces. vessel : the wall at stiffness 1.     wall : as stated.     given, prior : clamp.
+
+    roll_free : the roll is not stated.     roll_shared : its offset is that of all insertions.     force_N : (frames,)
+    measured push, NaN where it is not; force_sigma_N : its standard deviation.
+    """
+
+    name: str
+    vessel: VesselWall
+    wire: Wire
+    wall: Wall
+    given: Clamp
+    prior: Prior
+    seen: tuple[Seen, ...]
+    voxel_mm: float
+    roll_free: bool = False
+    catheter: OverWire | None = None
+    force_N: Array | None = None
+    force_sigma_N: float = 1e-3
+
+    @property
+    def sigmas(self) -> Array:
+        """Prior standard deviations (OWN + frames,) of what belongs to this insertion alone; 0 is exact."""
+        tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], 0.25 * self.voxel_mm)
+        roll = UNKNOWN_ROLL_DEG if self.roll_free else 0.0
+        return np.concatenate([self.prior.sigmas, [LUMEN_VOXELS * self.voxel_mm, roll], tips])
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Values of all shared parameters by name, and of an insertion's own (OWN + frames,)."""
+
+    shared: Mapping[str, float]
+    own: Array
+
+
+def depths_at(trial: Trial, point: Point) -> list[float]:
+    """Depth of each frame, mm from the clamp."""
+    clamp = moved(trial.given, point.own[:5])
+    return [max(depth_from(clamp, f.curve) + d, 0.1) for f, d in zip(trial.seen, point.own[OWN:], strict=True)]
+
+
+def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
+    """The insertion with other parameters, before its first push; ValueError where the solver refuses it."""
+    stiffness = trial.wall.stiffness_N_mm2 * wall_factor(trial.wall.stiffness_N_mm2, point.shared)
+    vessel = trial.vessel.like(stiffness_N_mm2=stiffness, friction=point.shared.get(FRICTION, trial.wall.friction))
+    # a wall that stands nearer by some length is a wire thicker by it
+    wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
+    length = lengths_mm(solver.segment_mm, wire.rest_curvature_per_mm)[0]
+    settings = replace(solver, segment_mm=length, finest_mm=solver.step_mm)
+    return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), settings, 1.0, trial.catheter)
+
+
+def rolls_at(trial: Trial, point: Point) -> list[float]:
+    """Roll of each frame, degrees."""
+    turn = float(point.own[6]) + (0.0 if trial.roll_free else point.shared.get(ROLL, 0.0))
+    return [frame.roll_deg + turn for frame in trial.seen]
+
+
+def replayed(pairs: Sequence[tuple[Trial, Point]], solver: SolverConfig) -> list[list[Solution]]:
+    """The wires of many insertions, all at once: those with a catheter, which cannot be, one after the other."""
+    ways = [
+        (insertion_at(trial, point, solver), depths_at(trial, point), rolls_at(trial, point)) for trial, point in pairs
+    ]
+    found: list[list[Solution]] = [[] for _ in ways]
+    plain = [i for i, (trial, _) in enumerate(pairs) if trial.catheter is None]
+    if plain:
+        insertions, depths, rolls = zip(*(ways[i] for i in plain), strict=True)
+        for i, wires in zip(plain, Insertions(insertions).to_depths(list(depths), list(rolls)), strict=True):
+            found[i] = wires
+    for i, (trial, _) in enumerate(pairs):
+        if trial.catheter is not None:
+            insertion, depths_mm, rolls_deg = ways[i]
+            tips = [min(f.catheter_mm, mm) for f, mm in zip(trial.seen, depths_mm, strict=True)]
+            found[i] = list(insertion.to_depths(depths_mm, rolls_deg, tips))
+    return found

@@ -1,0 +1,97 @@
+"""What is fitted: every parameter with its prior, its bounds and how well it must be known to count as seen.
+
+Stiffnesses of wire and wall only count in their ratio as long as nothing is weighed (``bending`` needs forces or a
+weight), and the plane of the rest curvature is the roll: neither is fitted twice.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.model import Wire
+from pipeline.ranges import Profile
+
+ROLL, REST, TAPER, WALL, FRICTION, BENDING = "roll_offset_deg", "rest_curvature", "taper", "wall", "friction", "bending"
+SEEN_LOG = 0.2
+"""A factor whose logarithm is known no better than this is not seen."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter, in degrees, as a coefficient or as the logarithm of a factor on what the manifest states.
+
+    prior, sd : mean and standard deviation.     low, high : bounds.     step : of a difference quotient.     enough :
+    largest standard deviation at which it counts as seen.     what : for the reader.     stated_N_mm2 : of the wall.
+    """
+
+    name: str
+    prior: float
+    sd: float
+    low: float
+    high: float
+    step: float
+    enough: float
+    what: str
+    stated_N_mm2: float = float("nan")
+
+    @property
+    def logarithmic(self) -> bool:
+        """It is the logarithm of a factor."""
+        return self.name.split(":")[0] in (REST, TAPER, WALL, BENDING)
+
+    def shown(self, value: float) -> float:
+        """A value as the reader sees it: a factor for a logarithm."""
+        return float(np.exp(value)) if self.logarithmic else value
+
+
+def _factor(name: str, sd: float, most: float, step: float, what: str) -> Unknown:
+    return Unknown(name, 0.0, sd, -float(np.log(most)), float(np.log(most)), step, SEEN_LOG, what)
+
+
+def unknowns(walls_N_mm2: Sequence[float], friction: float, *, weighed: bool) -> tuple[Unknown, ...]:
+    """All parameters of some insertions.
+
+    walls_N_mm2 : stated stiffnesses, walls that are stated alike being one.     friction : as stated.
+    weighed : forces or the wire's weight are known, so that the wire's stiffness has a scale.
+    """
+    found = [
+        Unknown(
+            ROLL, 0.0, 100.0, -180.0, 180.0, 1.0, 5.0, "degrees added to the stated roll: the plane of the tip's curve"
+        ),
+        _factor(REST, 0.5, 4.0, 0.02, "factor on the rest curvature"),
+        _factor(TAPER, 0.7, 5.0, 0.05, "factor on the shaft's stiffness relative to the tip's"),
+    ]
+    for stiffness in sorted(set(walls_N_mm2)):
+        what = f"factor on wall stiffness over the wire's, walls stated at {stiffness:g} N/mm2"
+        found.append(replace(_factor(f"{WALL}:{stiffness:g}", 1.5, 100.0, 0.1, what), stated_N_mm2=stiffness))
+    found.append(Unknown(FRICTION, friction, 0.1, 0.0, 0.5, 0.01, 0.02, "Coulomb's coefficient of wire and wall"))
+    if weighed:
+        found.append(_factor(BENDING, 0.7, 10.0, 0.05, "factor on the wire's stiffness, wall and wire together"))
+    return tuple(found)
+
+
+def bent(wire: Wire, values: Mapping[str, float]) -> Wire:
+    """A wire with other parameters: values by name, those that are missing are as stated."""
+    scale, shaft, rest = (np.exp(values.get(name, 0.0)) for name in (BENDING, TAPER, REST))
+    stiffness, curvature = wire.bending_stiffness_N_mm2, wire.rest_curvature_per_mm
+    changed: Profile
+    if isinstance(stiffness, (int, float)):
+        changed = float(stiffness * scale)
+    else:
+        at, ei = np.array(stiffness, dtype=float).T
+        # between tip and shaft in proportion, on a logarithmic scale
+        reach = np.log(ei[-1] / ei[0])
+        share = np.log(ei / ei[0]) / reach if reach else np.zeros(len(ei))
+        changed = [(float(s), float(value)) for s, value in zip(at, ei * scale * shaft**share, strict=True)]
+    curved: Profile
+    if isinstance(curvature, (int, float)):
+        curved = float(curvature * rest)
+    else:
+        curved = [(s, float(value * rest)) for s, value in curvature]
+    return replace(wire, bending_stiffness_N_mm2=changed, rest_curvature_per_mm=curved)
+
+
+def wall_factor(stated_N_mm2: float, values: Mapping[str, float]) -> float:
+    """Factor on a wall's stiffness: over that of the wire, times that of the wire."""
+    return float(np.exp(values.get(f"{WALL}:{stated_N_mm2:g}", 0.0) + values.get(BENDING, 0.0)))

@@ -1,0 +1,83 @@
+"""``wireval calibrate MANIFEST -o OUT``: parameters from the cases marked role = "calibration"."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.commands import add_settings, complain, resolved_settings, say
+
+if TYPE_CHECKING:
+    from pipeline.run.cache import Store
+    from pipeline.study.manifest import Case
+    from pipeline.study.settings import Config
+
+HELP = 'parameters from the cases marked role = "calibration"'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    add = parser.add_argument
+    add("manifest", type=Path, metavar="MANIFEST")
+    add("-o", "--out", type=Path, required=True, metavar="OUT", help="parameters.toml and calibration.html go there")
+    add("--design", action="store_true", help="predict from planned lumen, wire, depths and rolls; nothing is fitted")
+    add("--no-cache", action="store_true", help="neither read nor write the stage store")
+    add_settings(parser)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Exit 0; 1 where some case was left out; 2 on wrong input."""
+    from pipeline.run.cache import Store, default_root
+    from pipeline.run.calibration import chosen
+    from pipeline.status import InputError
+    from pipeline.study.check import check
+    from pipeline.study.manifest import read_manifest
+
+    try:
+        manifest, settings = read_manifest(args.manifest), resolved_settings(args)
+        cases, store = chosen(manifest.cases), Store(None if args.no_cache else default_root())
+        problems = [] if args.design else check(cases, settings.config)
+        if problems:
+            return complain(problems, str(args.manifest))
+        if args.out.is_file():
+            return complain([f"-o {args.out}: this is a file; name a folder"], "the command line")
+        return (_design if args.design else _fit)(args, cases, settings.config, store)
+    except InputError as error:
+        return complain(error.problems, error.place or str(args.manifest))
+
+
+def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
+    """Fit, write, and say what was found."""
+    from pipeline.run.calibration import calibrate, file_in, gathered
+    from pipeline.run.calibration_files import estimates_of, misfit, write_parameters, write_record
+    from reports.calibration import render_calibration
+
+    found = gathered(cases, config, store, say)
+    fit = calibrate(found, config)
+    write_parameters(file_in(args.out), found, fit)
+    write_record(args.out / "calibration.json", found, fit)
+    for row in estimates_of(found, fit):
+        sd = f"{100 * row['sd']:.2g} %" if row["logarithmic"] else f"{row['sd']:.2g}"
+        verdict = "" if row["seen"] else f"  UNIDENTIFIABLE, stays at {row['used']:.4g}: {row['why']}"
+        say(f"{row['name']:20s} {row['value']:10.4g}  +- {sd:8s}{verdict}")
+    for warning in misfit(fit):
+        say(f"warning: {warning}")
+    left_out = [case.id for case in cases if case.id not in {used.id for used in found.cases}]
+    for name in left_out:
+        say(next(note for note in found.notes if note.startswith(f"{name}: left out")))
+    say(f"parameters: {file_in(args.out)}  page: {render_calibration(args.out)}")
+    return 1 if left_out else 0
+
+
+def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
+    """Predict and say."""
+    from pipeline.run.calibration import design
+    from pipeline.run.calibration_files import write_design
+
+    rows, notes = design(cases, config, store)
+    for note in notes:
+        say(f"planned: {note}")
+    for row in rows:
+        verdict = "seen" if row.seen else "NOT SEEN"
+        say(f"{row.unknown.name:20s} +- {row.sd:8.3g}  ({row.unknown.enough:g} counts as seen)  {verdict}")
+    write_design(args.out / "design.json", rows, notes)
+    return 0

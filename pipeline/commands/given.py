@@ -1,0 +1,89 @@
+"""What MANIFEST stands for on the command line: a file, a folder that holds one, or a folder of scans."""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.commands import resolved_settings, say
+
+if TYPE_CHECKING:
+    from pipeline.study.manifest import Manifest
+
+NAME = "manifest.toml"
+Inferred = tuple[str, tuple[str, ...]]
+"""The text of a manifest, and sentences that say where each guess comes from."""
+
+
+def add_manifest(parser: argparse.ArgumentParser) -> None:
+    """MANIFEST, and what may be said where it is a folder of scans."""
+    parser.add_argument(
+        "manifest",
+        type=Path,
+        metavar="MANIFEST",
+        help="manifest.toml, a folder that holds it, or one of scans (a case)",
+    )
+    add_what_is_seen(parser)
+
+
+def add_what_is_seen(parser: argparse.ArgumentParser) -> None:
+    """What a folder of scans need not be searched for."""
+    folder = parser.add_argument_group("of a folder of scans").add_argument
+    folder("--entry", metavar="X,Y,Z", help="LPS mm, where the wire enters the lumen")
+    folder("--direction", metavar="X,Y,Z", help="where the wire points at the entry")
+    folder("--wire-radius", type=float, metavar="MM", help="outer radius of the wire")
+
+
+def given(args: argparse.Namespace, keep: Path | None = None) -> "tuple[Manifest, tuple[str, ...]]":
+    """The manifest, and what was assumed where it is inferred from scans, which is printed.
+
+    keep : folder in which an inferred one is left as manifest.inferred.toml; None leaves nothing.
+    """
+    from pipeline.load import SUFFIXES
+    from pipeline.status import InputError
+    from pipeline.study.manifest import read_manifest
+    from reports.atomic import write_text
+
+    path: Path = args.manifest
+    if path.name.lower().endswith(SUFFIXES):
+        folder = path.absolute().parent
+        raise InputError(
+            [f"{path}: a scan is no manifest; give its folder, {folder}, or write one: wireval init {folder}"]
+        )
+    if path.is_dir() and (path / NAME).exists():
+        path = path / NAME
+    if not path.is_dir():
+        return read_manifest(path), ()
+    text, assumptions = inferred(args)
+    say(text)
+    for note in assumptions:
+        say(f"assumed: {note}")
+    with tempfile.TemporaryDirectory() as passing:
+        written = Path(keep or passing) / "manifest.inferred.toml"
+        write_text(written, text)
+        return read_manifest(written), assumptions
+
+
+def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:
+    """A manifest for a folder of scans. beside : it will lie there, and names the scans from there."""
+    from pipeline.study.infer import infer_manifest
+
+    seen = _vector(args.entry, "--entry"), _vector(args.direction, "--direction"), args.wire_radius
+    load = resolved_settings(args).config.load
+    return infer_manifest(args.manifest, *seen, load, args.manifest if beside else None)
+
+
+def _vector(text: str | None, name: str) -> Any:
+    import numpy as np
+
+    from pipeline.run.launch import UsageError
+
+    if text is None:
+        return None
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise UsageError([f"{name} {text!r}: expected three numbers X,Y,Z in LPS mm"])
+    return values

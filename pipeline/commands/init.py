@@ -1,0 +1,40 @@
+"""``wireval init FOLDER``: the manifest that run would infer, as a file to correct."""
+
+import argparse
+from pathlib import Path
+
+from pipeline.commands import add_settings, say
+from pipeline.commands.given import NAME, add_what_is_seen, inferred
+
+HELP = "write the manifest that is inferred from a folder of scans, to be corrected"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    parser.add_argument("manifest", type=Path, metavar="FOLDER", help="of scans: one case")
+    parser.add_argument("--to", type=Path, metavar="FILE", help=f"where to write it (default FOLDER/{NAME})")
+    add_what_is_seen(parser)
+    add_settings(parser)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Exit 0; raises InputError or StageError where there is nothing to go by, or a manifest is there already."""
+    from pipeline.run.launch import UsageError
+    from pipeline.status import InputError
+    from pipeline.study.manifest import read_manifest
+    from reports.atomic import write_text
+
+    if not args.manifest.is_dir():
+        raise InputError([f"{args.manifest}: no such folder; give one that holds scans"])
+    path: Path = args.to or args.manifest / NAME
+    if path.exists():
+        raise UsageError([f"{path}: is there already; correct it, or write another with --to FILE"])
+    text, assumptions = inferred(args, beside=args.to is None)
+    head = [f"# {'assumed: ' * bool(n)}{note}" for n, note in enumerate(("correct what is assumed here", *assumptions))]
+    write_text(path, "\n".join([*head, "", text]))
+    read_manifest(path)
+    say(f"written: {path}")
+    for note in assumptions:
+        say(f"assumed: {note}")
+    say(f"correct it, then: wireval check {path} && wireval run {path} -o OUT")
+    return 0

@@ -1,0 +1,94 @@
+"""``wireval score MANIFEST --curves DIR -o OUT``: other simulators' wires, judged as the solver's own and beside it."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.commands import add_settings, complain, resolved_settings, say
+
+if TYPE_CHECKING:
+    from pipeline.run.launch import Plan
+
+HELP = "judge other simulators' wires by the same pipeline, side by side with the solver's own"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What may follow the verb."""
+    add = parser.add_argument
+    add("manifest", type=Path, metavar="MANIFEST", help="manifest.toml")
+    what = "folder of one wire a frame (.csv .vtp .vtk .mrk.json), of CASE/ folders, or an output of run; repeatable"
+    add("--curves", action="append", required=True, metavar="[NAME=]DIR", help=what)
+    add("--space", default="", choices=("LPS", "RAS"), help="of coordinates whose files do not state it")
+    add("--unit", default="", choices=("mm", "cm", "m"), help="of coordinates whose files do not state it")
+    add(
+        "-o",
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="output folder; of all but the first DIR below simulators/",
+    )
+    add_settings(parser)
+    add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add("--fresh", action="store_true", help="compute every case again")
+    add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Exit 0 all ok, 1 some case of the first simulator failed, 2 input wrong."""
+    from pipeline.run.launch import failure_lines, last_line, launch
+    from pipeline.run.simulators import write_comparison
+    from pipeline.status import InputError
+    from pipeline.study.check import check
+    from reports.simulators import render_simulators
+
+    try:
+        plans = _plans(args)
+    except InputError as error:
+        return complain(error.problems, error.place or str(args.manifest))
+    problems = [text for plan in plans.values() for text in check(plan.cases, plan.template.settings.config)]
+    if problems:
+        return complain(list(dict.fromkeys(problems)), str(args.manifest))
+    (args.out / "simulators").mkdir(parents=True, exist_ok=True)
+    done = {}
+    for name, plan in plans.items():
+        done[name] = launch(plan)
+        for line in failure_lines(plan):
+            sys.stderr.write(f"{name}: {line}\n")
+        say(f"{name}: {last_line(*done[name])}")
+    for line in write_comparison(args.out, {name: plan.out for name, plan in plans.items()}):
+        say(line)
+    say(f"side by side: {render_simulators(args.out, embed=args.embed)}")
+    return 0 if next(iter(done.values()))[0].all_ok else 1
+
+
+def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
+    """A run for each simulator, the solver's own last; raises InputError."""
+    from pipeline.run.cache import default_root
+    from pipeline.run.calibrated import as_calibrated
+    from pipeline.run.case import Job
+    from pipeline.run.launch import Plan, UsageError
+    from pipeline.run.simulators import OURS
+    from pipeline.study.manifest import read_manifest
+    from pipeline.study.others import Others, found_for, named
+
+    manifest, settings = read_manifest(args.manifest), resolved_settings(args)
+    if args.jobs < 1:
+        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
+        raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
+    calibrated, notes = as_calibrated(manifest.cases, None, own=False)
+    plans: dict[str, Plan] = {}
+    alone = len(manifest.cases) == 1
+    stated = {"space": args.space, "unit": args.unit}
+    for name, place in {**named(args.curves), OURS: None}.items():
+        cases = []
+        for case in calibrated:
+            files = None if place is None else found_for(case.id, place, alone)
+            others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
+            cases.append(case.model_copy(update={"simulated": others}))
+        out = args.out / "simulators" / name if plans else args.out
+        template = Job(cases[0], settings, out, cache=default_root(), fresh=args.fresh, embed=args.embed)
+        plans[name] = Plan(manifest, tuple(cases), template, workers=args.jobs, assumptions=notes)
+    return plans

@@ -1,0 +1,115 @@
+"""Which branch of the vessel a point lies in: the lumen as a graph of slices at equal way from the entry.
+
+Slices that follow each other one by one are a branch; where a slice has two after it, or two before it, branches meet
+(the Reeb graph of the way). A dead end that is short against the vessel beside it (a bump, a flat sac) is part of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.graph import MCP_Geometric
+from skimage.measure import label
+
+from pipeline.model import Array
+from solver import Grid
+
+SLICE_VOXELS = 2.0
+"""Thickness of a slice: two, so that neighbours of neighbours are never in the same one."""
+BUMP_RADII = 2.0
+"""A dead end that is shorter than so many radii of the vessel that it leaves is no branch."""
+Labels = NDArray[np.integer[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """inside_mm (n, 3) : the lumen's voxels.     names (n,) : of the branch of each.
+
+    meetings : where branches meet, middle (3,) mm, radius in mm, and the names of those that do.
+    """
+
+    inside_mm: Array
+    names: Labels
+    meetings: tuple[tuple[Array, float, frozenset[int]], ...]
+
+    def at(self, point_mm: Array) -> set[int]:
+        """The branches that a point lies in: one, or all that meet where it lies."""
+        own = {int(self.names[np.argmin(np.sum((self.inside_mm - point_mm) ** 2, axis=1))])}
+        for middle, radius, names in self.meetings:
+            if np.linalg.norm(point_mm - middle) <= radius:
+                own |= names
+        return own
+
+
+def branches_of(distance: Grid, entry_mm: Array) -> Branches:
+    """The branches of a lumen seen from an entry; ``distance`` in mm to its wall, negative inside."""
+    depth = -np.asarray(distance.values, dtype=np.float64)
+    inside = np.argwhere(depth > 0)
+    thick = SLICE_VOXELS * float(distance.spacing_mm.mean())
+    first = inside[np.argmin(np.sum((inside - distance.to_index(entry_mm)) ** 2, axis=1))]
+    way, _ = MCP_Geometric(np.where(depth > 0, 1.0, np.inf), sampling=tuple(distance.spacing_mm)).find_costs([first])
+    reached = np.isfinite(way)
+    band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int32)
+    slices, at = np.asarray(label(band, connectivity=3), dtype=np.int32), tuple(inside.T)
+    # what cannot be reached from the entry is no branch of this vessel: 0
+    nodes, middle = slices[at], distance.to_mm(inside.astype(float))
+    graph = _Graph(slices, band, depth, thick)
+    names = graph.names()
+    places = [(middle[nodes == node].mean(axis=0), graph.radius[node], names_of) for node, names_of in graph.met(names)]
+    return Branches(middle, names[nodes], tuple(places))
+
+
+class _Graph:
+    """Slices by number from 1: the band of each, its largest radius in mm, what follows it and what precedes it."""
+
+    def __init__(self, slices: Labels, band: Labels, depth: Array, thick_mm: float) -> None:
+        count = int(slices.max()) + 1
+        self.thick_mm, self.band, self.radius = thick_mm, np.zeros(count, dtype=np.int64), np.zeros(count)
+        kept = slices > 0
+        self.band[slices[kept]] = band[kept]  # all voxels of a slice are of one
+        np.maximum.at(self.radius, slices[kept], depth[kept])
+        found = []
+        for axis in range(3):
+            low, high = (np.moveaxis(slices, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+            touch = (low != high) & (low > 0) & (high > 0)
+            found.append(np.stack([low[touch], high[touch]], axis=1))
+        edges = np.unique(np.concatenate(found), axis=0)
+        self.after: dict[int, set[int]] = {node: set() for node in range(1, count)}
+        self.before: dict[int, set[int]] = {node: set() for node in range(1, count)}
+        for a, b in edges.tolist():
+            low, high = (a, b) if self.band[a] < self.band[b] else (b, a)
+            self.after[low].add(high)
+            self.before[high].add(low)
+        self.order = sorted(self.after, key=lambda node: int(self.band[node]))
+        self.real = self._real_branches()
+
+    def _real_branches(self) -> Mapping[int, set[int]]:
+        """Of each slice, those after it that lead on, or far: a short dead end beside another way is a bump."""
+        end: dict[int, int] = {}
+        for node in reversed(self.order):
+            end[node] = max([int(self.band[node]), *(end[one] for one in self.after[node])])
+        found = {}
+        for node, after in self.after.items():
+            least = self.band[node] + BUMP_RADII * self.radius[node] / self.thick_mm
+            far = {one for one in after if end[one] > least or len(self.before[one]) > 1}
+            found[node] = far or ({max(after, key=lambda one: end[one])} if after else set())
+        return found
+
+    def names(self) -> Labels:
+        """The branch of each slice; a bump has the name of the vessel that it is on."""
+        names, used = np.zeros(len(self.band), dtype=np.int64), 0
+        for node in self.order:
+            before = self.before[node]
+            parent = next(iter(before)) if len(before) == 1 else None
+            goes_on = parent is not None and (len(self.real[parent]) < 2 or node not in self.real[parent])
+            used += not goes_on
+            names[node] = names[parent] if parent is not None and goes_on else used
+        return names
+
+    def met(self, names: Labels) -> list[tuple[int, frozenset[int]]]:
+        """The slices at which branches meet, each with their names."""
+        forks = [(node, {node, *after}) for node, after in self.real.items() if len(after) > 1]
+        joins = [(node, {node, *before}) for node, before in self.before.items() if len(before) > 1]
+        return [(node, frozenset(int(names[one]) for one in all_of)) for node, all_of in forks + joins]

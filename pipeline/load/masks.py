@@ -1,0 +1,117 @@
+"""A lumen as voxels: a label map (one label of several by number or name), a layered .seg.nrrd, or probabilities.
+
+Out: a Volume of 0 and 1 (uint8), or of probabilities 0..1 (float32) whose wall is at 0.5.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.load import load, read_header
+from pipeline.load.config import LoadConfig
+from pipeline.load.files import head_of
+from pipeline.load.geometry import Header, Mask, Source, judged, refused
+from pipeline.load.guard import told
+from pipeline.load.voxels import Head, plain, read_box
+from pipeline.model import Volume
+from pipeline.status import did_you_mean
+from solver.grid import read_only
+
+FEW = 16
+"""A map of whole numbers up to 255 with more distinct ones than this is a probability in 255 steps."""
+MOST_NAMED = 12
+
+
+def read_mask(source: Source, least_voxels: int) -> Volume:
+    """The lumen among the voxels of a file; LoadError where it is not clear which, or fewer than ``least_voxels``."""
+    label, level = (source.label, source.level) if isinstance(source, Mask) else (None, None)
+    volume, names = _voxels(source, label)
+    path, value = source.path, names[label][1] if isinstance(label, str) else label
+    inside = _chosen(path, volume.values, value, names) if level is None else _probability(path, volume.values, level)
+    count = int(np.count_nonzero(inside >= 0.5))
+    if count < least_voxels:
+        allowed = f"at least {least_voxels} (segment.least_voxels)"
+        raise refused(path, f"{count} labelled voxels", allowed, "check the label map")
+    if count == inside.size:
+        raise refused(path, "every voxel labelled", "a lumen with something around it", "check the label map")
+    return Volume(read_only(inside), volume.spacing_mm, volume.origin_mm, volume.direction, volume.assumed)
+
+
+def mask_header(source: Source) -> Header:
+    """Geometry of a mask's file, its layers counted as one; LoadError where it has none."""
+    if not source.path.name.lower().endswith((".nrrd", ".nhdr")):
+        return read_header(source)
+    with told(source.path):
+        return judged(_header(source, head_of(source.path)))
+
+
+def _header(source: Source, head: Head) -> Header:
+    geometry = head.spacing_mm, head.origin_mm, head.direction
+    return Header(source, head.shape, *geometry, str(head.kind), head.items, head.assumed)
+
+
+def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, tuple[int, int]]]:
+    """The voxels of the layer that holds a label, and (layer, value) of the file's named ones."""
+    path = source.path
+    header = mask_header(source)
+    head = head_of(path) if path.name.lower().endswith((".nrrd", ".nhdr")) else None
+    names = head.names if head else {}
+    if isinstance(label, str) and label not in names:
+        hint = did_you_mean(label, names) if names else "the file names none; give a number"
+        raise refused(path, f"no label named {label!r}", "one that the file names", hint)
+    if header.item_count > 1:
+        raise refused(path, f"{header.item_count} volumes", "one label map", "save the one that is meant")
+    if head is None or head.channels == 1:
+        return load(header, config=LoadConfig()), names
+    found = [names[label]] if isinstance(label, str) else [n for n in names.values() if label in (None, n[1])]
+    if len(found) != 1:
+        allowed = f"one of {', '.join(sorted(names)[:MOST_NAMED]) or 'none'}"
+        raise refused(path, f"{head.channels} layers, label {label!r}", allowed, "give label by its name")
+    if found[0][0] >= head.channels:
+        raise refused(path, f"a segment in layer {found[0][0]} of {head.channels}", "a layer it has", "save it again")
+    values = plain(read_box(head, 0, header.box, found[0][0]), path)
+    where = Volume(read_only(values), header.spacing_mm, header.origin_mm, header.direction, header.assumed)
+    return where, {**names, **({} if label is not None else {"": found[0]})}
+
+
+def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str, tuple[int, int]]) -> NDArray[Any]:
+    """1 where the label is; without one where the only label is, or a probability."""
+    if value is None and "" in names:
+        value = names[""][1]
+    if value is not None:
+        return np.asarray(values == value).astype(np.uint8)
+    low, high = float(values.min()), float(values.max())
+    whole = values.dtype.kind in "iu" or bool(np.all(values == np.rint(values)))
+    if not whole:
+        return _probability(path, values, 0.5)
+    kinds = _different(values)
+    if len(kinds) == 2 and low == 0:
+        return np.asarray(values != 0).astype(np.uint8)
+    if len(kinds) > FEW and low >= 0 and 200 <= high <= 255:
+        return _probability(path, values, 0.5)
+    shown = ", ".join(f"{kind:g}" for kind in kinds[:MOST_NAMED])
+    named = f" ({', '.join(f'{name} = {n[1]}' for name, n in list(names.items())[:MOST_NAMED])})" if names else ""
+    got = f"{len(kinds)} different values, {shown}{named}"
+    do = 'name one, lumen = {file = "...", label = 2}, or a probability, lumen = {file = "...", level = 0.5}'
+    raise refused(path, got, "0 and one label", do)
+
+
+def _different(values: NDArray[Any]) -> NDArray[Any]:
+    """The different values, ascending; counted rather than sorted where they are few."""
+    low, high = int(values.min()), int(values.max())
+    if values.dtype.kind not in "iu" or high - low > 65535:
+        return np.unique(values)
+    seen = np.zeros(high - low + 1, bool)
+    seen[values.astype(np.int64, order="K") - low] = True
+    return np.flatnonzero(seen) + low
+
+
+def _probability(path: Path, values: NDArray[Any], level: float) -> NDArray[np.float32]:
+    """Values 0..1 or 0..255 as probabilities, stretched so that ``level`` becomes 0.5."""
+    low, high = float(values.min()), float(values.max())
+    if low < -1e-3 or high > 255.5 or 1.001 < high < 100:
+        raise refused(path, f"values from {low:g} to {high:g}", "0 to 1, or 0 to 255", "name a label, or rescale it")
+    share = np.clip(values.astype(np.float32) / np.float32(255.0 if high > 1.001 else 1.0), 0, 1)
+    return np.asarray(np.interp(share, (0.0, level, 1.0), (0.0, 0.5, 1.0)), np.float32)

@@ -1,0 +1,95 @@
+"""Headers of MetaImage (.mha, .mhd), read here: ITK's own reader dies of some and takes what others lack as given."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.load.geometry import unusable
+from pipeline.load.guard import opened, size_of
+from pipeline.load.outside import beside, millimetres, numbered, numbers
+from pipeline.load.voxels import Head, Placed, axes_of
+
+LONGEST_HEADER = 65536
+TYPES = {
+    "MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4", "MET_UINT": "u4",
+    "MET_LONG": "i4", "MET_ULONG": "u4", "MET_LONG_LONG": "i8", "MET_ULONG_LONG": "u8", "MET_FLOAT": "f4",
+    "MET_DOUBLE": "f8",
+}  # fmt: skip
+PLACES = ("Offset", "Position", "Origin")
+TURNS = ("TransformMatrix", "Orientation", "Rotation")
+
+
+def head_of(path: Path) -> Head:
+    """What the header says; LoadError where that cannot be a scan."""
+    with opened(path) as file:
+        start = file.read(LONGEST_HEADER)
+    key = start.find(b"ElementDataFile")
+    end = start.find(b"\n", key)
+    if key < 0 or end < 0:
+        raise unusable(path, "cannot read it as MetaImage: no line ElementDataFile; check that the file is complete")
+    lines = start[:end].decode("latin-1").splitlines()
+    tags = {key.strip(): value.strip() for key, _, value in (line.partition("=") for line in lines)}
+    count = int(numbers(path, tags, "NDims", 1, whole=True)[0])
+    if not 1 <= count <= 8:
+        raise unusable(path, f"NDims = {count}; allowed: 3, or 4 for a sequence")
+    shape, items = axes_of(path, [int(n) for n in numbers(path, tags, "DimSize", count, whole=True)])
+    kind = tags.get("ElementType", "").removesuffix("_ARRAY")
+    if kind not in TYPES:
+        raise unusable(path, f"ElementType = {kind!r}; allowed: {', '.join(TYPES)}")
+    packing = "deflate" if tags.get("CompressedData", "False") == "True" else ""
+    if not packing and tags.get("BinaryData", "True") != "True":
+        packing = "ascii"
+    swapped = "True" in (tags.get("BinaryDataByteOrderMSB"), tags.get("ElementByteOrderMSB"))
+    stored = np.dtype((">" if swapped else "<") + TYPES[kind])
+    channels = int(numbers(path, tags, "ElementNumberOfChannels", 1, whole=True, missing="1")[0])
+    files = _files(path, tags["ElementDataFile"], start[end + 1 :], shape[2] * items)
+    voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
+    parts = tuple((name, _begin(name, path, tags, end + 1, voxel_bytes // len(files))) for name in files)
+    slope, shift = (
+        float(numbers(path, tags, f"ElementToIntensityFunction{name}", 1, missing=text)[0])
+        for name, text in (("Slope", "1"), ("Offset", "0"))
+    )
+    geometry, assumed = _geometry(path, tags, count)
+    return Head(
+        path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, slope=slope,
+        intercept=shift, assumed=assumed,
+    )  # fmt: skip
+
+
+def _begin(name: Path, header: Path, tags: dict[str, str], end: int, voxel_bytes: int) -> int:
+    """The byte of a data file where its voxels begin."""
+    skipped = int(numbers(header, tags, "HeaderSize", 1, whole=True, missing="0")[0])
+    if skipped == -1:
+        return max(size_of(name) - voxel_bytes, 0)
+    return end if name == header else max(skipped, 0)
+
+
+def _files(path: Path, text: str, below: bytes, planes: int) -> list[Path]:
+    """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
+    words = text.split()
+    if text.upper() == "LOCAL":
+        return [path]
+    if words and words[0].upper() == "LIST":
+        return [beside(path, line.strip()) for line in below.decode("latin-1").splitlines() if line.strip()]
+    if "%" in text:
+        return numbered(path, words, planes)
+    return [beside(path, text)]
+
+
+def _geometry(path: Path, tags: dict[str, str], count: int) -> tuple[Placed, tuple[str, ...]]:
+    """Spacing, origin and direction, and what of it the header lacks."""
+    factor = millimetres(path, tags.get("DistanceUnits", "mm"))
+    given = next((name for name in ("ElementSpacing", "ElementSize") if name in tags), "")
+    place = next((name for name in PLACES if name in tags), "")
+    turn = next((name for name in TURNS if name in tags), "")
+    lacks = [
+        text
+        for name, text in ((given, "spacing: 1 mm"), (place, "origin: 0, 0, 0 mm"), (turn, "direction: along x, y, z"))
+        if not name
+    ]
+    spacing = numbers(path, tags, given, count, missing="1 " * count)[:3] * factor
+    origin = numbers(path, tags, place, count, missing="0 " * count)[:3] * factor
+    identity = " ".join(map(str, np.eye(count).ravel()))
+    matrix = numbers(path, tags, turn, count * count, missing=identity)
+    direction = matrix.reshape(count, count).T[:3, :3]
+    return (spacing, origin, direction), tuple(f"{path.name}: the header lacks {text} assumed" for text in lacks)

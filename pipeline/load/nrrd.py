@@ -1,0 +1,179 @@
+"""Headers of NRRD (.nrrd, .nhdr, .seg.nrrd), read here: with their units, their space and 3D Slicer's segments."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.load.geometry import unusable
+from pipeline.load.guard import opened, size_of
+from pipeline.load.outside import beside, millimetres, numbered, numbers
+from pipeline.load.voxels import Head, Placed, axes_of
+
+LONGEST_HEADER = 4 * 2**20
+_NAMES = {
+    "i1": ("signed char", "int8", "int8_t"), "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "i4": ("int", "signed int", "int32", "int32_t"), "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "i8": ("longlong", "long long", "long long int", "signed long long", "int64", "int64_t"),
+    "u8": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
+    "f4": ("float",), "f8": ("double",),
+}  # fmt: skip
+TYPES = {name: kind for kind, names in _NAMES.items() for name in names}
+PACKINGS = {
+    "raw": "", "gzip": "deflate", "gz": "deflate", "bzip2": "bzip2", "bz2": "bzip2", "ascii": "ascii", "text": "ascii",
+    "txt": "ascii",
+}  # fmt: skip
+TO_LPS = {
+    "left-posterior-superior": (1, 1, 1), "lps": (1, 1, 1), "right-anterior-superior": (-1, -1, 1), "ras": (-1, -1, 1),
+    "left-anterior-superior": (1, -1, 1), "las": (1, -1, 1),
+}  # fmt: skip
+
+
+def head_of(path: Path) -> Head:
+    """What the header says; LoadError where that cannot be a scan."""
+    fields, begin = _fields(path)
+    count = int(numbers(path, fields, "dimension", 1, whole=True)[0])
+    if not 1 <= count <= 8:
+        raise unusable(path, f"dimension: {count}; allowed: 3, or 4 for a sequence")
+    sizes = [int(n) for n in numbers(path, fields, "sizes", count, whole=True)]
+    vectors = _vectors(path, fields, count)
+    kinds = fields.get("kinds", "").lower().split() or ["domain"] * count
+    leading = count == 4 and (vectors[0] is None if any(v is None for v in vectors) else kinds[0] not in DOMAINS)
+    shape, items = axes_of(path, sizes[1:] if leading else sizes)
+    kind = fields.get("type", "").lower()
+    packing = PACKINGS.get(fields.get("encoding", "raw").lower())
+    if kind not in TYPES or packing is None:
+        got = f"type {kind!r}, encoding {fields.get('encoding')!r}"
+        raise unusable(path, f"{got}; allowed: numbers up to 8 bytes, raw, gzip, bzip2 or ascii; save it again")
+    if fields.get("endian", "little").lower() not in ("little", "big"):
+        raise unusable(path, f"endian: {fields['endian']!r}; allowed: little, big")
+    stored = np.dtype((">" if fields.get("endian", "").lower() == "big" else "<") + TYPES[kind])
+    if packing != "ascii" and stored.itemsize > 1 and "endian" not in fields:
+        raise unusable(path, f"no endian for {stored.itemsize} bytes a voxel; allowed: little, big; correct the header")
+    channels = sizes[0] if leading else 1
+    files = _files(path, fields, begin, shape[2] * items)
+    voxel_bytes = int(np.prod(shape)) * items * channels * stored.itemsize
+    parts = tuple((name, _begin(name, path, fields, begin, voxel_bytes // len(files))) for name in files)
+    geometry, assumed = _geometry(path, fields, [v for v in vectors if v is not None], int(leading))
+    return Head(
+        path, shape, stored, parts, *geometry, packing=packing, items=items, channels=channels, assumed=assumed,
+        names=_segments(fields),
+    )  # fmt: skip
+
+
+DOMAINS = ("domain", "space", "time", "???", "none")
+
+
+def _fields(path: Path) -> tuple[dict[str, str], int]:
+    """The header's fields and key/value pairs, and the byte after it."""
+    with opened(path) as file:
+        start = file.read(LONGEST_HEADER)
+    if not start.startswith(b"NRRD"):
+        raise unusable(path, "cannot read it as NRRD: it does not begin with NRRD000; check that the file is complete")
+    blank = re.search(rb"\r?\n\r?\n", start)
+    end = blank.end() if blank else len(start)
+    fields: dict[str, str] = {}
+    text = start[:end].decode("utf-8", errors="replace")
+    for line in text.splitlines()[1:]:
+        name, colon, value = line.partition(":")
+        if colon and not line.startswith("#"):
+            fields[name if value.startswith("=") else name.strip().lower()] = value.removeprefix("=").strip()
+    alias = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip"}
+    fields = {alias.get(name, name): value for name, value in fields.items()}
+    if fields.get("data file", "").upper().startswith("LIST"):
+        fields["data file"] += "\n" + text.partition(fields["data file"])[2]
+    return fields, end
+
+
+def _begin(name: Path, header: Path, fields: dict[str, str], begin: int, voxel_bytes: int) -> int:
+    """The byte of a data file where its voxels (or their packing) begin."""
+    lines, skipped = (
+        int(numbers(header, fields, key, 1, whole=True, missing="0")[0]) for key in ("line skip", "byte skip")
+    )
+    at = begin if name == header else 0
+    if skipped == -1:
+        return max(size_of(name) - voxel_bytes, 0)
+    if lines < 0 or skipped < 0 or lines > MOST_LINES:
+        raise unusable(header, f"line skip {lines}, byte skip {skipped}; allowed: 0 or more; correct the header")
+    if lines:
+        with opened(name) as file:
+            file.seek(at)
+            for _ in range(lines):
+                file.readline(LONGEST_HEADER)
+            at = file.tell()
+    return at + skipped
+
+
+MOST_LINES = 1000
+
+
+def _files(path: Path, fields: dict[str, str], begin: int, planes: int) -> list[Path]:
+    """The data files: the header's own, one, a list below it, or a pattern with its first and last number."""
+    text = fields.get("data file", "")
+    if not text:
+        return [path]
+    if text.upper().startswith("LIST"):
+        return [beside(path, line.strip()) for line in text.splitlines()[1:] if line.strip()]
+    return numbered(path, text.split(), planes) if "%" in text else [beside(path, text)]
+
+
+def _vectors(path: Path, fields: dict[str, str], count: int) -> list[NDArray[Any] | None]:
+    """A vector in space for every axis, None for one that has none; unit vectors where the header has no space."""
+    text = fields.get("space directions", "")
+    words = re.findall(r"none|nan|\([^)]*\)", text.lower())
+    if not text:
+        return [np.eye(max(count, 3))[i] for i in range(count)]
+    if len(words) != count:
+        raise unusable(path, f"space directions: {text[:80]!r}; allowed: one vector (x,y,z), or none, for each axis")
+    vectors = [None if w in ("none", "nan") else w.strip("()").replace(",", " ") for w in words]
+    name = "space directions"
+    return [None if v is None else numbers(path, {name: v}, name, len(v.split())) for v in vectors]
+
+
+def _geometry(path: Path, fields: dict[str, str], vectors: list[Any], leading: int) -> tuple[Placed, tuple[str, ...]]:
+    """Spacing, origin and direction in LPS mm, and what of it the header lacks."""
+    space = fields.get("space", "").lower().removesuffix("-time")
+    lacks = [] if space in TO_LPS else ["space: left-posterior-superior"]
+    if space and space not in TO_LPS and space not in ("scanner-xyz", "3d-right-handed", "3d-left-handed"):
+        raise unusable(path, f"space: {space!r}; allowed: {', '.join(n for n in TO_LPS if '-' in n)}; save it again")
+    flip = np.array(TO_LPS.get(space, (1, 1, 1)), float)
+    if "space directions" in fields:
+        if len(vectors) < 3 or any(len(v) < 3 for v in vectors[:3]):
+            raise unusable(path, "space directions of fewer than three axes; allowed: three vectors (x,y,z)")
+        columns = np.array([v[:3] for v in vectors[:3]]).T * flip[:, None]
+    else:
+        lacks += ["direction: along x, y, z"] + ["spacing: 1 mm"] * ("spacings" not in fields)
+        words = fields.get("spacings", "1 1 1" if not leading else "1 1 1 1").split()[leading:][:3]
+        columns = np.diag(numbers(path, {"spacings": " ".join(words)}, "spacings", 3))
+    units = re.findall(r'"([^"]*)"', fields.get("space units", "") or fields.get("units", ""))
+    named = [unit for unit in units if unit.strip()][:3] or ["mm"]
+    if len(set(named)) > 1:
+        raise unusable(path, f"units {named} differ between the axes; allowed: one unit for all; convert the file")
+    factor = millimetres(path, named[0])
+    lacks += ["origin: 0, 0, 0 mm"] * ("space origin" not in fields)
+    tags = {"space origin": fields.get("space origin", "(0,0,0)").strip("()").replace(",", " ")}
+    origin = numbers(path, tags, "space origin", len(tags["space origin"].split()))[:3]
+    if len(origin) != 3:
+        raise unusable(path, f"space origin: {fields['space origin'][:80]!r}; allowed: three numbers (x,y,z)")
+    size = np.linalg.norm(columns, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        direction = columns / size
+    return (size * factor, origin * flip * factor, direction), tuple(
+        f"{path.name}: the header lacks {text} assumed" for text in lacks
+    )
+
+
+def _segments(fields: dict[str, str]) -> dict[str, tuple[int, int]]:
+    """(layer, label value) of every segment of 3D Slicer by its name."""
+    found = {}
+    for key, name in fields.items():
+        match = re.fullmatch(r"(Segment\d+_)Name", key)
+        if match:
+            layer, value = (fields.get(match[1] + part, one) for part, one in (("Layer", "0"), ("LabelValue", "1")))
+            if layer.isdecimal() and value.isdecimal():
+                found[name] = (int(layer), int(value))
+    return found

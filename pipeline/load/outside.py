@@ -1,0 +1,68 @@
+"""What headers of several formats have in common: numbers in text, units of length, names of other files."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.load.geometry import unusable
+
+UNITS_MM = {
+    "mm": 1.0, "millimeter": 1.0, "millimetre": 1.0, "millimeters": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3,
+    "micron": 1e-3, "microns": 1e-3, "micrometer": 1e-3, "cm": 10.0, "m": 1e3, "meter": 1e3, "metre": 1e3,
+    "meters": 1e3, "nm": 1e-6,
+}  # fmt: skip
+MOST_PARTS = 100_000
+NUMBER = re.compile(r"%0?\d{0,2}d")
+"""The one pattern that a header may hold: a number. It goes to no printf of any library."""
+
+
+def millimetres(what: object, unit: str) -> float:
+    """Millimetres of a unit of length by its name."""
+    name = unit.strip().strip('"').lower()
+    if name not in UNITS_MM:
+        allowed = "mm, um, cm, m, nm"
+        raise unusable(what, f"lengths in {unit!r}; allowed: {allowed}; convert the file")
+    return UNITS_MM[name]
+
+
+def numbers(
+    what: object, tags: Mapping[str, str], name: str, count: int, *, whole: bool = False, missing: str | None = None
+) -> NDArray[np.float64]:
+    """``count`` finite numbers of a header's field."""
+    text = tags.get(name, missing)
+    words = (text or "").split()
+    try:
+        values = np.array([int(w) if whole else float(w) for w in words], float)
+    except (ValueError, OverflowError):
+        values = np.zeros(0)
+    if len(values) != count or not np.all(np.isfinite(values)) or (whole and np.abs(values).max(initial=0) > 2**53):
+        kind = "whole numbers" if whole else "finite numbers"
+        found = "nothing" if text is None else repr(text[:80])
+        raise unusable(what, f"{name} of the header holds {found}; allowed: {count} {kind}; correct the header")
+    return values
+
+
+def beside(header: Path, name: str) -> Path:
+    """A file that a header names, in the header's own folder or below; LoadError for any other place."""
+    part = Path(name)
+    if not name or "\0" in name or part.is_absolute() or ".." in part.parts:
+        why = f"its data are said to be in {name[:80]!r}; allowed: a file in the folder of the header, or below"
+        raise unusable(header, f"{why}. Put both into one folder and correct the header.")
+    return header.parent / part
+
+
+def numbered(header: Path, words: list[str], count: int) -> list[Path]:
+    """The files of a pattern as ``slice_%03d.raw 1 64 1``: their first number, last number and step."""
+    name = words[0] if words else ""
+    if len(NUMBER.findall(name)) != 1 or "%" in NUMBER.sub("", name):
+        raise unusable(header, f"the pattern {name[:80]!r} of its data; allowed: one number, as in slice_%03d.raw")
+    try:
+        first, last, step = (*map(int, words[1:4]), *(1, count, 1)[len(words[1:4]) :])
+    except ValueError:
+        first, last, step = 1, 0, 0
+    if step < 1 or not first <= last or (last - first) // step >= MOST_PARTS:
+        raise unusable(header, f"the numbers {words[1:4]} of its data files; allowed: first, last and step")
+    return [beside(header, name % number) for number in range(first, last + 1, step)]

@@ -1,0 +1,159 @@
+"""Wires that another simulator wrote, one file a frame or all in one HDF5 file. Out: LPS mm, base first.
+
+What a file's numbers mean is stated, by the file, its format or whoever names it, and never guessed: a wire in metres
+or RAS that is taken for mm and LPS is another wire. A frame without a usable wire is known as such and by its reason.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from pipeline.load.curves import READERS, read_csv_points
+from pipeline.load.geometry import LoadError, Source, refused, unusable
+from pipeline.load.surfaces import RAS_TO_LPS
+from pipeline.load.vtk import read_vtk_points
+from pipeline.model import Array
+
+OF_KIND = {**READERS, ".vtk": read_vtk_points}
+IN_HDF5 = (".h5", ".hdf5")
+KINDS = (*OF_KIND, *IN_HDF5)
+UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
+HEAD = 4096  # bytes of a file in which it says what it is
+_SPACE = re.compile(r"(?:SPACE|coordinateSystem)\"?\s*[:=]\s*\"?(LPS|RAS|[01]\b)", re.IGNORECASE)
+_UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-z]+)|lengths in (\w+)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class OtherFile:
+    """A frame's wire as it was read. points_mm : (n, 3) LPS, or None where ``problem`` says why there is none.
+
+    missing : the simulator wrote nothing for the frame.
+    """
+
+    name: str
+    points_mm: Array | None = None
+    problem: str = ""
+    missing: bool = False
+
+
+def kind_of(path: Path) -> str:
+    """The ending by which a file is read; empty where it is no wire's."""
+    return next((kind for kind in KINDS if path.name.lower().endswith(kind)), "")
+
+
+def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str = "") -> list[OtherFile]:
+    """The wire of each of ``count`` frames. space, unit : of coordinates that no file states.
+
+    Raises LoadError where it is not known which file belongs to which frame, or what the numbers mean: then all would
+    be wrong. A file that is missing or cannot be read concerns its frame alone.
+    """
+    if len(files) == 1 and kind_of(files[0].path) in IN_HDF5:
+        return _in_hdf5(files[0].path, count, space, unit)
+    wrong = next((f.path for f in files if not kind_of(f.path)), None)
+    if wrong is not None:
+        raise refused(wrong, repr(wrong.suffix), ", ".join(KINDS), "export the wire in one of these")
+    numbered = numbered_frames([file.path for file in files], count)
+    missing = OtherFile("no file", problem="there is none for this frame", missing=True)
+    return [_read(numbered[i], space, unit) if i in numbered else missing for i in range(count)]
+
+
+def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
+    """Files by frame: by the last number in their names, counted from 0 or 1, else in the order given."""
+    found = [re.findall(r"\d+", path.name.lower().removesuffix(kind_of(path))) for path in paths]
+    numbers = [int(digits[-1]) if digits else -1 for digits in found]
+    unique = set(numbers)
+    if len(unique) == len(numbers) and -1 not in unique and paths:
+        first = 1 if 0 not in unique and count in unique else 0
+        if (0 in unique or count in unique) and unique <= set(range(first, first + count)):
+            return {number - first: path for number, path in zip(numbers, paths, strict=True)}
+    if len(paths) == count or not paths:
+        return dict(enumerate(paths))
+    shown = f"{len(paths)} files, {paths[0].name} to {paths[-1].name}, for {count} frames"
+    do = f"number them from 0 to {count - 1}; an empty file stands for a frame that the simulator failed in"
+    raise unusable(paths[0].parent, f"got {shown}: it is not known which belongs to which; {do}")
+
+
+def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
+    """/frames/NNN/simulated_mm, NNN from 0, as in frames.h5: LPS mm by its layout."""
+    if space not in ("", "LPS") or unit not in ("", "mm"):
+        raise unusable(path, f"the layout of frames.h5 is LPS mm, stated was {space} {unit}; write CSV files instead")
+    try:
+        with h5py.File(path, "r") as file:
+            groups = {int(name): group for name, group in file["frames"].items()}
+            points = {n: np.array(g["simulated_mm"], float) for n, g in groups.items() if "simulated_mm" in g}
+    except (OSError, KeyError, ValueError, AttributeError) as error:
+        raise refused(path, repr(error), "/frames/NNN/simulated_mm (n, 3), NNN from 0", "write it so") from None
+    beyond = sorted(n for n in groups if not 0 <= n < count)
+    if beyond:
+        raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
+    missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
+    return [_checked(f"{path.name}#{n}", points[n]) if n in points else missing for n in range(count)]
+
+
+def _read(path: Path, space: str, unit: str) -> OtherFile:
+    """One file; raises LoadError where nothing says what its numbers mean, or two statements differ."""
+    if not path.exists() or path.stat().st_size == 0:
+        return OtherFile(path.name, problem="the file is empty, or not there", missing=True)
+    kind = kind_of(path)
+    in_space, in_unit = _agreed(path, kind, space, unit)
+    try:
+        points = OF_KIND[kind](path)
+    except (LoadError, ValueError, TypeError, KeyError, IndexError) as error:
+        return OtherFile(path.name, problem=str(error))
+    # all readers but that of tables turn what a file states to be RAS
+    turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not _stated(path, kind)[0])
+    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # whose reader does it itself
+    return _checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0))
+
+
+def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
+    """Space and unit of a file."""
+    agreed = []
+    for what, own, given, key in zip(("space", "unit"), _stated(path, kind), (space, unit), ("LPS", "mm"), strict=True):
+        if own and given and own != given:
+            raise unusable(path, f"{what}: the file says {own}, stated was {given}; correct one of them")
+        if not own and not given:
+            how = f"say --{what} {key}, or {what} = {key!r} in the manifest's simulated"
+            also = f"; or write '# {what}: {key}' above the table; columns x_mm, y_mm, z_mm say LPS mm"
+            raise unusable(path, f"{what} is not stated and will not be guessed; {how}{also * (kind == '.csv')}")
+        agreed.append(own or given)
+    if agreed[1] not in UNITS_MM:
+        raise unusable(path, f"unit {agreed[1]!r}; allowed: {', '.join(UNITS_MM)}")
+    return agreed[0], agreed[1]
+
+
+def _stated(path: Path, kind: str) -> tuple[str, str]:
+    """What a file says of itself, or its format for it; empty where it says nothing."""
+    with path.open("rb") as file:
+        head = file.read(HEAD).decode("latin-1")
+    default = ("", "")
+    if kind == ".csv":
+        rows = [line for line in head.splitlines() if line.strip()]
+        names = {c.strip().lower() for r in rows if not r.lstrip().startswith("#") for c in r.split(",")[:40]}
+        head = "\n".join(line for line in rows if line.lstrip().startswith("#"))
+        default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
+    else:
+        # 3D Slicer's files: LPS and mm unless they say otherwise; of VTK's it writes SPACE= into the first lines
+        slicer = kind == ".mrk.json"
+        default = ("LPS" if slicer else "", "mm" if slicer or _SPACE.search(head) else "")
+    space, unit = _SPACE.search(head), _UNIT.search(head)
+    said = {"1": "LPS", "0": "RAS"}.get(space[1], space[1].upper()) if space else default[0]
+    return said, (unit[1] or unit[2]).lower() if unit else default[1]
+
+
+def _checked(name: str, points: Array) -> OtherFile:
+    """The points without repeats (nodes that wait at the introducer); a problem where they are no curve."""
+    if points.ndim != 2 or points.shape[1:] != (3,):
+        return OtherFile(name, problem=f"got an array of shape {points.shape}; expected points (n, 3)")
+    bad = np.flatnonzero(~np.all(np.isfinite(points), axis=1))
+    if len(bad):
+        return OtherFile(name, problem=f"{len(bad)} of {len(points)} points are NaN or infinite, the first is {bad[0]}")
+    if len(points):
+        points = points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0, axis=1)])]
+    if len(points) < 2:
+        return OtherFile(name, problem=f"got {len(points)} different points; a wire has two or more")
+    return OtherFile(name, points)

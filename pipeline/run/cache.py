@@ -1,0 +1,176 @@
+"""The stage store on disk: one file a result, whole or not believed, the oldest used removed where it grows too large.
+
+A store that cannot be read or written costs a warning and the time to compute again, never a case.
+"""
+
+import hashlib
+import io
+import json
+import os
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from pipeline.model import Curve, Lumen
+from pipeline.status import FrameStatus
+from reports.atomic import replacing, write_text
+from solver.grid import Grid, read_only
+
+DEFAULT_LIMIT = 20 * 2**30
+"""Bytes: the lumens of about a thousand scans of 256^3 voxels."""
+ABANDONED_S = 86400.0
+"""Age from which a temporary file is nobody's any more."""
+OURS = re.compile(r"[0-9a-f]{64}\.(result|npz)|\.tmp-.*\.result")
+"""Names of files of the store; .npz is how it wrote them before they had a hash."""
+NOT_A_RESULT = (ValueError, KeyError, TypeError, EOFError, BadZipFile)
+
+
+def default_root() -> Path:
+    """``$WIREVAL_CACHE``, else the user's cache folder."""
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(os.environ.get("WIREVAL_CACHE") or Path(home) / "wireval" / "stages")
+
+
+@dataclass
+class Store:
+    """Results on disk by key; ``root`` None switches the store off. warn : called with a sentence for the reader."""
+
+    root: Path | None
+    warn: Callable[[str], None] = lambda text: None
+    _writable: bool = True
+
+    def get(self, stage: str, key: str) -> Lumen | Curve | None:
+        """The stored result, or None; one that was cut or altered counts as absent and is removed."""
+        if self.root is None:
+            return None
+        path = self._path(self.root, stage, key)
+        try:
+            result = decoded(stage, key, path.read_bytes())
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            self.warn(f"the stored result {path} cannot be read ({error.strerror}): computed again")
+            return None
+        except NOT_A_RESULT as error:
+            self.warn(f"the stored result {path} is not as it was written ({error}): computed again")
+            _remove(path)
+            return None
+        _touch(path)
+        return result
+
+    def put(self, stage: str, key: str, result: Lumen | Curve) -> None:
+        """Store a result. The first that cannot be written is the last that is tried."""
+        if self.root is None or not self._writable:
+            return
+        try:
+            with replacing(self._path(self.root, stage, key)) as temporary:
+                temporary.write_bytes(encoded(key, result))
+        except OSError as error:
+            self._writable = False
+            self.warn(f"the stage store keeps nothing from here on: {error}")
+
+    @staticmethod
+    def _path(root: Path, stage: str, key: str) -> Path:
+        return root / stage / key[:2] / f"{key}.result"
+
+    def entries(self) -> list[tuple[Path, int, float]]:
+        """Every result with its bytes and the time of its last use, and what was left half written; nothing else.
+
+        Whoever names a folder that holds other things as well loses none of them.
+        """
+        found = []
+        for path in sorted(self.root.glob("*/??/*")) if self.root else ():
+            if not OURS.fullmatch(path.name):
+                continue
+            try:
+                known = path.stat()
+            except OSError:  # another run has just removed it
+                continue
+            found.append((path, known.st_size, known.st_mtime))
+        return found
+
+    @property
+    def limit(self) -> int:
+        """Bytes that the store may take."""
+        try:
+            return int((self.root or Path()).joinpath("limit").read_text(encoding="ascii"))
+        except (OSError, ValueError):
+            return DEFAULT_LIMIT
+
+    def set_limit(self, size: int) -> None:
+        """Remember how many bytes the store may take."""
+        if self.root is not None:
+            write_text(self.root / "limit", f"{size}\n")
+
+    def trim(self, limit: int | None = None) -> tuple[int, int]:
+        """Remove what was not used for longest until the rest fits; returns how many files and how many bytes."""
+        limit = self.limit if limit is None else limit
+        entries = sorted(self.entries(), key=lambda entry: entry[2])
+        abandoned = time.time() - ABANDONED_S
+        excess, removed = sum(size for _, size, _ in entries) - limit, [0, 0]
+        for path, size, used in entries:
+            temporary = path.name.startswith(".")
+            if (excess > 0 and not temporary) or (temporary and used < abandoned):
+                _remove(path)
+                excess, removed = excess - size, [removed[0] + 1, removed[1] + size]
+        return removed[0], removed[1]
+
+    def check(self) -> tuple[int, list[Path]]:
+        """Read every result; returns how many are whole, and which are not: they are removed."""
+        whole, damaged = 0, []
+        for path, _, _ in self.entries():
+            if path.name.startswith(".") or path.suffix != ".result":
+                continue
+            try:
+                decoded(path.parent.parent.name, path.stem, path.read_bytes())
+                whole += 1
+            except (OSError, *NOT_A_RESULT):
+                damaged.append(path)
+                _remove(path)
+        return whole, damaged
+
+
+def encoded(key: str, result: Lumen | Curve) -> bytes:
+    """A result as bytes, behind the hash of key and content: neither may be changed without the other."""
+    named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
+    arrays: dict[str, Any] = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
+    rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}
+    text = json.dumps(rest, default=lambda status: status.name)
+    file = io.BytesIO()
+    np.savez(file, json=np.array(text), **arrays)
+    return _seal(key, file.getvalue()) + file.getvalue()
+
+
+def decoded(stage: str, key: str, content: bytes) -> Lumen | Curve:
+    """A result from its bytes; raises one of NOT_A_RESULT where they are not what was written under this key."""
+    seal, body = content[:32], content[32:]
+    if seal != _seal(key, body):
+        raise ValueError("its hash does not fit")
+    with np.load(io.BytesIO(body), allow_pickle=False) as data:
+        arrays: dict[str, Any] = {name: read_only(data[name]) for name in data.files if name != "json"}
+        rest = json.loads(str(data["json"]))
+    if stage == "segment":
+        return Lumen(Grid(**arrays), **rest | {"warnings": tuple(rest["warnings"])})
+    return Curve(**arrays, **rest | {"status": FrameStatus[rest["status"]]})
+
+
+def _seal(key: str, body: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + body).digest()
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+
+
+def _touch(path: Path) -> None:
+    """Note that a result was used; its key does not depend on times."""
+    with suppress(OSError):
+        os.utime(path)

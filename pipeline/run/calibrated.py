@@ -1,0 +1,62 @@
+"""Cases of a study with the parameters that were calibrated, and a refusal of those that would score themselves."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.run.store import file_hash
+from pipeline.study.manifest import Case
+from pipeline.study.parameters import Parameters, ParametersError, read_parameters, with_parameters
+
+
+def data_of(case: Case) -> tuple[str, ...]:
+    """SHA-256 of every frame and trace of a case, which tells it whatever it is called."""
+    sources = [*case.frames, *case.traces]
+    return tuple(f"{file_hash(s.path)}#{s.dataset}" for s in sources if s.path.exists())
+
+
+def as_calibrated(
+    cases: Sequence[Case], given: Path | None, *, own: bool = False
+) -> tuple[tuple[Case, ...], tuple[str, ...]]:
+    """The cases with their parameters, and sentences for the report; ParametersError lists every problem.
+
+    given : for all cases, before what the manifest names for each.     own : also score cases that were calibrated
+    with. Without it those of role calibration are left out, and one of role validation is a problem.
+    """
+    read: dict[Path, Parameters] = {}
+    kept, notes, problems = [], [], []
+    for case in cases:
+        path = given or case.parameters
+        if path is None:
+            kept.append(case)
+            continue
+        try:
+            found = read.setdefault(path, read_parameters(path)) if path not in read else read[path]
+            changed = _with_clamp(case, with_parameters(case, found, data_of(case)), found)
+        except ParametersError as error:
+            problems += [text for text in error.problems if text not in problems]
+            continue
+        if changed.own_parameters and not own and case.role == "validation":
+            problems.append(
+                f"case {case.id!r}: {changed.own_parameters}; take it out of the validation cases, or say "
+                "--score-used: it is then marked and left out of every figure over cases"
+            )
+        elif changed.own_parameters and not own:
+            notes.append(f"case {case.id!r} was calibrated with and is not scored (--score-used scores it, marked)")
+        else:
+            kept.append(changed)
+            notes += [f"case {case.id!r}: {changed.own_parameters}"] * bool(changed.own_parameters)
+    if not kept and not problems:
+        problems.append(
+            f"{given or 'parameters'}: every case was calibrated with: nothing is left to score; say --score-used"
+        )
+    if problems:
+        raise ParametersError(problems)
+    return tuple(kept), tuple(notes)
+
+
+def _with_clamp(case: Case, changed: Case, found: Parameters) -> Case:
+    """The case, and the one whose clamp it borrows, both with the parameters."""
+    other = case.entry_case
+    if other is None or other.wire.name != found.wire:
+        return changed
+    return changed.model_copy(update={"entry_case": with_parameters(other, found, ())})

@@ -1,0 +1,156 @@
+"""``wireval calibrate``: the cases of role calibration traced, the parameters fitted, and what came of it written."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.calibrate.design import Predicted, predicted, straight_to
+from pipeline.calibrate.estimates import Calibration, calibrated
+from pipeline.calibrate.residuals import Evidence
+from pipeline.calibrate.trials import Trial, depths_at
+from pipeline.calibrate.unknowns import Unknown, unknowns
+from pipeline.load.curves import read_curve
+from pipeline.run.cache import Store
+from pipeline.run.calibrated import data_of
+from pipeline.run.log import Log
+from pipeline.run.stages import Context, Known, run_stages
+from pipeline.run.stages.given import trial_of
+from pipeline.run.stages.load import each_frame
+from pipeline.status import InputError
+from pipeline.study.manifest import Case
+from pipeline.study.settings import Config
+
+SAME_MM = 0.5
+"""Standard deviation of one depth that is read off a scale, where there are too few to tell."""
+LEAST_FRAMES = 3
+Say = Callable[[str], None]
+
+
+class CalibrationError(InputError):
+    """There is nothing to calibrate with."""
+
+    place = "the calibration"
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """Calibration cases and their insertions; depth_mm : what each frame's manifest states, NaN where nothing.
+
+    notes : what was left out, and what was assumed.
+    """
+
+    cases: tuple[Case, ...]
+    trials: tuple[Trial, ...]
+    stated_mm: tuple[np.ndarray[Any, np.dtype[np.float64]], ...]
+    notes: tuple[str, ...]
+
+
+def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
+    """The cases to calibrate with; CalibrationError where there is none, or wires of several kinds."""
+    found = tuple(case for case in cases if case.role == "calibration")
+    if not found:
+        raise CalibrationError(['no case has role = "calibration"; mark the insertions to calibrate with so'])
+    names = sorted({case.wire.name for case in found})
+    if len(names) > 1:
+        what = f"the calibration cases have {len(names)} wires ({', '.join(names)})"
+        raise CalibrationError([f"{what}; calibrate one wire at a time: a manifest for each"])
+    given = [case.id for case in found if case.parameters is not None]
+    if given:
+        what = f"case {given[0]!r} has parameters already, which a calibration would be made on top of"
+        raise CalibrationError([f"{what}; take the key parameters off cases of role calibration"])
+    return found
+
+
+def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> Gathered:
+    """Segment and trace the cases; one that shows no wire is left out with a note."""
+    kept, trials, stated, notes = [], [], [], []
+    for case in cases:
+        log = Log(lambda *_: None)
+        run = Context(case, config, store, log)
+        known = _with_own_curves(run, run_stages(run, "trace"))
+        frames = [frame for frame in known.frames if frame.trusted_curve is not None]
+        notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
+        if known.failure is not None or len(frames) < LEAST_FRAMES:
+            why = known.failure or f"{len(frames)} of {len(known.frames)} frames have a trace to be trusted"
+            notes.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
+            continue
+        say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
+        kept.append(case)
+        trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
+        stated.append(np.array([frame.expected_mm for frame in frames]))
+    if not trials:
+        raise CalibrationError(notes)
+    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(notes))
+
+
+def _with_own_curves(run: Context, known: Known) -> Known:
+    """The frames with the user's own curves, in a case without scans."""
+    if not run.case.traces or run.case.frames or any(frame.curve is not None for frame in known.frames):
+        return known
+    pairs = zip(known.frames, run.case.traces, strict=True)
+    return replace(known, frames=tuple(replace(f, curve=read_curve(source.path)) for f, source in pairs))
+
+
+def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
+    """What is fitted to these cases."""
+    weighed = any(case.push_force_N is not None or case.wire.weight_N_per_mm > 0 for case in cases)
+    friction = float(np.mean([case.wall.friction for case in cases]))
+    return unknowns([case.wall.stiffness_N_mm2 for case in cases], friction, weighed=weighed)
+
+
+def calibrate(found: Gathered, config: Config) -> Calibration:
+    """Fit the parameters."""
+    return calibrated(all_unknowns(found.cases), [Evidence(trial) for trial in found.trials], config.solver)
+
+
+def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:
+    """What is to be added to stated depths, mm, and its standard deviation; NaN where none is stated.
+
+    The deviations of one insertion's depths are not independent, a scale is off for all of them: insertions count.
+    """
+    points = fit.fit.problem.points(fit.fit.linear.x)
+    means, spread = [], []
+    for trial, point, stated in zip(found.trials, points, found.stated_mm, strict=True):
+        off = np.array(depths_at(trial, point)) - stated
+        if np.isfinite(off).any():
+            means.append(float(np.nanmean(off)))
+            spread.append(float(np.nanstd(off) / np.sqrt(np.isfinite(off).sum())))
+    if not means:
+        return float("nan"), float("nan")
+    own = float(np.sqrt(np.mean(np.square(spread)) / len(means)))
+    between = float(np.std(means, ddof=1) / np.sqrt(len(means))) if len(means) > 1 else SAME_MM
+    return float(np.mean(means)), float(np.hypot(own, between))
+
+
+def design(cases: Sequence[Case], config: Config, store: Store) -> tuple[list[Predicted], tuple[str, ...]]:
+    """Predicted standard deviations of a planned study; CalibrationError where something is missing."""
+    planned, notes = [], []
+    for case in cases:
+        if case.insertion_mm is None:
+            raise CalibrationError([f"case {case.id!r}: insertion_mm is missing: which depths are planned?"])
+        run = Context(case.model_copy(update={"frames": (), "traces": ()}), config, store, Log(lambda *_: None))
+        known = run_stages(run, "segment")
+        if known.failure is not None:
+            raise CalibrationError([f"case {case.id!r}: {known.failure}"])
+        trial = trial_of(run, known, (), roll_free=case.roll_deg == "fit")
+        rolls = each_frame(case.stated_roll_deg, len(case.insertion_mm))
+        force = None if case.push_force_N is None else np.zeros(len(case.insertion_mm))
+        planned.append(replace(straight_to(trial, case.insertion_mm, rolls), force_N=force))
+        notes.append(f"{case.id}: {len(case.insertion_mm)} frames, voxels of {trial.voxel_mm:.2f} mm")
+    try:
+        return predicted(all_unknowns(cases), planned, config.solver), tuple(notes)
+    except ValueError as error:
+        raise CalibrationError([str(error)]) from None
+
+
+def used_by(found: Gathered) -> list[dict[str, Any]]:
+    """The cases that were calibrated with, as parameters.toml names them."""
+    return [{"case": case.id, "group": case.group, "data": list(data_of(case))} for case in found.cases]
+
+
+def file_in(out: Path) -> Path:
+    """Where the parameters go."""
+    return out / "parameters.toml"

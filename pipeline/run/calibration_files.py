@@ -1,0 +1,131 @@
+"""What a calibration leaves: parameters.toml for runs, calibration.json for its page."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.calibrate.design import Predicted
+from pipeline.calibrate.estimates import Calibration, Estimate
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WALL, bent, wall_factor
+from pipeline.run.calibration import Gathered, depth_offset, used_by
+from pipeline.run.provenance import code_state
+from pipeline.run.results import jsonable, write_json
+from pipeline.study.parameters import read_parameters
+from reports.atomic import write_text
+
+DEPTH = "depth_offset_mm"
+DEPTH_ENOUGH_MM = 0.25
+MISFIT = 2.0
+ADVICE = {
+    ROLL: "a tip with a curve, seen free of the wall; a frame whose tip does not touch tells the roll best",
+    REST: "frames in which the tip lies free; a tip that is pressed straight shows little of its curve",
+    TAPER: "deeper insertions, so that tip and shaft bend in the same frame, and a bend wherever the stiffness changes",
+    WALL: "a softer wall or a sharper bend: the wire must press in by several times what the wall is known to",
+    FRICTION: "the same depths once pushed and once pulled: friction changes sides",
+    BENDING: "push_force_N of every frame, or a sag scan: a free overhang of a wire with weight_N_per_mm",
+    DEPTH: "insertion_mm of every frame, in three insertions or more",
+}
+"""What would show a parameter, by its name."""
+
+
+def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
+    """Rows of all parameters, the depth offset among them."""
+    rows = [_row(e) for e in fit.estimates]
+    value, sd = depth_offset(found, fit)
+    seen = bool(np.isfinite(sd) and sd <= DEPTH_ENOUGH_MM)
+    why = "" if seen else "no depths are stated" if np.isnan(sd) else f"known to {sd:.2g} mm only"
+    known = float(np.nan_to_num(value))
+    row = {"name": DEPTH, "value": known, "sd": float(sd if np.isfinite(sd) else 5.0), "logarithmic": False}
+    rows.append(row | {"seen": seen, "used": known if seen else 0.0, "why": why})
+    return rows
+
+
+def _row(e: Estimate) -> dict[str, Any]:
+    u = e.unknown
+    row = {"name": u.name, "value": u.shown(e.value), "sd": e.sd, "logarithmic": u.logarithmic}
+    return row | {"seen": e.seen, "used": u.shown(e.used), "why": e.why}
+
+
+def write_parameters(path: Path, found: Gathered, fit: Calibration) -> None:
+    """Write parameters.toml, and read it back: a file that cannot be read is not left to a run to find."""
+    rows, values, first = estimates_of(found, fit), fit.values, found.cases[0]
+    wire, by_name = bent(first.wire, values), {row["name"]: row for row in rows}
+    walls = sorted({case.wall.stiffness_N_mm2 for case in found.cases})
+    scaled = BENDING in by_name and by_name[BENDING]["seen"]
+    lines = [
+        "# written by wireval calibrate; taken by `parameters` in a case or by --parameters FILE",
+        "schema = 1",
+        f"wire = {json.dumps(wire.name)}",
+        f"bending_stiffness_N_mm2 = {_text(wire.bending_stiffness_N_mm2)}",
+        f"rest_curvature_per_mm = {_text(wire.rest_curvature_per_mm)}",
+        f"friction = {_text(values[FRICTION])}",
+        f"roll_offset_deg = {_text(values[ROLL])}",
+        f"depth_offset_mm = {_text(by_name[DEPTH]['used'])}",
+        f"absolute_stiffness = {json.dumps(scaled)}",
+    ]
+    for stated in walls:
+        lines += ["", "[[wall]]", f"stated_N_mm2 = {_text(stated)}"]
+        lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")
+    for row in rows:
+        lines += ["", "[[estimate]]", *(f"{key} = {_text(value)}" for key, value in row.items())]
+    for used in used_by(found):
+        lines += ["", "[[used]]", *(f"{key} = {_text(value)}" for key, value in used.items())]
+    write_text(path, "\n".join(lines) + "\n")
+    read_parameters(path)
+
+
+def _text(value: Any) -> str:
+    """A value of TOML, which writes numbers, texts and nested lists as JSON does; six digits are enough."""
+    if isinstance(value, float):
+        return json.dumps(float(f"{value:.6g}"))
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_text, value))}]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def misfit(fit: Calibration) -> list[str]:
+    """A warning where the wires lie farther from the traces than these are off: then something else is wrong."""
+    times = float(np.sqrt(fit.scale))
+    if times < MISFIT:
+        return []
+    return [
+        f"the calibrated wires lie {times:.1f} times as far from the traces as these are taken to be off: lumen, "
+        "stated rolls, the wire's profile or a trace is wrong; standard deviations are widened, values may be off "
+        "beyond them"
+    ]
+
+
+def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
+    """Write calibration.json: all that the page shows."""
+    rows = estimates_of(found, fit)
+    names = [e.unknown.name for e in fit.estimates]
+    profiles = {e.unknown.name: [[e.unknown.shown(v), rise] for v, rise in e.profile] for e in fit.estimates}
+    about = {e.unknown.name: e.unknown for e in fit.estimates}
+    for row in rows:
+        unknown = about.get(row["name"])
+        row["what"] = unknown.what if unknown else "mm added to stated depths"
+        row["prior"] = unknown.shown(unknown.prior) if unknown else 0.0
+        row["prior_sd"] = unknown.sd if unknown else 5.0
+        row["bounds"] = [unknown.shown(unknown.low), unknown.shown(unknown.high)] if unknown else []
+        row["enough"] = unknown.enough if unknown else DEPTH_ENOUGH_MM
+        row["advice"] = "" if row["seen"] else ADVICE[row["name"].split(":")[0]]
+    record = {
+        "estimates": rows,
+        "correlation": {"names": names, "values": fit.correlation},
+        "profiles": profiles,
+        "frames": [vars(frame) for frame in fit.frames],
+        "starts": fit.fit.starts,
+        "scale": fit.scale,
+        "used": used_by(found),
+        "notes": [*misfit(fit), *found.notes],
+        "provenance": code_state(),
+    }
+    write_json(path, {"schema": 1, **record})
+
+
+def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> None:
+    """Write design.json: the predicted standard deviations of a planned study."""
+    found = [{"name": p.unknown.name, "sd": p.sd, "enough": p.unknown.enough, "seen": p.seen} for p in rows]
+    write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))

@@ -1,0 +1,48 @@
+"""A gate for CI: ``run --fail-if "rms_mm>0.5"`` holds one value of the whole run against a limit."""
+
+import math
+import operator
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.run.launch import UsageError
+from pipeline.status import did_you_mean
+from reports.schema import OVERALL_FILE, SUMMARY
+
+RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+WRITTEN = re.compile(rf"\s*(\w+)\s*({'|'.join(RELATIONS)})\s*(\S+)\s*")
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Closes where a column of overall.csv stands in this relation to a limit, or has no value."""
+
+    column: str
+    relation: str
+    limit: float
+
+    def closed(self, overall: Mapping[str, Any]) -> str:
+        """Why a run with this row of overall.csv must not pass; empty where it may."""
+        asked, found = f"--fail-if {self.column}{self.relation}{self.limit:g}", overall.get(self.column)
+        value = float("nan") if found is None else float(found)
+        if math.isnan(value):
+            return f"{asked}: {OVERALL_FILE} has no {self.column}, so that it cannot be shown to hold"
+        return f"{asked}: {self.column} is {value:.4g}" if RELATIONS[self.relation](value, self.limit) else ""
+
+
+def gate(text: str) -> Gate:
+    """``column>number`` as typed; UsageError where it is none, or no number of overall.csv."""
+    found = WRITTEN.fullmatch(text)
+    try:
+        column, relation, limit = found.groups() if found else ("", "", "")
+        number = float(limit)
+    except ValueError:
+        number = math.nan
+    if math.isnan(number):
+        raise UsageError([f'--fail-if {text!r}: write a column of {OVERALL_FILE} and a limit, as in "rms_mm>0.5"'])
+    names = [one.name for one in SUMMARY if one.kind != "text"]
+    if column not in names:
+        raise UsageError([f"--fail-if {text!r}: no number {column!r} in {OVERALL_FILE}; {did_you_mean(column, names)}"])
+    return Gate(column, relation, number)

@@ -1,0 +1,113 @@
+"""ledger.json: every file of a case's result with its size and hash, written last.
+
+A case is finished when its ledger stands and all that it names is there and whole. The tables, curves and views are the
+data; the pages are drawn from them, so that they are made again by themselves.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from pydantic import TypeAdapter
+
+from reports.atomic import write_bytes
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
+
+FILE = "ledger.json"
+RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"
+TABLES = (RESULT, ERRORS.file, POINTS.file)
+"""What numbers over many cases are made of."""
+DATA = (*TABLES, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE, FRAMES)
+PAGES = ("report.html",)
+Pages = Literal["", "linked", "embedded"]
+"""Which pages a case has: none, ones with links to their pictures, ones with the pictures inside."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file as it was written."""
+
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What was written of a case. key : of everything that the result depends on.     files : by name."""
+
+    key: str
+    files: dict[str, Entry]
+    pages: Pages = ""
+
+    def amiss(self, folder: Path, names: Sequence[str]) -> str:
+        """A sentence on the first of the named files that is not as it was written; empty where all are."""
+        for name in names:
+            path, known = folder / name, self.files.get(name)
+            if known is None:
+                continue
+            try:
+                if path.stat().st_size != known.bytes or entry_of(path) != known:
+                    return f"{name} is not as it was written"
+            except FileNotFoundError:
+                return f"{name} is missing"
+            except OSError as error:
+                return f"{name} cannot be read ({error.strerror})"
+        return ""
+
+    @property
+    def data(self) -> list[str]:
+        """Names of the files that are no pages."""
+        return [name for name in self.files if not is_page(name)]
+
+    @property
+    def drawn(self) -> list[str]:
+        """Names of the files that are pages or belong to them."""
+        return [name for name in self.files if is_page(name)]
+
+
+LEDGER = TypeAdapter(Ledger)
+
+
+def is_page(name: str) -> bool:
+    """Whether a file is drawn from others."""
+    return name in PAGES or name.startswith("figures/")
+
+
+def entry_of(path: Path) -> Entry:
+    """A file's size and hash."""
+    with path.open("rb") as file:
+        return Entry(path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest())
+
+
+def read(folder: Path) -> Ledger | None:
+    """The ledger of a case's folder; None where there is none, or one that cannot be read."""
+    try:
+        return LEDGER.validate_json((folder / FILE).read_bytes())
+    except (OSError, ValueError):
+        return None
+
+
+def write(folder: Path, key: str) -> None:
+    """Record the data of a case that has no pages yet."""
+    _write(folder, Ledger(key, {name: entry_of(folder / name) for name in _found(folder) if not is_page(name)}))
+
+
+def record_pages(folder: Path, pages: Pages) -> None:
+    """Record the pages that were drawn; a folder without a ledger stays without."""
+    ledger = read(folder)
+    if ledger is not None:
+        drawn = {name: entry_of(folder / name) for name in _found(folder) if is_page(name)}
+        kept = {name: ledger.files[name] for name in ledger.data}
+        _write(folder, replace(ledger, files=kept | drawn, pages=pages))
+
+
+def _write(folder: Path, ledger: Ledger) -> None:
+    write_bytes(folder / FILE, LEDGER.dump_json(ledger, indent=1) + b"\n")
+
+
+def _found(folder: Path) -> Iterator[str]:
+    yield from (name for name in (*DATA, *PAGES) if (folder / name).is_file())
+    for part in ("view", "figures"):
+        yield from sorted(f"{part}/{p.name}" for p in (folder / part).glob("[!.]*") if p.is_file())

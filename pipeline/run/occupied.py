@@ -1,0 +1,66 @@
+"""Two runs in one folder: a case is held by the one that works on it; the other says by whom, and waits."""
+
+import fcntl
+import os
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TextIO
+
+from reports.atomic import writing
+
+FILE = ".at-work"
+
+
+@contextmanager
+def held(folder: Path, say: Callable[[str], None]) -> Iterator[None]:
+    """Hold a case's folder; where another run does, say so and wait until it lets go or is no more.
+
+    The system forgets the lock of a process that has died, however it died.
+    """
+    with writing(folder / FILE):
+        folder.mkdir(parents=True, exist_ok=True)
+        file = _locked(folder / FILE, say)
+        file.truncate(0)
+        file.write(f"process {os.getpid()} on {platform.node()}, since {datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC")
+        file.flush()
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            (folder / FILE).unlink(missing_ok=True)
+        file.close()
+
+
+def owner_of(folder: Path) -> str:
+    """Who works on a case at the moment; empty where nobody does."""
+    with suppress(OSError), (folder / FILE).open("r", encoding="utf-8") as file:
+        return "" if _lock(file, fcntl.LOCK_NB) else file.read() or "another run"
+    return ""
+
+
+def _locked(path: Path, say: Callable[[str], None]) -> TextIO:
+    """The locked file; one that was removed by who held it before is no lock any more."""
+    while True:
+        file = path.open("a+", encoding="utf-8")
+        if not _lock(file, fcntl.LOCK_NB):
+            file.seek(0)
+            say(f"{file.read() or 'another run'} is at work on this case; waiting for it")
+            _lock(file, 0)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        file.close()
+
+
+def _lock(file: TextIO, how: int) -> bool:
+    """Whether the lock was taken. A disk that knows no locks is used without: files are replaced whole in any case."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | how)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True

@@ -1,0 +1,144 @@
+"""The whole run as one row: frames that count, read back from the folders of all validation cases, and pooled.
+
+Two runs are compared by the ratio of their errors on the frames that count in both, insertion by insertion.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.compare import intervals
+from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
+from pipeline.run.results import Result, found_results, lost
+from reports import tables
+from reports.schema import ERRORS, POINTS
+
+ALL = "(all)"
+"""Stands where the name of a case would."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A case found on disk, and its frames that count by their numbers."""
+
+    result: Result
+    frames: Mapping[int, Scored]
+
+
+def found_cases(out: Path) -> list[Found]:
+    """Every case below an output folder; one whose tables cannot be read is damaged, and hides no other."""
+    return [_found(out, result) for result in found_results(out)]
+
+
+def _found(out: Path, result: Result) -> Found:
+    folder = out / "cases" / result.case
+    try:
+        return Found(result, _scored(folder, result.group or result.case))
+    except (OSError, EOFError, ValueError, KeyError) as error:
+        return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}"), {})
+
+
+def _scored(folder: Path, insertion: str) -> dict[int, Scored]:
+    if not (folder / POINTS.file).exists():
+        return {}
+    points, errors = tables.read(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
+    frame, distance = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
+    rows = errors.astype(object).where(errors.notna(), None).to_dict("records")
+    scored = [Scored({str(k): v for k, v in row.items()}, distance[frame == row["frame"]], insertion) for row in rows]
+    return {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
+
+
+def validation(found: Sequence[Found]) -> list[Found]:
+    """The cases that numbers over the whole run are made of.
+
+    A calibration case says nothing about the model, and one without scans has nothing to be compared with.
+    """
+    return [case for case in found if case.result.role != "calibration" and case.result.status != "simulated"]
+
+
+def frames_of(found: Sequence[Found]) -> list[Scored]:
+    """The frames that count, of all these cases."""
+    return [frame for case in found for frame in case.frames.values()]
+
+
+def overall(found: Sequence[Found]) -> dict[str, Any]:
+    """The row of all validation cases, with the columns of summary.csv; empty where no frame counts."""
+    used = validation(found)
+    frames = frames_of(used)
+    if not frames:
+        return {}
+    rows = [case.result.summary for case in used]
+    counts = {name: sum(row.get(name) or 0 for row in rows) for name in ("frames", "frames_ok", "frames_failed")}
+    good = all(case.result.ok for case in used)
+    head = {"case": ALL, "role": "validation", "status": "ok" if good else "frames_failed", **counts}
+    share = within([frame.row for frame in frames], counts["frames"])
+    return head | pooled(frames) | {"within_1mm": share, "cases": len(used)}
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Pooled rms of one run over that of another, on the frames that count in both; note : as of an interval."""
+
+    value: float
+    low: float
+    high: float
+    frames: int
+    note: str
+
+    @property
+    def sentence(self) -> str:
+        """One line for a reader."""
+        known = f"95 %: {self.low:.3f} to {self.high:.3f}, " if np.isfinite(self.low) else ""
+        return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
+
+    @property
+    def verdict(self) -> str:
+        """The sentence, and what may be concluded from it."""
+        if self.value == 1.0 and not self.low < self.high:
+            meaning = "no frame's error changed"
+        elif not np.isfinite(self.low):
+            meaning = "too few insertions to say whether another study would show the same"
+        elif self.low <= 1.0 <= self.high:
+            meaning = "no difference is shown"
+        else:
+            meaning = "the second is worse" if self.low > 1.0 else "the second is better"
+        return f"{self.sentence}: {meaning}"
+
+
+def pairs(before: Sequence[Found], after: Sequence[Found]) -> list[tuple[Scored, Scored]]:
+    """The frames that count in both runs, of validation cases."""
+    old = {case.result.case: case.frames for case in validation(before)}
+    return [
+        (old[case.result.case][number], frame)
+        for case in validation(after)
+        for number, frame in case.frames.items()
+        if number in old.get(case.result.case, {})
+    ]
+
+
+def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
+    """How many times the error of ``before`` that of ``after`` is; None where they have no frame in common."""
+    both = pairs(before, after)
+    if not both:
+        return None
+    first, second = [a for a, _ in both], [b for _, b in both]
+    points = np.array([float(len(frame.error_mm)) for frame in second])
+    # a wire of another length has other points: the squares are per point, times the points of one of the runs
+    each = [squares_of(frames) / [len(f.error_mm) for f in frames] * points for frames in (first, second)]
+    under, over, weights = by_insertion(second, *each, points)
+    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(over, under, weights)))
+    total = np.maximum([over.sum(), under.sum()], intervals.SMALLEST_MM2)
+    value = float(np.sqrt(total[0] / total[1]))
+    return Ratio(value, float(low), float(high), len(both), intervals.note(len(weights)))
+
+
+def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:
+    """Skill of ``after``, with its interval, against what a predictor left in ``before``: one rival for all points."""
+    both = pairs(before, after)
+    second = [frame for _, frame in both]
+    points = np.array([float(len(frame.error_mm)) for frame in second])
+    nulls = points * numbers([frame for frame, _ in both], f"null_{null}_rms_mm") ** 2
+    return skill(second, squares_of(second), nulls, "skill_strongest")

@@ -1,0 +1,131 @@
+"""Several simulators of one study side by side: pooled errors, ratios of all pairs, and who is nearer where.
+
+Each has an output folder of its own, as of any run. Ratios are over the frames that count in both; along the wire and
+over depth, over those that count in all. A simulator's failed frames stand beside them: leaving out the hard ones helps
+none of its shares of the planned frames.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pipeline.compare import intervals
+from pipeline.model import Array
+from pipeline.run.another import with_another
+from pipeline.run.overall import Found, found_cases, overall, ratio, validation
+from reports import tables
+from reports.schema import POINTS, SIMULATORS, WHERE
+
+OURS = "wireval"
+STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+MOST_BINS = 12
+Studies = Mapping[str, Sequence[Found]]
+
+
+class Piece(NamedTuple):
+    """A frame's points in one bin: insertion, sum of squares in mm^2, number of points."""
+
+    insertion: str
+    squares: float
+    points: int
+
+
+def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
+    """simulators.csv and where.csv from the output folders of simulators by name; sentences for the terminal."""
+    studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
+    pairs = [(one, other) for one in studies for other in studies if one != other]
+    rows = [_alone(name, found) for name, found in studies.items()]
+    sentences = []
+    for one, other in pairs:
+        both = ratio(studies[other], studies[one])
+        if both is not None:
+            values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
+            rows.append({"simulator": one, "against": other, "common_frames": both.frames, **values})
+            if other == OURS:
+                sentences.append(both.sentence.replace("the second run / the first", f"{one} / {OURS}"))
+    tables.write(out / SIMULATORS.file, SIMULATORS, rows)
+    tables.write(out / WHERE.file, WHERE, list(_where(folders, studies)))
+    return sentences
+
+
+def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
+    """What a simulator's own overall.csv says; one without a frame that counts has its planned frames."""
+    used = validation(found)
+    planned = {"frames": sum(case.result.summary["frames"] for case in used), "frames_ok": 0, "within_1mm": 0.0}
+    row = planned | overall(found)
+    return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
+
+
+def _where(folders: Mapping[str, Path], studies: Studies) -> Iterator[dict[str, Any]]:
+    """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest."""
+    kept = [{(c.result.case, n) for c in validation(found) for n in c.frames} for found in studies.values()]
+    common = set.intersection(*kept)
+    points = {name: list(_points(folders[name], found, common)) for name, found in studies.items()}
+    for along, place in (("distance from the tip", 1), ("insertion depth", 2)):
+        values = [np.max(part[place]) for parts in points.values() for part in parts]
+        if not values:
+            return
+        step = next((s for s in STEPS_MM if max(values) / s <= MOST_BINS), STEPS_MM[-1])
+        for number in range(int(max(values) / step) + 1):
+            low, high = number * step, (number + 1) * step
+            found = {name: _pieces(parts, place, low, high) for name, parts in points.items()}
+            if all(found.values()):
+                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, found)
+
+
+Part = tuple[str, Array, Array, Array]
+"""Of a frame: insertion, distances from the tip (n,), depth as often (n,), errors (n,); mm."""
+
+
+def _points(folder: Path, found: Sequence[Found], common: set[tuple[str, int]]) -> Iterator[Part]:
+    for case in validation(found):
+        if not any((case.result.case, number) in common for number in case.frames):
+            continue
+        table = tables.read(folder / "cases" / case.result.case / POINTS.file, POINTS)
+        frames, arc = table["frame"].to_numpy(dtype=int), table["arc_mm"].to_numpy(dtype=float)
+        for number, frame in case.frames.items():
+            if (case.result.case, number) in common:
+                mine = arc[frames == number]
+                depth = np.full(len(mine), float(frame.row["insertion_mm"]))
+                yield frame.insertion, mine.max() - mine, depth, frame.error_mm
+
+
+def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[Piece]:
+    pieces = []
+    for part in parts:
+        at: Any = part[place]
+        errors = part[3][(at >= low) & (at < high)]
+        if len(errors):
+            pieces.append(Piece(part[0], float(np.sum(errors**2)), len(errors)))
+    return pieces
+
+
+def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]]) -> Iterator[dict[str, Any]]:
+    """A row for each simulator in a bin; that of the nearest says by how much, and how sure that is."""
+    mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
+    order = sorted(mean, key=lambda name: mean[name])
+    for name in found:
+        row = head | {"simulator": name, "rms_mm": float(np.sqrt(mean[name])), "frames": len(found[name])}
+        if name == order[0] and len(order) > 1:
+            row |= _lead(found[order[0]], found[order[1]])
+        yield row
+
+
+def _lead(first: Sequence[Piece], second: Sequence[Piece]) -> dict[str, Any]:
+    """Error of the nearest over that of the next, with its interval over the insertions that both have there."""
+    names = [n for n in dict.fromkeys(p.insertion for p in first) if any(p.insertion == n for p in second)]
+    sums = [[[p for p in pieces if p.insertion == n] for n in names] for pieces in (first, second)]
+    points = np.array([float(sum(p.points for p in mine)) for mine in sums[0]])
+    under, over = (
+        np.array([sum(p.squares for p in mine) / sum(p.points for p in mine) for mine in of]) * points for of in sums
+    )
+    least = np.maximum([under.sum(), over.sum()], intervals.SMALLEST_MM2)
+    value = float(np.sqrt(least[0] / least[1]))
+    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(under, over, points)))
+    if abs(value - 1.0) < 1e-6:
+        verdict = "tie"
+    else:
+        verdict = "clear" if high < 1.0 else "not clear" if np.isfinite(high) else intervals.note(len(names))
+    return {"ratio_to_next": value, "ratio_to_next_low": float(low), "ratio_to_next_high": float(high), "lead": verdict}

@@ -1,0 +1,177 @@
+"""The budget of a case: its ensemble, what that says of every frame, and the table by source."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays.polyline import at_arc, samples
+from pipeline.budget import (
+    SOURCES,
+    Budget,
+    Nominal,
+    Scene,
+    Seen,
+    Sigmas,
+    alone,
+    drawn,
+    frame_budget,
+    releases,
+    replayed,
+)
+from pipeline.budget.frame import FEWEST
+from pipeline.budget.inputs import INSERTION_MM, TIP_VOXELS, sigmas_of
+from pipeline.budget.verdict import ROUND
+from pipeline.compare.metrics import rms, scored
+from pipeline.model import Array, arc_length
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate import altered
+from pipeline.simulate.evidence import UNKNOWN_VOXELS
+from pipeline.simulate.resolution import lengths_mm
+
+PER_LUMEN, PER_LUMEN_ALONE = 8, 2
+"""Members that share a draw of the lumen's surface: as many as go side by side; few where it alone is looked at."""
+AT_REST = 0.9
+DISTAL = 20
+"""Points of a wire's end, at the usual 0.5 mm its last 10 mm."""
+
+
+def budgeted(run: Context, known: Known) -> Known:
+    """The case with what its inputs may be: of every frame, and by source."""
+    frames = [f for f in known.frames if f.ok and f.simulated is not None and len(f.simulated.joints_mm) > 1]
+    settings = run.config.budget
+    if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):
+        return known
+    with run.log.timed("compare"):
+        work = _Work(run, known, frames)
+        try:
+            budgets = _with_releases(frames, work.budgets(work.sigmas, settings.members, PER_LUMEN))
+            found = dict(zip(work.numbers, budgets, strict=True))
+            rows = work.by_source(found) if settings.members_alone else []
+        except ValueError as error:  # an input was drawn that the solver refuses
+            run.log.warnings.append(f"case {run.case.id!r} has no budget: {error}; lower that input's uncertainty")
+            return known
+    run.log.assumptions.append(work.said())
+    run.log.warnings += _lost(found, settings.members)
+    done = tuple(replace(frame, budget=found.get(frame.index)) for frame in known.frames)
+    return replace(known, frames=done, sources=tuple(rows))
+
+
+def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
+    """A warning where much of the ensemble came to no rest: its spread is that of the rest."""
+    few = [n for n, budget in found.items() if budget is None or budget.members < AT_REST * count]
+    if not few:
+        return []
+    frames = ", ".join(map(str, few))
+    return [
+        f"frames {frames}: fewer than {100 * AT_REST:.0f} % of the {count} insertions of the budget came to rest, or "
+        f"fewer than {FEWEST}, of which nothing is said: u_val is that of the others; raise budget.members, or state "
+        "smaller uncertainties"
+    ]
+
+
+def _with_releases(frames: Sequence[Frame], budgets: Sequence[Budget | None]) -> list[Budget | None]:
+    """The budgets with what became of releases."""
+    snapped = [frame.solved is not None and bool(frame.solved.snaps) for frame in frames]
+    told = releases(snapped, [None if budget is None else budget.shapes for budget in budgets])
+    return [None if b is None else replace(b, released=word) for b, word in zip(budgets, told, strict=True)]
+
+
+class _Work:
+    """What all ensembles of a case share."""
+
+    def __init__(self, run: Context, known: Known, frames: Sequence[Frame]) -> None:
+        config, case = run.config, run.case
+        assert known.lumen is not None
+        assert known.clamp is not None
+        self.run, self.frames, self.numbers = run, frames, [frame.index for frame in frames]
+        self.voxel = float(np.mean(known.lumen.distance.spacing_mm))
+        friction = case.wall.friction if config.simulate.friction is None else config.simulate.friction
+        depth, roll = (np.array([getattr(f, name) for f in frames]) for name in ("depth_mm", "roll_deg"))
+        traced = config.simulate.depth == "traced" and all(f.traced for f in frames)
+        self.nominal = Nominal(known.clamp, depth, roll, replace(config.simulate, friction=friction), traced)
+        stated = {"roll_deg": case.roll_sigma_deg, **asdict(case.uncertainty)}
+        self.sigmas = sigmas_of(stated, self.nominal, case.wire, self._depth_sigmas(), self.voxel)
+        self.seen = [self._seen(frame) for frame in frames]
+        wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
+        traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
+        # the coarsest of them will do: what segments make is common to all members, and stands in num_mm
+        lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
+        segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
+        solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
+        tips = [frame.catheter_mm for frame in frames] if case.catheter else None
+        shared = case.wire, case.wall, known.lumen, solver, [*wires, *traces]
+        self.scene = Scene(*shared, case.catheter, tips, config.budget.seed)
+
+    def _depth_sigmas(self) -> Array:
+        """How well each frame's depth is known, mm."""
+        if not self.nominal.traced:
+            stated = self.run.case.insertion_sigma_mm
+            return np.full(len(self.frames), INSERTION_MM if stated is None else stated)
+        tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in self.frames if f.curve is not None]
+        return np.hypot(tips, TIP_VOXELS * self.voxel)
+
+    def _seen(self, frame: Frame) -> Seen:
+        """A frame's wires at the points at which it was compared."""
+        settings, errors = self.run.config.compare, frame.comparison
+        assert frame.simulated is not None
+        if errors is None or frame.curve is None:
+            arc = scored(samples(frame.depth_mm, settings.sample_mm), settings.skip_mm)
+            return Seen(arc, at_arc(frame.simulated.joints_mm, arc))
+        own = self._trace_mm(frame) ** 2 + self._segments_mm(frame) ** 2
+        return Seen(errors.arc_mm, errors.sample_mm, frame.curve.points_mm, errors.foot_arc_mm, own)
+
+    def _trace_mm(self, frame: Frame) -> Array:
+        """Standard deviation (n,) of the trace along each axis across it, where a frame was compared."""
+        curve, errors = frame.curve, frame.comparison
+        if curve is None or errors is None:
+            return np.zeros(0)
+        sigma = np.interp(errors.foot_arc_mm, arc_length(curve.points_mm), curve.sigma_mm)
+        return np.where(np.isfinite(sigma), sigma, UNKNOWN_VOXELS * self.voxel)
+
+    def _segments_mm(self, frame: Frame) -> float:
+        """The same of the segments: num_mm is a bound, two standard deviations."""
+        return 0.5 * float(np.nan_to_num(frame.num_mm))
+
+    def said(self) -> str:
+        """What the ensemble was drawn from, for the report."""
+        words = ", ".join(f"{name.replace('_', ' ')} {said}" for name, said in self.sigmas.said.items())
+        count = self.run.config.budget.members
+        return f"the budget rests on {count} insertions drawn from (one standard deviation): {words}"
+
+    def budgets(self, sigmas: Sigmas, count: int, per_lumen: int) -> list[Budget | None]:
+        """The budget of each frame by an ensemble."""
+        members = drawn(self.nominal, sigmas, count, per_lumen, self.run.config.budget.seed)
+        ensemble = replayed(self.scene, members, [seen.arc_mm for seen in self.seen])
+        return [frame_budget(wires, seen) for wires, seen in zip(ensemble, self.seen, strict=True)]
+
+    def by_source(self, found: Mapping[int, Budget | None]) -> list[dict[str, Any]]:
+        """Rows of budget.csv: u of every input by itself, of all, of segments and trace, and the error beside them.
+
+        Over the frames in which the ensemble has one shape.
+        """
+        calm = [i for i, n in enumerate(self.numbers) if (b := found[n]) is not None and b.shapes is None]
+        rows = [self._alone(source, calm) for source in SOURCES if np.any(getattr(alone(self.sigmas, source), source))]
+        budgets, frames = [found[self.numbers[i]] for i in calm], [self.frames[i] for i in calm]
+        ends = (
+            ("inputs", "all of these", [b.input_mm for b in budgets if b]),
+            ("segments", "half of num_mm", [np.full(1, ROUND * self._segments_mm(frame)) for frame in frames]),
+            ("trace", "its own", [ROUND * self._trace_mm(frame) for frame in frames]),
+            ("u_val", "inputs, segments, trace", [b.whole_mm for b in budgets if b and b.whole_mm is not None]),
+            ("error", "simulated to traced", [f.comparison.error_mm for f in frames if f.comparison is not None]),
+        )
+        return rows + [_row(name, said, values) for name, said, values in ends if calm]
+
+    def _alone(self, source: str, calm: Sequence[int]) -> dict[str, Any]:
+        """The row of one input."""
+        few = PER_LUMEN_ALONE if source == "lumen" else PER_LUMEN
+        budgets = self.budgets(alone(self.sigmas, source), self.run.config.budget.members_alone, few)
+        return _row(source, self.sigmas.said[source], [b.input_mm for i in calm if (b := budgets[i]) is not None])
+
+
+def _row(name: str, said: str, values: Sequence[Array]) -> dict[str, Any]:
+    """A row of budget.csv from values of frames, each (n,) along the wire."""
+    step = [v[-DISTAL:] for v in values]
+    everything, distal = (np.concatenate([np.zeros(0), *part]) for part in (values, step))
+    return {"source": name, "sigma": said, "u_mm": rms(everything), "distal_u_mm": rms(distal)}

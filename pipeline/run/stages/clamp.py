@@ -1,0 +1,59 @@
+"""simulate, its beginning: where the wire is held, by the manifest or by the scans."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pipeline.model import Clamp
+from pipeline.run.log import Log
+from pipeline.run.stages.given import manifest_clamp, seen_in
+from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.load import open_case
+from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.run.stages.segment import segment_vessel
+from pipeline.run.stages.trace import trace_frames
+from pipeline.simulate import altered, insertion_of, together
+from pipeline.simulate.clamp import Seen, estimated_clamp
+from pipeline.simulate.resolution import lengths_mm
+from pipeline.study.manifest import Case
+from solver import Solution
+
+
+def clamp_of(run: Context, known: Known) -> Clamp:
+    """The clamp of the simulation: estimated from the scans, or the manifest's."""
+    given, prior, voxel_mm = manifest_clamp(run, known)
+    if run.config.simulate.entry == "manifest":
+        return given
+    if run.case.entry_case is not None:
+        return _of_another(run, run.case.entry_case, given)
+    seen = seen_in(known.frames) if any(frame.trusted_curve for frame in known.frames) else []
+    clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
+    run.log.assumptions += [clamp.note] * bool(clamp.note)
+    run.log.warnings += [clamp.warning] * bool(clamp.warning)
+    return clamp
+
+
+def _of_another(run: Context, other: Case, given: Clamp) -> Clamp:
+    """The clamp that another insertion of the same fixation shows: nothing of this case's own scans is in it."""
+    silent = Context(other, run.config, run.store, Log(lambda *_: None))
+    known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
+    clamp = clamp_of(silent, known)
+    run.log.assumptions.append(
+        f"the clamp is blind to this case's scans, it is that of case {other.id!r}: {clamp.note}"
+    )
+    run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
+    return replace(clamp, material_axis=given.material_axis, down=given.down)
+
+
+def _replayed(
+    run: Context, known: Known, clamps: Sequence[Clamp], seen: Sequence[Seen], depths: Sequence[Sequence[float]]
+) -> list[list[Solution]]:
+    """The wire of every frame from several clamps, with the longest segments."""
+    case, config, lumen = run.case, run.config, known.lumen
+    assert lumen is not None
+    segment = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)[0]
+    settings = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
+    insertions = [
+        insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter) for clamp in clamps
+    ]
+    tips = [frame.catheter_mm for frame in seen] if case.catheter else None
+    return together(insertions, depths, [frame.roll_deg for frame in seen], tips)

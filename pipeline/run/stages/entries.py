@@ -1,0 +1,69 @@
+"""The wires held and pushed otherwise: clamp from the scans or the manifest, depth from the traces or the manifest.
+
+Four rows beside each other say how much of an error was in what the user stated, and how much was taken from the scans.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.compare.metrics import Pair, Way, distal, pair_of, rms
+from pipeline.model import Clamp
+from pipeline.run.stages.given import manifest_clamp
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate import insertion_of, together
+from pipeline.simulate.clamp import depth_from
+from solver import Solution
+
+
+def four_entries(run: Context, known: Known, way: Way) -> tuple[dict[str, Any], ...]:
+    """Rows of entries.csv, over the frames that are ok and come to rest in all four; none where there are not four."""
+    frames = [frame for frame in known.frames if frame.ok and frame.comparison is not None]
+    stated = run.case.insertion_mm is not None and run.case.frames
+    if not frames or not stated or known.clamp is None or run.config.simulate.entry == "manifest":
+        return ()
+    clamps = {"estimated": known.clamp, "manifest": manifest_clamp(run, known)[0]}
+    ways = [(clamp, depth) for clamp in clamps for depth in ("traced", "manifest")]
+    depths = [[_depth(frame, clamps[clamp], depth) for frame in frames] for clamp, depth in ways]
+    wires = _replayed(run, known, frames, [clamps[clamp] for clamp, _ in ways], depths)
+    kept = [i for i in range(len(frames)) if all(one[i].converged for one in wires)]
+    pairs = [[_pair(run, known, frames[i], one[i], way) for i in kept] for one in wires]
+    return tuple(_row(*names, own) for names, own in zip(ways, pairs, strict=True)) if kept else ()
+
+
+def _depth(frame: Frame, clamp: Clamp, depth: str) -> float:
+    assert frame.curve is not None
+    return depth_from(clamp, frame.curve) if depth == "traced" else frame.expected_mm
+
+
+def _replayed(
+    run: Context, known: Known, frames: Sequence[Frame], clamps: Sequence[Clamp], depths: Sequence[Sequence[float]]
+) -> list[list[Solution]]:
+    """The wires of each frame from four entries, with the segments of the case."""
+    case, config, lumen = run.case, run.config, known.lumen
+    assert lumen is not None
+    solver = replace(config.solver, segment_mm=known.segment_mm)
+    insertions = [insertion_of(case.wire, case.wall, lumen, c, solver, config.simulate, case.catheter) for c in clamps]
+    tips = [frame.catheter_mm for frame in frames] if case.catheter else None
+    return together(insertions, depths, [frame.roll_deg for frame in frames], tips)
+
+
+def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: Way) -> Pair:
+    assert frame.curve is not None
+    assert known.lumen is not None
+    return pair_of(wire, frame.curve, known.lumen, run.config.compare, way)
+
+
+def _row(clamp: str, depth: str, pairs: Sequence[Pair]) -> dict[str, Any]:
+    counts = np.array([len(pair.error_mm) for pair in pairs])
+    ends = np.array([distal(pair, 10.0) for pair in pairs])
+    return {
+        "clamp": clamp,
+        "depth": depth,
+        "frames": len(pairs),
+        "rms_mm": rms(np.concatenate([pair.error_mm for pair in pairs])),
+        "distal10_rms_mm": float(np.sqrt(np.sum(counts * ends**2) / counts.sum())),
+        "tip_median_mm": float(np.median([np.linalg.norm(pair.wire_mm[-1] - pair.curve_mm[-1]) for pair in pairs])),
+    }

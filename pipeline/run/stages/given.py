@@ -1,0 +1,64 @@
+"""What an insertion is fitted from: the clamp as the manifest has it, and the traces that are to be believed."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.calibrate.trials import Trial
+from pipeline.model import Clamp, Curve
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate.clamp import Prior, Seen
+from pipeline.status import FrameStatus
+from solver import VesselWall
+
+ENTRY_SIGMA_VOXELS = 0.5
+"""How well a point of a scan can be pointed at."""
+
+
+def seen_in(frames: Sequence[Frame]) -> list[Seen]:
+    """The frames whose beginning is to be believed."""
+    return [
+        Seen(frame.index, curve, frame.roll_deg, frame.catheter_mm)
+        for frame in frames
+        if (curve := frame.trusted_curve or _faint(frame)) is not None
+    ]
+
+
+def _faint(frame: Frame) -> Curve | None:
+    """The curve of a frame of too low a contrast: its tip may be missed, its beginning is as good as its sigma says."""
+    return frame.curve if frame.traced and frame.status == FrameStatus.TRACE_LOW_CONTRAST.identifier else None
+
+
+def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
+    """The clamp as the manifest has it, how well it knows it, and the voxels' size, mm."""
+    case = run.case
+    assert known.lumen is not None
+    voxel = float(np.mean(known.lumen.distance.spacing_mm))
+    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
+    direction = np.array(case.entry_direction) / np.linalg.norm(case.entry_direction)
+    given = Clamp(np.array(case.entry_mm), direction, axis, down)
+    sigma = ENTRY_SIGMA_VOXELS * voxel if case.entry_sigma_mm is None else case.entry_sigma_mm
+    return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
+
+
+def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool) -> Trial:
+    """The insertion as calibration takes it: the whole length of trusted traces of these frames."""
+    case = run.case
+    assert known.lumen is not None
+    given, prior, voxel_mm = manifest_clamp(run, known)
+    trusted = [frame for frame in frames if frame.trusted_curve is not None]
+    force = None if case.push_force_N is None else np.array([case.push_force_N[frame.index] for frame in trusted])
+    return Trial(
+        name=case.id,
+        vessel=VesselWall(known.lumen.distance, stiffness_N_mm2=1.0, hull=run.config.solver.hull),
+        wire=case.wire,
+        wall=case.wall,
+        given=given,
+        prior=prior,
+        seen=tuple(seen_in(trusted)),
+        voxel_mm=voxel_mm,
+        roll_free=roll_free,
+        catheter=case.catheter,
+        force_N=force,
+        force_sigma_N=case.push_force_sigma_N,
+    )

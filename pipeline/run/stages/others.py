@@ -1,0 +1,75 @@
+"""simulate, where another simulator did it: its wires, judged by the rule that every frame counts."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays.polyline import resample
+from pipeline.load.wires import OtherFile, read_wires
+from pipeline.model import Array, OtherWire, arc_length
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate import wall_of
+from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity
+from pipeline.status import FrameStatus
+
+STEP_MM = 0.25
+MOST_OUTSIDE = 0.2
+"""Share of a wire outside the lumen from which on it is asked whether its x and y are turned."""
+
+
+def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
+    """The frames, each with its wire; one that has none, or none that can be used, has failed."""
+    case, log = run.case, run.log
+    assert case.simulated is not None
+    with log.timed("simulate"):
+        files = read_wires(case.simulated.files, len(known.frames), case.simulated.space, case.simulated.unit)
+        frames = [_taken(run, known, frame, file) for frame, file in zip(known.frames, files, strict=True)]
+    log.assumptions.append(
+        f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
+    )
+    log.warnings += _outside(known, frames, case.wire.radius_mm)
+    return tuple(frames)
+
+
+def _listed(files: Sequence[OtherFile]) -> str:
+    names = [file.name for file in files]
+    return f"frame 0 is {names[0]}, frame {len(names) - 1} is {names[-1]}"
+
+
+def _taken(run: Context, known: Known, frame: Frame, file: OtherFile) -> Frame:
+    assert known.clamp is not None
+    case, clamp = run.case, known.clamp
+    if file.points_mm is None:
+        status = FrameStatus.CURVE_MISSING if file.missing else FrameStatus.CURVE_UNUSABLE
+        return frame.failed("simulate", status, f"{file.name}: {file.problem}")
+    odd = oddity(file.points_mm, np.array(case.entry_mm), np.array(case.entry_direction))
+    if odd:
+        return frame.failed("simulate", FrameStatus.CURVE_UNUSABLE, f"{file.name}: {odd}")
+    points = begun(file.points_mm, clamp.entry_mm, clamp.direction)
+    deepest = float(_clearance(known, points).max()) + case.wire.radius_mm
+    found = replace(frame, simulated=OtherWire(points, max(deepest, 0.0)))
+    length = float(arc_length(points)[-1])
+    wrong = not_to_depth(length, frame.depth_mm, run.config.trace.length_tolerance_mm)
+    return found.failed("simulate", FrameStatus.NOT_TO_DEPTH, f"{file.name}: {wrong}") if wrong else found
+
+
+def _clearance(known: Known, points: Array) -> Array:
+    """Distance (n,) of equal steps along a wire to the lumen's wall, mm, negative inside."""
+    assert known.lumen is not None
+    return wall_of(known.lumen.distance, "offset").look_up(resample(points, STEP_MM))[0]
+
+
+def _outside(known: Known, frames: Sequence[Frame], radius_mm: float) -> list[str]:
+    """Warnings where wires lie outside the lumen, and whether they would not with x and y turned."""
+    wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
+    outside = {n: np.mean(_clearance(known, wire) > radius_mm) for n, wire in wires.items()}
+    outside = {n: share for n, share in outside.items() if share > MOST_OUTSIDE}
+    if not outside:
+        return []
+    worst = max(outside, key=lambda n: float(outside[n]))
+    turned = Counter(np.mean(_clearance(known, wires[n] * MIRROR) > radius_mm) < 0.5 * outside[n] for n in outside)
+    hint = "; with x and y turned most would not: are they RAS?" if turned[True] > turned[False] else ""
+    what = f"{100 * outside[worst]:.0f} % of the wire lies outside the lumen by more than its radius"
+    return [f"{len(outside)} frames: in frame {worst} {what}{hint}"]

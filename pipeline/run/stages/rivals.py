@@ -1,0 +1,51 @@
+"""Simulators that lack something, as predictors: what the roll and the tip's curve are worth.
+
+Both have everything else of the simulated wire, the clamp and the depths too. One does not know the roll and gives the
+mean, at equal arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays.polyline import at_arc, samples
+from pipeline.model import Array
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.simulate import insertion_of, simulate
+from pipeline.simulate.config import SimulateConfig
+
+ROLLS = 12
+
+
+def simulated_rivals(run: Context, known: Known) -> dict[int, dict[str, Array]]:
+    """By frame and by name, the wires (n, 3) of both; a frame that was not simulated has none."""
+    frames = [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
+    if not run.config.compare.simulated_nulls or not frames or not np.isfinite(known.segment_mm):
+        return {}
+    plain = run.config.simulate
+    straight = _wires(run, known, frames, replace(plain, rest_curvature_scale=0.0), 0.0)
+    turned = [_wires(run, known, frames, plain, 360.0 * i / ROLLS) for i in range(ROLLS)]
+    found: dict[int, dict[str, Array]] = {}
+    for i, frame in enumerate(frames):
+        arc = samples(frame.depth_mm, run.config.compare.sample_mm)
+        known_rolls = [at_arc(wire, arc) for wires in turned if (wire := wires[i]) is not None]
+        mean = np.mean(known_rolls, axis=0) if len(known_rolls) > ROLLS // 2 else None
+        both = {"roll_unknown": mean, "no_tip_curve": straight[i]}
+        found[frame.index] = {name: np.asarray(wire) for name, wire in both.items() if wire is not None}
+    return found
+
+
+def _wires(
+    run: Context, known: Known, frames: Sequence[Frame], config: SimulateConfig, turn_deg: float
+) -> list[Array | None]:
+    """The wire of each frame under other settings, turned; None where it comes to no rest."""
+    case, lumen, clamp = run.case, known.lumen, known.clamp
+    assert lumen is not None
+    assert clamp is not None
+    settings = replace(run.config.solver, segment_mm=known.segment_mm, finest_mm=run.config.solver.step_mm)
+    insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config, case.catheter)
+    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if case.catheter else None
+    rolls = [frame.roll_deg + turn_deg for frame in frames]
+    wires = simulate(insertion, [frame.depth_mm for frame in frames], rolls, tips)
+    return [np.asarray(wire.joints_mm) if wire.converged else None for wire in wires]

@@ -1,0 +1,97 @@
+"""compare, where the real wire is known from X-ray projections."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays.grids import corners_mm
+from pipeline.arrays.polyline import at_arc
+from pipeline.compare import Comparison
+from pipeline.compare.config import CompareConfig
+from pipeline.compare.nulls import NULLS, TOLD, Clues, Seen
+from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of, values_in
+from pipeline.load.views import View
+from pipeline.model import Array
+from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.simulate import wall_of
+from pipeline.status import FrameStatus
+
+
+def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
+    """The frames with their errors on the planes of their views, beside those of predictors with the same freedom."""
+    clues, config = _clues(run, known), run.config.compare
+    simulated = {} if clues is None else simulated_rivals(run, known)
+    seen = [Seen(simulated=simulated.get(frame.index, {})) for frame in known.frames]
+    frames = [_compared(frame, clues, told, config) for frame, told in zip(known.frames, seen, strict=True)]
+    limited = "" if clues is None else _limited(frames, clues, config)
+    views = [frame.view for frame in frames if frame.view is not None]
+    how = "shifted in the plane to lie best from 40 to 110 mm behind the tip, and scored on the last 40 mm"
+    run.log.chosen["projections"] = "translation fitted" if views[0].fitted else "no translation"
+    run.log.assumptions.append(
+        "distances are in the plane through the isocentre, parallel to the detector; each wire, predictors too, was "
+        + (how if views[0].fitted else "taken where it lies: no translation was fitted")
+    )
+    if not limited:
+        return tuple(frames)
+    # a wire cannot lie farther from its vessel's middle than the vessel is wide: what is left is registration
+    run.log.warnings.insert(0, limited)
+    run.log.chosen["label"] = limited
+    return tuple(replace(frame, nulls_rms_mm={}) for frame in frames)
+
+
+def _clues(run: Context, known: Known) -> Clues | None:
+    """What predictors may know: the lumen, and the vessel's end that was stated beforehand."""
+    views = [frame.view for frame in known.frames if frame.view is not None]
+    if known.lumen is None or known.clamp is None:
+        return None
+    # where the real wire lay in space is not known: paths are looked for in all of the lumen
+    towards = np.vstack([corners_mm(known.lumen.distance), views[0].leaf_mm])
+    return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, towards)
+
+
+def _compared(frame: Frame, clues: Clues | None, seen: Seen, config: CompareConfig) -> Frame:
+    view = frame.view
+    if view is None or clues is None or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
+        return frame
+    screen, wire = screen_seen(view), np.asarray(frame.simulated.joints_mm)
+    guesses = {name: guess(clues, frame.depth_mm, seen) for name, guess in NULLS.items() if name not in TOLD}
+    known_wires = {name: guess for name, guess in guesses.items() if guess is not None}
+    try:
+        pair = pair_in(screen, wire, view.fitted, clues.lumen, clues.way, config)
+        nulls = nulls_in(screen, known_wires, view.fitted, config)
+    except ValueError as error:
+        return frame.failed("compare", FrameStatus.VIEW_FAILED, str(error))
+    axes = screen.axes.T
+    flat = tuple((curve - screen.isocentre_mm) @ axes for curve in (pair.curve_mm, pair.wire_mm))
+    done = Comparison(**vars(pair), values=values_in(pair))
+    return replace(frame, comparison=done, nulls_rms_mm=nulls, in_view_mm=flat)
+
+
+def screen_seen(view: View) -> Screen:
+    """The plane of a view with the polyline on it."""
+    return screen_of(view.matrix, view.isocentre_mm, view.points_px)
+
+
+def _limited(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> str:
+    """What is to be said where even the vessel's middle lies farther from the wire than the vessel is wide."""
+    known = [frame for frame in frames if frame.ok and "centreline" in frame.nulls_rms_mm]
+    if not known or clues.centreline is None:
+        return ""
+    off = float(np.sqrt(np.mean([frame.nulls_rms_mm["centreline"] ** 2 for frame in known])))
+    radius = float(np.median(np.concatenate([_radii(frame, clues, config) for frame in known])))
+    if off <= radius:
+        return ""
+    return (
+        f"registration-limited: centreline {off:.1f} mm in a lumen of {radius:.1f} mm radius; no skill can be claimed"
+    )
+
+
+def _radii(frame: Frame, clues: Clues, config: CompareConfig) -> Array:
+    """The lumen's radius along the part of its middle that was scored."""
+    path = NULLS["centreline"](clues, frame.depth_mm, Seen())
+    assert path is not None
+    assert frame.view is not None
+    part = at_arc(path, counted(path, frame.view.fitted, config))
+    return np.asarray(-wall_of(clues.lumen.distance, "offset").look_up(part)[0])

@@ -1,0 +1,127 @@
+"""A sweep: the same cases with one setting changed at a time, beside the plain result.
+
+Segmentation and tracing do not depend on the solver's settings, so the stage store answers them: a sweep costs
+simulation and comparison only. An agreement that no parameter moves is suspicious.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pipeline.run.another import with_another
+from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
+from pipeline.run.results import LOST, Result, found_results
+from pipeline.study.manifest import Case
+from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
+from reports import tables
+from reports.case_files import read_json
+from reports.schema import SWEEP
+
+PLAIN = "(plain)"
+"""Stands where the name of the changed setting would."""
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One changed setting and the settings that result."""
+
+    parameter: str
+    value: str
+    settings: Resolved
+
+    @property
+    def cheap(self) -> Resolved:
+        """The settings without predictors that are simulations and without a budget: those of the plain run stand."""
+        config = self.settings.config
+        compare, budget = replace(config.compare, simulated_nulls=False), replace(config.budget, members=0)
+        return replace(self.settings, config=replace(config, compare=compare, budget=budget))
+
+    @property
+    def folder(self) -> Path:
+        """Its sub-folder of the output."""
+        return _folder({"parameter": self.parameter, "value": self.value})
+
+
+Head = dict[str, str]
+"""A point as run.json and sweep.csv name it: the setting, its value here and in the plain run (unchanged)."""
+
+
+def _folder(head: Head) -> Path:
+    return Path("sweep", f"{head['parameter']}={head['value']}".replace("/", "_"))
+
+
+def points_of(texts: Sequence[str], base: Sequence[Setting]) -> list[SweepPoint]:
+    """``table.key=v1,v2`` texts as points; raises SettingsError for an unknown setting or value."""
+    points = []
+    for text in texts:
+        name, equals, values = text.partition("=")
+        if not equals or not values.strip():
+            raise SettingsError([f"--sweep {text!r}: write table.key=value1,value2"])
+        for value in values.split(","):
+            setting = parse_assignment(f"{name}={value}", "sweep")
+            points.append(SweepPoint(name.strip(), value.strip(), resolve([*base, setting])))
+    return points
+
+
+def heads_of(plain: Resolved, cases: Sequence[Case], points: Sequence[SweepPoint]) -> list[Head]:
+    """The points as run.json names them."""
+    named = [{"parameter": point.parameter, "value": point.value} for point in points]
+    return [head | {"unchanged": unchanged(plain, cases, head["parameter"])} for head in named]
+
+
+def found_heads(out: Path) -> list[Head]:
+    """The points that the runs into an output folder name; ``unchanged`` is empty where shards differ in it."""
+    found: dict[tuple[str, str], Head] = {}
+    for path in sorted(out.glob("run*.json")):
+        for head in read_json(path).get("sweep", ()):
+            before = found.setdefault((head["parameter"], head["value"]), head)
+            if before["unchanged"] != head["unchanged"]:
+                found[head["parameter"], head["value"]] = head | {"unchanged": ""}
+    return list(found.values())
+
+
+def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
+    """Cases of which a sweep has no result, and at which point."""
+    return [(_folder(h), r) for h in heads for r in found_results(out / _folder(h)) if r.status in LOST]
+
+
+def write_sweep(out: Path, heads: Sequence[Head]) -> None:
+    """sweep.csv: the plain result first, then every point, each of them case by case and over all of them."""
+    if not heads:
+        return
+    before = with_another(out, found_cases(out))
+    rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))
+    for head in heads:
+        rows += _rows(head, before, found_cases(out / _folder(head)))
+    tables.write(out / SWEEP.file, SWEEP, rows)
+
+
+def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:
+    """A setting's value in the plain run; of one that takes the manifest's place, the manifest's."""
+    table, _, key = parameter.partition(".")
+    value = getattr(getattr(plain.config, table), key)
+    if value is None and parameter == "simulate.friction":
+        values = {case.wall.friction for case in cases}
+        value = values.pop() if len(values) == 1 else None
+    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _rows(head: Head, before: Sequence[Found], after: Sequence[Found]) -> Iterator[dict[str, Any]]:
+    """A row for each case of ``after``, and one over all where there are several."""
+    for case in after:
+        yield _row(head, case.result.summary, before, [case])
+    if len(after) > 1 and (whole := overall(after)):
+        yield _row(head, whole, before, after)
+
+
+def _row(
+    head: dict[str, str], summary: dict[str, Any], before: Sequence[Found], after: Sequence[Found]
+) -> dict[str, Any]:
+    """A row of sweep.csv; the plain result is compared with itself by nobody."""
+    row = {name: summary.get(name) for name in SWEEP.names} | head | {"case": summary["case"]}
+    found = None if head["parameter"] == PLAIN else ratio(before, after)
+    if found is not None:
+        row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
+    null = overall(before).get("strongest_null")
+    return row | (skill_beside(before, after, null) if null and found is not None else {})

@@ -1,0 +1,128 @@
+"""What a case leaves for 3D Slicer and ParaView in its folder ``view``; LPS mm.
+
+The lumen, closed, as surface and label map; every frame's wires as lines with arrays and as curves; collections over
+the frames, and a scene that opens everything.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from pipeline.model import Array, Lumen, arc_length
+from pipeline.run.stages import Known
+from pipeline.run.stages.known import Frame
+from reports import colours, export
+from solver import Grid
+
+_LEAST = 1e-3
+"""Least distance, in voxels, of a voxel's centre from the surface beyond the grid's edge: no triangle without area."""
+
+
+def write_view(folder: Path, known: Known) -> None:
+    """The lumen and every frame's wires, each in a file; then what opens them together."""
+    if known.lumen is not None:
+        _write_lumen(folder, known.lumen)
+    for frame in known.frames:
+        _write_wires(folder, frame)
+    for kind in ("traced", "simulated", "true"):
+        export.write_collection(folder, f"wire_{kind}")
+    with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
+    export.write_scene(folder, shown=max(with_wire, default=0))
+
+
+def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
+    """Magnitude (n,) of the contact force of the joints that are nearest to each arc length (n,), N.
+
+    Forces of joints are added up, so that their sum does not depend on the length of the segments.
+    """
+    if frame.solved is None:
+        return np.full(len(arc_mm), np.nan)
+    arc = arc_length(frame.solved.joints_mm)
+    # what lies before the first of them, in the clamp's reach, is none of theirs
+    there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
+    force = np.zeros((len(arc_mm), 3))
+    nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
+    np.add.at(force, nearest, frame.solved.contact_force_N[there])
+    return np.asarray(np.linalg.norm(force, axis=1))
+
+
+def closed_surface(grid: Grid) -> tuple[Array, NDArray[np.int64]]:
+    """Vertices (n, 3), LPS mm, and triangles (t, 3) of where a distance is 0; closed where the inside meets the edge.
+
+    One more voxel on every side mirrors the distance there, so that a cut vessel ends on its last voxels' outer faces.
+    """
+    step = float(np.min(grid.spacing_mm))
+    values = np.pad(np.asarray(grid.values, dtype=np.float32), 1, mode="edge")
+    inner = tuple(slice(1, -1) for _ in range(3))
+    outer = np.maximum(np.abs(values), _LEAST * step)
+    outer[inner] = values[inner]
+    # normals point outward, where the distance grows; a left-handed grid turns them over
+    way: Literal["descent", "ascent"] = "descent" if np.linalg.det(grid.direction) > 0 else "ascent"
+    vertices, triangles, _, _ = marching_cubes(outer, 0.0, gradient_direction=way)
+    return grid.to_mm(vertices - 1.0), np.asarray(triangles, dtype=np.int64)
+
+
+def _write_lumen(folder: Path, lumen: Lumen) -> None:
+    grid = lumen.distance
+    inside = (grid.values < 0).astype(np.uint8)
+    export.write_segmentation_nrrd(
+        folder / "lumen.seg.nrrd", inside, grid.spacing_mm, grid.origin_mm, grid.direction, ("lumen",)
+    )
+    if inside.any():
+        surface = closed_surface(grid)
+        export.write_surface_vtp(folder / "lumen.vtp", *surface)
+        export.write_surface_stl(folder / "lumen.stl", *surface)
+
+
+def _write_wires(folder: Path, frame: Frame) -> None:
+    if frame.curve is not None and frame.traced:
+        points = frame.curve.points_mm
+        arrays = {"arc_mm": arc_length(points)}
+        if len(frame.curve.sigma_mm) == len(points):
+            arrays["u_mm"] = frame.curve.sigma_mm
+        _write_wire(folder, "traced", frame, points, arrays)
+    if frame.truth_mm is not None and len(frame.truth_mm):
+        _write_wire(folder, "true", frame, frame.truth_mm, {"arc_mm": arc_length(frame.truth_mm)})
+    if frame.simulated is not None:
+        joints = frame.simulated.joints_mm
+        plain = {"arc_mm": arc_length(joints)}
+        plain |= {} if frame.solved is None else {"contact_force_N": frame.solved.contact_force_N}
+        in_space = frame.comparison is not None and frame.view is None
+        points, arrays = _compared(frame) if in_space else (joints, plain)
+        _write_wire(folder, "simulated", frame, points, arrays, joints)
+
+
+def _compared(frame: Frame) -> tuple[Array, dict[str, Any]]:
+    """The clamp's reach as joints, then the compared samples with their errors; u_mm: of the trace at their feet."""
+    errors, joints = frame.comparison, frame.simulated.joints_mm if frame.simulated is not None else np.zeros((0, 3))
+    assert errors is not None
+    assert frame.curve is not None
+    along = arc_length(joints)
+    reach = along[along < errors.arc_mm[0] - 1e-9]
+    arc = np.concatenate([reach, errors.arc_mm])
+    nothing = np.full(len(reach), np.nan)
+    arrays = {"error_mm": np.concatenate([nothing, errors.error_mm]), "arc_mm": arc}
+    arrays |= {} if frame.solved is None else {"contact_force_N": contact_at(frame, arc)}
+    traced = arc_length(frame.curve.points_mm)
+    if len(frame.curve.sigma_mm) == len(traced):
+        u_mm = np.interp(errors.foot_arc_mm, traced, frame.curve.sigma_mm)
+        arrays["u_mm"] = np.concatenate([nothing, u_mm])
+    return np.concatenate([joints[: len(reach)], errors.sample_mm]), arrays
+
+
+def _write_wire(
+    folder: Path, kind: str, frame: Frame, points: Array, arrays: Mapping[str, Any], curve: Array | None = None
+) -> None:
+    """One wire as a line with arrays and as a curve of 3D Slicer with its numbers; curve: its points, where others."""
+    name = f"wire_{kind}_{frame.index:03d}"
+    export.write_polyline_vtp(folder / f"{name}.vtp", points, arrays)
+    known = {"rms_mm": "rms distance to the traced wire", "tip_mm": "distance of the tips"}
+    numbers = {} if kind != "simulated" or frame.comparison is None else frame.comparison.values
+    said = {text: float(numbers[column]) for column, text in known.items() if column in numbers}
+    colour = {"traced": colours.TRACED, "simulated": colours.SIMULATED, "true": colours.TRUE}[kind]
+    path, label = folder / f"{name}.mrk.json", f"{kind} {frame.index:03d}"
+    export.write_markups_curve(path, points if curve is None else curve, label, colour, said)

@@ -1,0 +1,105 @@
+"""What the reader sees of a batch: on a terminal one bar over all cases and points of a sweep, elsewhere lines.
+
+The bar reads the logs that cases write in any case: workers need send nothing, wherever they run.
+"""
+
+import re
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TextIO
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from pipeline.run.case import Job
+from pipeline.run.log import STAGES
+
+EVERY_S = 0.3
+STEP = re.compile(rf"\] ({'|'.join(STAGES)}) (\d+)/(\d+)  ")
+WORK: dict[str, float] = dict(zip(STAGES, (0.05, 0.05, 0.5, 0.1, 0.2, 0.1), strict=True))
+"""Rough shares of the stages in a case's time: what the estimate of the rest goes by."""
+
+
+def share_done(log: str) -> float:
+    """How much of a case is done, 0 to 1, by the last step in its log."""
+    stage, done, total = (STEP.findall(log) or [(STAGES[0], 0, 1)])[-1]
+    before = sum(share for name, share in WORK.items() if STAGES.index(name) < STAGES.index(stage))
+    return before + WORK[stage] * int(done) / max(int(total), 1)
+
+
+@dataclass
+class Watch:
+    """Follows the jobs of a batch. silent : say nothing; lines : no bar, even on a terminal.     stream : where to."""
+
+    jobs: Sequence[Job]
+    silent: bool = False
+    lines: bool = False
+    stream: TextIO = field(default_factory=lambda: sys.stderr)
+    _start: float = field(default_factory=time.time)
+    _finished: set[Path] = field(default_factory=set)
+
+    @property
+    def bar(self) -> bool:
+        """Whether a bar is shown, beside which cases must print nothing."""
+        return self.stream.isatty() and not (self.silent or self.lines)
+
+    def finished(self, job: Job, error: str = "") -> None:
+        """Count a job; where there is no bar a line says how far the batch is."""
+        self._finished.add(job.folder)
+        done, total = len(self._finished), len(self.jobs)
+        if self.silent or self.bar or total < 2:
+            return
+        passed = time.time() - self._start
+        rest = f", about {_clock(passed / done * (total - done))} left" if done < total else ""
+        what = job.case.id if job.pictures else f"{job.case.id} with {job.out.name}"
+        self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or 'finished'}\n")
+        self.stream.flush()
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """Show the bar while the block runs."""
+        if not self.bar:
+            yield
+            return
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(file=self.stream), transient=True) as progress:
+            task, stop = progress.add_task("starting", total=len(self.jobs)), threading.Event()
+            thread = threading.Thread(target=self._follow, args=(progress, task, stop), daemon=True)
+            thread.start()
+            try:
+                yield
+            finally:
+                stop.set()
+                thread.join()
+
+    def _follow(self, progress: Progress, task: TaskID, stop: threading.Event) -> None:
+        while not stop.wait(EVERY_S):
+            done, heard = self.now()
+            progress.update(task, completed=done, description=f"{len(self._finished)}/{len(self.jobs)} {heard}")
+
+    def now(self) -> tuple[float, str]:
+        """Jobs done, with fractions of those under way, and the last that was heard of one of these."""
+        done, heard = float(len(self._finished)), ""
+        for log in (job.folder / "log.txt" for job in self.jobs if job.folder not in self._finished):
+            if log.exists() and log.stat().st_mtime >= self._start:
+                text = log.read_text(encoding="utf-8", errors="replace")
+                done, heard = done + share_done(text), text.rstrip().rpartition(" s  ")[2][:60]
+        return done, heard
+
+
+def _clock(seconds: float) -> str:
+    """45 s, 3 min or 2 h 5 min."""
+    minutes = round(seconds / 60)
+    if minutes < 2:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

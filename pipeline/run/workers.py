@@ -1,0 +1,169 @@
+"""Worker processes of this machine: each takes one job at a time, dies alone, keeps to limits and ends with the run.
+
+However this process ends, by a signal or without any chance to say so, its workers end with it.
+"""
+
+import fcntl
+import math
+import multiprocessing
+import os
+import resource
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
+from multiprocessing import connection, forkserver
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from pipeline.run.outcome import LOST, Outcome, guarded
+
+J = TypeVar("J")
+R = TypeVar("R")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ITK_GLOBAL_DEFAULT_NUMBER_OF_THREADS")
+PRELOADED = "pipeline.run.case"
+"""Imported once (1.5 s) by the server that workers are forked from."""
+LOOK_S = 0.1
+"""How often a worker under limits is looked at: what it takes in between is what it may take too much."""
+
+
+class Limits(NamedTuple):
+    """What a job may take."""
+
+    seconds: float = math.inf
+    memory_mib: float = math.inf
+
+    @property
+    def any(self) -> bool:
+        """There is one."""
+        return min(self) < math.inf
+
+    def broken(self, seconds: float, peak_mib: float) -> str:
+        """A sentence on the limit that is broken; empty where none is."""
+        if seconds > self.seconds:
+            return f"took longer than the {self.seconds:g} s of --case-timeout (peak memory {peak_mib:.0f} MiB)"
+        if peak_mib > self.memory_mib:
+            return f"took {peak_mib:.0f} MiB of memory, more than the {self.memory_mib:g} MiB of --case-memory"
+        return ""
+
+
+NO_LIMITS = Limits()
+
+
+class Worker(Generic[J, R]):
+    """A process that does jobs, and the job that it is at."""
+
+    def __init__(self, work: Callable[[J], R]) -> None:
+        context = multiprocessing.get_context("forkserver")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_serve, args=(theirs, work))
+        self.process.start()
+        theirs.close()
+        self._job: list[J] = []
+        self._since, self._peak_mib = 0.0, 0.0
+
+    def give(self, job: J) -> None:
+        """Begin a job. That the process has died in between shows where its outcome is asked for."""
+        self._job, self._since, self._peak_mib = [job], time.monotonic(), 0.0
+        with suppress(OSError):
+            self.pipe.send(job)
+
+    def outcome(self, ready: bool, limits: Limits) -> Outcome[J, R] | None:
+        """What became of its job; None as long as it is at it. ready : the process has sent something, or died."""
+        (job,) = self._job
+        if ready:
+            try:
+                outcome: Outcome[J, R] = self.pipe.recv()
+            except (EOFError, OSError):
+                self.process.join()
+                return Outcome(job, None, LOST, f"{LOST} ({_ended(self.process.exitcode)})", "worker_lost")
+            return outcome
+        self._peak_mib = max(self._peak_mib, resident_mib(self.process.pid))
+        broken = limits.broken(time.monotonic() - self._since, self._peak_mib)
+        if not broken:
+            return None
+        self.end()
+        return Outcome(job, None, broken, broken, "over_limit")
+
+    def end(self) -> None:
+        """End the process at once. Whatever it was writing has a temporary name."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def in_processes(
+    jobs: Sequence[J], work: Callable[[J], R], count: int, limits: Limits = NO_LIMITS
+) -> Generator[Outcome[J, R], None, None]:
+    """The outcomes of jobs as they come; one whose worker has died says so. Ends the workers, however it is left."""
+    _start_server()
+    waiting, idle, busy = deque(jobs), list[Worker[J, R]](), list[Worker[J, R]]()
+    try:
+        while waiting or busy:
+            while waiting and len(busy) < count:
+                busy.append(idle.pop() if idle else Worker(work))
+                busy[-1].give(waiting.popleft())
+            ready = connection.wait([worker.pipe for worker in busy], LOOK_S if limits.any else None)
+            for worker in tuple(busy):
+                outcome = worker.outcome(worker.pipe in ready, limits)
+                if outcome is None:
+                    continue
+                busy.remove(worker)
+                if worker.process.is_alive():
+                    idle.append(worker)
+                yield outcome
+    finally:
+        for worker in (*idle, *busy):
+            worker.end()
+
+
+def resident_mib(process: int | None) -> float:
+    """Memory of a process that lies in RAM, MiB; 0 where it is no more."""
+    try:
+        pages = Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1]
+    except (OSError, IndexError):
+        return 0.0
+    return int(pages) * resource.getpagesize() / 2**20
+
+
+def _start_server() -> None:
+    """Start the process that workers are forked from. They take one core each: N times N threads slow each other."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        multiprocessing.get_context("forkserver").set_forkserver_preload([PRELOADED])
+        forkserver.ensure_running()
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
+
+
+def _serve(pipe: Any, work: Callable[[J], R]) -> None:
+    """Do one job after the other, until the pipe is closed."""
+    # Ctrl-C reaches every process of a terminal; this one is ended by its parent
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+    with suppress(EOFError, OSError):
+        while True:
+            pipe.send(guarded(work, pipe.recv()))
+
+
+def end_with_parent() -> None:
+    """Let the system end this process as soon as its parent is no more.
+
+    A thread that watches would wait for the interpreter while a kernel or a reader keeps it for seconds.
+    """
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    signal.signal(signal.SIGIO, signal.SIG_DFL)  # ends the process
+    fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, fcntl.fcntl(parent.sentinel, fcntl.F_GETFL) | os.O_ASYNC)
+    if connection.wait([parent.sentinel], 0):
+        os._exit(1)
+
+
+def _ended(code: int | None) -> str:
+    return f"signal {-code}, {signal.Signals(-code).name}" if code is not None and code < 0 else f"exit code {code}"

@@ -1,0 +1,230 @@
+"""Where the wire is held: the solver's own wire fitted to the first millimetres of the traces of all frames.
+
+A clamp turned by 2 degrees puts a free wire 0.35 mm off after 10 mm, more than everything else in the pipeline, and a
+hand-picked entry is no better. The wire's first millimetres show the clamp, bent by what the wire does farther on: so
+the solver's wire, with its stiffness, rest curvature and wall, is what is fitted. The manifest's statement is the
+prior, with the uncertainty that it states. Unknown are the clamp's place (3) and two tilts of its direction; Gauss and
+Newton find them, with derivatives from insertions from clamps a little off.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays.polyline import angle_deg, at_arc
+from pipeline.model import Array, Clamp, Curve, arc_length
+from pipeline.simulate.evidence import Sight, covariance_of, disagreeing, posterior
+from solver import Solution
+
+REACH_MM = 10.0
+"""Length of wire behind the entry that is fitted: a trace's error of 0.02 mm turns it by a tenth of a degree."""
+FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 0.5  # the trace's own ends are left out
+MOST_FRAMES = 12
+"""Frames that are fitted, the least deep ones: half of a trace's noise is the reference scan's, which all share, so
+that more of them tell hardly more."""
+STEP_MM, STEP_RAD, STEP_DEPTH_MM = 0.05, np.radians(0.5), 0.1
+ROUNDS, WHOLE_STEPS, SETTLED = 6, 2, 0.1
+"""Most steps of Gauss and Newton; from the third on they are halved, since contacts may make them go to and fro. It
+ends where a step is smaller than this part of the standard deviations."""
+TIP_VOXELS = 0.25
+"""What a traced tip may be off along the wire beyond its own standard deviation. It matters where rest curvature ends
+near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
+FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
+TANGENT_MM = 0.25
+SNAPS = 3.0
+"""A derivative so many times that of a rigid wire is a wire that snaps: its frame says nothing in this round."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A frame that is fitted: its number, its trace, the base's roll and the catheter's tip."""
+
+    index: int
+    curve: Curve
+    roll_deg: float = 0.0
+    catheter_mm: float = 0.0
+
+
+@dataclass(frozen=True)
+class Prior:
+    """How well the manifest knows the clamp, one standard deviation along each axis; 0 is exact."""
+
+    sigma_mm: float
+    direction_sigma_deg: float
+
+    @property
+    def sigmas(self) -> Array:
+        """Of the five unknowns (5,): mm along the direction and twice across it, and two tilts in rad."""
+        return np.array([self.sigma_mm] * 3 + [np.radians(self.direction_sigma_deg)] * 2)
+
+
+Replay = Callable[[Sequence[Clamp], Sequence[Seen], Sequence[Sequence[float]]], Sequence[Sequence[Solution]]]
+"""Insertions from several clamps: the wire of every frame, at depths for each clamp and frame."""
+
+
+def depth_from(clamp: Clamp, curve: Curve) -> float:
+    """Length of wire beyond a clamp, mm: the trace begins in the plane of the manifest's entry, not in the clamp's."""
+    return curve.length_mm + float((curve.points_mm[0] - clamp.entry_mm) @ clamp.direction)
+
+
+def axes_of(direction: Array) -> Array:
+    """Rows (3, 3): the direction, and two axes across it."""
+    across = np.eye(3)[np.argmin(np.abs(direction))]
+    first = np.cross(direction, across)
+    first /= np.linalg.norm(first)
+    return np.array([direction, first, np.cross(direction, first)])
+
+
+def moved(given: Clamp, step: Array) -> Clamp:
+    """The clamp displaced by step (5,), see ``Prior.sigmas``."""
+    axes = axes_of(given.direction)
+    direction = given.direction + step[3:] @ axes[1:]
+    return replace(given, entry_mm=given.entry_mm + step[:3] @ axes, direction=direction / np.linalg.norm(direction))
+
+
+def sights(seen: Sequence[Seen]) -> list[Sight]:
+    """The points of each trace that are fitted; nothing of a trace that is too short."""
+    found = []
+    for frame in seen:
+        arc = np.arange(FIRST_MM, min(REACH_MM, frame.curve.length_mm - LAST_MM) + 1e-9, EVERY_MM)
+        along = arc_length(frame.curve.points_mm)
+        sigma = np.interp(arc, along, frame.curve.sigma_mm)
+        knot = frame.curve.levels.get("knot_mm", np.nan)
+        found.append(Sight(frame.index, arc, at_arc(frame.curve.points_mm, arc), sigma, knot))
+    return found
+
+
+def _feet(sight: Sight, curve: Array) -> tuple[Array, Array]:
+    """Where the points' feet on a curve are: arc lengths (n,), not below 0, and tangents (n, 3) there."""
+    foot = sight.arc_mm
+    for _ in range(3):
+        tangent = at_arc(curve, foot + TANGENT_MM) - at_arc(curve, np.maximum(foot - TANGENT_MM, 0.0))
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        foot = np.maximum(foot + np.sum((sight.points_mm - at_arc(curve, foot)) * tangent, axis=1), 0.0)
+    return foot, tangent
+
+
+def _linear(wires: Sequence[Solution], sight: Sight, steps: Array) -> tuple[Array, Array, bool]:
+    """Residuals (n, 3) of a trace across the wire, their derivatives (n, 3, 6), and whether the frame can be used.
+
+    wires : of the clamp itself, of the clamp moved by each of the first steps (6,), and of a depth more by the last.
+    """
+    n = len(sight.points_mm)
+    if n == 0 or not all(wire.converged and len(wire.joints_mm) > 1 for wire in wires):
+        return np.zeros((n, 3)), np.zeros((n, 3, len(steps))), False
+    curves = [wire.joints_mm for wire in wires]
+    foot, tangent = _feet(sight, curves[0])
+    here = at_arc(curves[0], foot)
+    across = np.eye(3) - tangent[:, :, None] * tangent[:, None, :]
+    change = np.stack([(at_arc(c, foot) - here) / h for c, h in zip(curves[1:], steps, strict=True)], axis=2)
+    jacobian = across @ change
+    rigid = np.ones((n, len(steps)))
+    rigid[:, 3:5] += foot[:, None]
+    sane = bool(np.all(np.linalg.norm(jacobian, axis=1) < SNAPS * rigid))
+    return np.einsum("nij,nj->ni", across, sight.points_mm - here), jacobian, sane
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What does not change from step to step."""
+
+    seen: Sequence[Seen]
+    sights: Sequence[Sight]
+    given: Clamp
+    sigmas: Array
+    replay: Replay
+    voxel_mm: float
+
+    def look(self, at: Array) -> tuple[list[Array], list[Array], NDArray[np.bool_]]:
+        """Residuals and derivatives of each frame at values (5 + frames,), and which frames can be used."""
+        steps = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [STEP_DEPTH_MM])
+        clamps = [moved(self.given, at[:5] + d) for d in (np.zeros(5), *np.diag(steps[:5]), np.zeros(5))]
+        more = at[5:] + np.array([0.0] * 6 + [STEP_DEPTH_MM])[:, None]
+        pairs = zip(clamps, more, strict=True)
+        depths = [[max(depth_from(c, f.curve) + d, 0.1) for f, d in zip(self.seen, m, strict=True)] for c, m in pairs]
+        wires = self.replay(clamps, self.seen, depths)
+        residual, jacobian, good = [], [], np.zeros(len(self.seen), bool)
+        for i, sight in enumerate(self.sights):
+            left, slopes, good[i] = _linear([way[i] for way in wires], sight, steps)
+            wide = np.zeros((*left.shape, len(at)))
+            wide[:, :, :5], wide[:, :, 5 + i] = slopes[:, :, :5], slopes[:, :, 5]
+            residual.append(left)
+            jacobian.append(wide)
+        return residual, jacobian, good
+
+    def round(self, at: Array) -> tuple[Array, Array, list[int], int]:
+        """The next values, their covariance, the frames that disagree and how many were used."""
+        residual, jacobian, good = self.look(at)
+        out: list[int] = []
+        while True:
+            use = [i for i in range(len(good)) if good[i] and i not in out]
+            if not use:
+                return np.zeros(len(at)), np.diag(self.sigmas**2), out, 0
+            used = [self.sights[i] for i in use]
+            stacked = [np.concatenate([a[i] for i in use]) for a in (residual, jacobian)]
+            noise = covariance_of(used, self.voxel_mm)
+            mean, spread, left = posterior(stacked[0], stacked[1], noise, self.sigmas, at)
+            worst = disagreeing(left, used, self.voxel_mm)
+            if worst is None or len(use) < 3:
+                return mean, spread, out, len(use)
+            out.append(use[worst])
+
+
+def estimated_clamp(seen: Sequence[Seen], given: Clamp, prior: Prior, replay: Replay, voxel_mm: float) -> Clamp:
+    """The clamp from the traces and what the manifest says of it; the manifest's where they are too far apart.
+
+    seen : frames whose traces are to be trusted, in the order of the insertion.     voxel_mm : of the scans.
+    """
+    deepest = sorted(f.curve.length_mm for f in seen)[:MOST_FRAMES][-1:]
+    chosen = [f for f in seen if f.curve.length_mm <= deepest[0]] if deepest else []
+    given = replace(given, covariance=_in_space(given, np.diag(prior.sigmas**2)))
+    if not chosen or not prior.sigmas.any():
+        return given
+    tips = [np.nan_to_num(f.curve.tip_sigma_mm) for f in chosen]
+    sigmas = np.concatenate([prior.sigmas, np.hypot(tips, TIP_VOXELS * voxel_mm)])
+    fit = _Fit(chosen, sights(chosen), given, sigmas, replay, voxel_mm)
+    at = np.zeros(len(sigmas))
+    for number in range(ROUNDS):
+        goal, covariance, out, used = fit.round(at)
+        step = (goal - at) * (1.0 if number < WHOLE_STEPS else 0.5)
+        at = at + step
+        if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(covariance))):
+            break
+    found = moved(given, at[:5])
+    found = replace(found, covariance=_in_space(found, covariance[:5, :5]))
+    return _told(given, found, [chosen[i].index for i in out], used)
+
+
+def _in_space(clamp: Clamp, covariance: Array) -> Array:
+    """Covariance (6, 6) of the place, mm, and of the direction's change, from that of the five unknowns."""
+    axes = axes_of(clamp.direction)
+    turn = np.zeros((6, 5))
+    turn[:3, :3], turn[3:, 3:] = axes.T, axes[1:].T
+    return np.asarray(turn @ covariance @ turn.T)
+
+
+def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
+    """The clamp that was found with a note; the given one with a warning where it lies too far off."""
+    shift, turned = float(np.linalg.norm(found.entry_mm - given.entry_mm)), angle_deg(found.direction, given.direction)
+    offset = f"{shift:.2f} mm and {turned:.1f} degrees from the manifest's"
+    if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
+        warning = (
+            f"the traced wires start {offset} (accepted: {FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the "
+            "manifest's entry was kept: check entry_mm and entry_direction"
+        )
+        return replace(given, warning=warning)
+    if not used:
+        return replace(found, warning="no frame tells where the wire is held: the manifest's entry was kept")
+    note = (
+        f"the clamp was estimated from {used} frames: the solver's wire fitted to the first {REACH_MM:g} mm of the "
+        f"traces, with the manifest's entry as prior; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
+        f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
+        "this off)"
+    )
+    frames = ", ".join(map(str, out))
+    warning = (
+        f"the first {REACH_MM:g} mm of the traces of frames {frames} disagree with the others: left out of the clamp"
+    )
+    return replace(found, note=note, warning=warning if out else "")

@@ -1,0 +1,82 @@
+"""A wire that another simulator made, taken over: where it passes the entry, and what tells that it is something else.
+
+Its depth is counted as the solver's: along the wire, from the plane through the clamp across its direction.
+"""
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from pipeline.arrays.polyline import angle_deg, at_arc
+from pipeline.model import Array, arc_length
+
+AT_ENTRY_MM = 5.0
+"""Farther from the manifest's entry no wire is taken to begin there: more than the radius of any vessel that a guide
+wire of 0.4 mm is used in blindly."""
+LARGEST_TURN_DEG = 60.0
+"""Of a wire's first 2 mm from the entry's direction."""
+OVER_MM = 2.0
+ROUNDING_MM = 1e-3
+UNITS = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
+SAME = 0.15
+"""Of a unit's factor: how far the ratio of depth and length may be from it."""
+MIRROR = np.array([-1.0, -1.0, 1.0])
+
+
+def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
+    """The wire (n, 3) from the plane through the entry on: cut there, or continued back to it in a straight line."""
+    beyond = (points_mm - entry_mm) @ direction
+    if beyond[0] > ROUNDING_MM:
+        return np.concatenate([points_mm[:1] - beyond[0] * direction, points_mm])
+    crossed = np.flatnonzero((beyond[:-1] < -ROUNDING_MM) & (beyond[1:] >= -ROUNDING_MM))
+    if beyond[0] >= -ROUNDING_MM or not len(crossed):
+        return points_mm
+    share = np.clip(-beyond[crossed] / (beyond[crossed + 1] - beyond[crossed]), 0.0, 1.0)
+    places = points_mm[crossed] + share[:, None] * (points_mm[crossed + 1] - points_mm[crossed])
+    # a wire may come back to the plane farther on: its base passes nearest to the entry
+    nearest = int(np.argmin(np.linalg.norm(places - entry_mm, axis=1)))
+    rest = points_mm[crossed[nearest] + 1 :]
+    return np.concatenate([places[nearest][None], rest[np.linalg.norm(rest - places[nearest], axis=1) > 0]])
+
+
+def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
+    """Why a wire cannot be the one that was pushed in at this entry, with what would make it so; empty where it can."""
+    wrong = _misplaced(points_mm, entry_mm, direction)
+    if not wrong:
+        return ""
+    found = next((name for name, other in _readings(points_mm) if not _misplaced(other, entry_mm, direction)), "")
+    return wrong + (f": it would if it were {found}" if found else "; check its coordinates")
+
+
+def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
+    # what is added to reach the plane points along the entry by construction: it tells nothing
+    wire = points_mm if (points_mm[0] - entry_mm) @ direction > 0 else begun(points_mm, entry_mm, direction)
+    gap = float(np.linalg.norm(wire[0] - entry_mm))
+    if gap > AT_ENTRY_MM:
+        return f"its base passes {gap:.3g} mm from entry_mm and not within {AT_ENTRY_MM:g}"
+    first = at_arc(wire, np.array([min(OVER_MM, float(arc_length(wire)[-1]))]))[0] - wire[0]
+    turn = angle_deg(first, direction)
+    if turn > LARGEST_TURN_DEG:
+        return f"its first {OVER_MM:g} mm do not point along entry_direction but {turn:.0f} degrees away from it"
+    return ""
+
+
+def _readings(points_mm: Array) -> Iterator[tuple[str, Array]]:
+    """What else the numbers might be, with the points that they would then mean; fewest changes first."""
+    orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
+    spaces = {"": np.ones(3), "RAS": MIRROR}
+    units = {"": 1.0} | {f"in {name}": factor for name, factor in UNITS.items()}
+    all_of_them = [tuple(zip(*named, strict=True)) for named in product(orders.items(), spaces.items(), units.items())]
+    for names, (points, signs, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
+        if any(names):
+            yield " and ".join(filter(None, names)), points * signs * factor
+
+
+def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float) -> str:
+    """Why a wire is not one of this depth; empty where it is."""
+    if abs(length_mm - depth_mm) <= tolerance_mm:
+        return ""
+    unit = next((n for n, f in UNITS.items() if abs(np.log(depth_mm / max(length_mm, 1e-9) / f)) < SAME), "")
+    hint = f"; is it in {unit}?" if unit else ""
+    return f"it is {length_mm:.3g} mm long from the entry on, the frame {depth_mm:.2f} mm deep{hint}"

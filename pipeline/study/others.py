@@ -1,0 +1,71 @@
+"""Another simulator's wires as a manifest names them (``simulated``) and as ``wireval score --curves`` finds them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from pipeline.load.order import natural_key
+from pipeline.load.wires import KINDS, kind_of
+from pipeline.status import InputError
+from pipeline.study.sources import Sources, Strict
+
+
+class Others(Strict):
+    """The files of one case. space, unit : of coordinates that no file states; where a file does, both must agree."""
+
+    files: Sources = ()
+    space: Literal["", "LPS", "RAS"] = ""
+    unit: Literal["", "mm", "cm", "m"] = ""
+
+
+def written_out(value: Any) -> Any:
+    """A pattern or a list stands for the files alone."""
+    return {"files": value} if isinstance(value, (str, list)) else value
+
+
+def found_for(case: str, place: Path, alone: bool) -> list[str]:
+    """The files that a place holds for a case, in natural order: of ``--curves``, a folder, a file or a pattern.
+
+    A folder holds one of its own for each case (``CASE/`` or ``CASE.h5``) or is an output of `wireval run`; where the
+    manifest has one case, it may hold the files themselves. Raises InputError where none of this is so.
+    """
+    if any(mark in place.name for mark in "*?["):
+        return _sorted(place.parent.glob(place.name)) if alone else _refuse(case, place, "a pattern serves one case")
+    if place.is_file():
+        return [str(place)] if alone else _refuse(case, place, "one file serves one case")
+    named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]
+    here = next((path for path in named if path.exists()), None)
+    if here is None:
+        return _refuse(case, place, f"found neither {case}/ nor {case}.h5 in it")
+    if here.is_file():
+        return [str(here)]
+    inside = [path for path in here.iterdir() if path.is_file() and kind_of(path)]
+    kinds = sorted({kind_of(path) for path in inside})
+    if len(kinds) > 1:
+        return _refuse(case, here, f"it holds {' and '.join(kinds)} files; name one kind, as in {here}/*{kinds[0]}")
+    if here == place and not inside:
+        return _refuse(case, here, f"no {', '.join(KINDS)} in it")
+    return _sorted(inside)
+
+
+def _sorted(paths: Any) -> list[str]:
+    return [str(path) for path in sorted(paths, key=lambda path: natural_key(path.name))]
+
+
+def _refuse(case: str, place: Path, why: str) -> list[str]:
+    do = f"give a folder with {case}/ in it, one file a frame; an empty one counts every frame as failed"
+    raise InputError([f"case {case!r}: --curves {place}: {why}; {do}"])
+
+
+def named(texts: Sequence[str]) -> dict[str, Path]:
+    """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises InputError."""
+    found: dict[str, Path] = {}
+    for text in texts:
+        name, equals, place = text.rpartition("=") if "=" in text and not Path(text).exists() else ("", "", text)
+        name = name if equals else Path(place).absolute().stem
+        if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name == "wireval":
+            raise InputError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
+        if name in found:
+            raise InputError([f"--curves {text!r}: the name {name!r} is taken; write NAME={place}"])
+        found[name] = Path(place)
+    return found

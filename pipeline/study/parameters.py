@@ -1,0 +1,150 @@
+"""parameters.toml: what ``wireval calibrate`` found, and the cases of a study as they are with it.
+
+A case is known again by the content of its frames and traces, whatever it is called: one that was calibrated with says
+nothing about the model, and is not scored unless that is asked for.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.status import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from pipeline.study.manifest import Case
+
+
+class Table(BaseModel):
+    """Unknown keys are errors; values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class WallFound(Table):
+    """A wall as calibrated, known by the stiffness that the manifest states."""
+
+    stated_N_mm2: Positive
+    stiffness_N_mm2: Positive
+
+
+class Found(Table):
+    """An estimate: a value with its standard deviation (of its logarithm where it is a factor), and what is used."""
+
+    name: str
+    value: Finite
+    sd: NonNegative
+    logarithmic: bool
+    seen: bool
+    used: Finite
+    why: str = ""
+
+
+class Used(Table):
+    """A case that was calibrated with. data : SHA-256 of each of its frames and traces."""
+
+    case: str
+    group: str
+    data: tuple[str, ...]
+
+
+class Parameters(Table):
+    """The whole file. bending_... and rest_... : of the wire, as profiles of the manifest."""
+
+    schema_: Annotated[Literal[1], Field(alias="schema")]
+    wire: str
+    bending_stiffness_N_mm2: PositiveProfile
+    rest_curvature_per_mm: FiniteProfile
+    friction: NonNegative
+    roll_offset_deg: Finite
+    depth_offset_mm: Finite
+    absolute_stiffness: bool
+    wall: tuple[WallFound, ...]
+    estimate: tuple[Found, ...] = ()
+    used: tuple[Used, ...] = ()
+
+    @property
+    def unseen(self) -> list[str]:
+        """Names of what the calibration could not see: as stated there."""
+        return [found.name for found in self.estimate if not found.seen]
+
+
+class ParametersError(InputError):
+    """Parameters that cannot be used."""
+
+    place = "the parameters"
+
+
+def read_parameters(path: Path) -> Parameters:
+    """Read parameters.toml; raises ParametersError."""
+    try:
+        return Parameters.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        raise ParametersError(
+            [f"{path}: no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"]
+        ) from None
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParametersError([f"{path}: cannot be read as TOML: {error}"]) from None
+    except ValidationError as error:
+        raise ParametersError([_sentence(path, dict(item)) for item in error.errors()]) from None
+
+
+def _sentence(path: Path, error: Mapping[str, Any]) -> str:
+    where = ".".join(map(str, error["loc"]))
+    if error["type"] == "extra_forbidden":
+        names = {field.alias or name for name, field in Parameters.model_fields.items()}
+        return f"{path}: {where}: unknown key; {did_you_mean(where, names)}"
+    found = f"; found {error['input']!r}" if not isinstance(error["input"], (dict, list)) else ""
+    return f"{path}: {where}: {error['msg']}{found}; write it as wireval calibrate did"
+
+
+def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Case":
+    """A case with calibrated wire, wall, roll and depths; ParametersError where they are another wire's.
+
+    data : SHA-256 of its frames and traces. A case that was calibrated with is one for calibration from here on.
+    """
+    if case.wire.name != found.wire:
+        what = f"case {case.id!r}: its wire is {case.wire.name!r}, the parameters are those of {found.wire!r}"
+        raise ParametersError([f"{what}; calibrate this wire, or take the parameters off this case"])
+    from dataclasses import replace
+
+    profiles = {name: getattr(found, name) for name in ("bending_stiffness_N_mm2", "rest_curvature_per_mm")}
+    stiffness = {w.stated_N_mm2: w.stiffness_N_mm2 for w in found.wall}.get(case.wall.stiffness_N_mm2)
+    changes: dict[str, Any] = {
+        "wire": replace(case.wire, **profiles),
+        "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=found.friction),
+        "calibrated": _told(case, found, known_wall=stiffness is not None),
+    }
+    if case.roll_deg != "fit":
+        rolls = case.roll_deg if isinstance(case.roll_deg, tuple) else (case.roll_deg,)
+        turned = tuple(roll + found.roll_offset_deg for roll in rolls)
+        changes["roll_deg"] = turned if isinstance(case.roll_deg, tuple) else turned[0]
+    if case.insertion_mm is not None:
+        changes["insertion_mm"] = tuple(max(mm + found.depth_offset_mm, 1e-3) for mm in case.insertion_mm)
+    own = sharing(found, data)
+    if own:
+        warning = f"its scans or traces were calibrated with (as case {own!r}): its errors say nothing about the model"
+        changes |= {"role": "calibration", "own_parameters": warning}
+    return case.model_copy(update=changes)
+
+
+def sharing(found: Parameters, data: Sequence[str]) -> str:
+    """Which calibrated case has a frame or a trace with these in common; empty where none has."""
+    return next((one.case for one in found.used if set(one.data) & set(data)), "")
+
+
+def _told(case: "Case", found: Parameters, *, known_wall: bool) -> str:
+    """For the report: what was taken, and what of it the calibration could not see."""
+    parts = [f"wire, wall, friction, roll and depth offset are calibrated with {', '.join(u.case for u in found.used)}"]
+    if found.unseen:
+        parts.append(f"not seen there, as stated: {', '.join(found.unseen)}")
+    if any(case.group == used.group for used in found.used):
+        parts.append(f"a case of the same group, {case.group!r}, was among them")
+    if not known_wall:
+        parts.append(f"no wall stated at {case.wall.stiffness_N_mm2:g} N/mm2 was calibrated: as stated")
+    if not found.absolute_stiffness:
+        parts.append("stiffness is known in its ratios alone: forces are in units of the stated one")
+    return "; ".join(parts)

@@ -1,0 +1,110 @@
+"""What a manifest may write where a file is meant: paths, patterns in natural order, a lumen with its label."""
+
+import itertools
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from pipeline.load import Source
+from pipeline.load.geometry import Mask
+from pipeline.load.order import natural_key
+
+WHOLE_CASE = "whole_case"
+"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
+MOST_MATCHES, LONGEST_PATTERN, LONGEST_NAME = 20_000, 4000, 255
+
+
+def saying(*problems: str) -> PydanticCustomError:
+    """The error that says these sentences and nothing else."""
+    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
+
+
+def _source(value: Any, info: ValidationInfo) -> Source:
+    """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
+    if not isinstance(value, str):
+        raise ValueError("Input should be a valid string")
+    name, _, dataset = value.partition("#")
+    _require_name(name, info)
+    return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
+
+
+def _require_name(name: str, info: ValidationInfo) -> None:
+    """An error for what is no path, or leads out of the study without being absolute."""
+    if not name.strip() or "\0" in name:
+        raise saying(f"{info.field_name} = {name!r}: an empty name; name a file, or leave the key out")
+    longest = max(len(part.encode()) for part in name.split("/"))
+    if len(name) > LONGEST_PATTERN or longest > LONGEST_NAME:
+        allowed = f"allowed: {LONGEST_NAME}, and {LONGEST_PATTERN} for a whole path"
+        raise saying(f"{info.field_name}: a name of {longest} bytes in a path of {len(name)}; {allowed}")
+    if not Path(name).is_absolute() and Path(os.path.normpath(name)).parts[:1] == ("..",):
+        where = "leads out of the manifest's folder; give such a path as an absolute one"
+        raise saying(f"{info.field_name} = {name!r} {where}")
+
+
+def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
+    """A list of sources, or a pattern whose matches come in natural order."""
+    if isinstance(value, list):
+        if not value:
+            raise saying(f"{info.field_name} = []: an empty list; name files, or leave the key out")
+        return tuple(_source(item, info) for item in value)
+    source = _source(value, info)
+    pattern = value.partition("#")[0]
+    if not any(mark in pattern for mark in "*?["):
+        return (source,)
+    base, relative = _base(pattern, info)
+    try:
+        matches = list(itertools.islice(base.glob(relative), MOST_MATCHES + 1))
+    except (ValueError, NotImplementedError, OSError, RecursionError):
+        raise saying(f"{info.field_name} = {value!r} is no pattern; write names with *, ? and [...]") from None
+    found = sorted(matches, key=lambda path: natural_key(path.relative_to(base).as_posix()))
+    if not found:
+        raise saying(f"{info.field_name} = {value!r} matches no file below {base}")
+    if len(found) > MOST_MATCHES:
+        raise saying(f"{info.field_name} = {value!r} matches more than {MOST_MATCHES} files; make it narrower")
+    return tuple(Source(path, source.dataset) for path in found)
+
+
+def _base(pattern: str, info: ValidationInfo) -> tuple[Path, str]:
+    """The folder from which a pattern looks, and the pattern from there on."""
+    path = Path(pattern)
+    if not path.is_absolute():
+        return Path((info.context or {}).get("folder", "")), pattern
+    fixed = list(itertools.takewhile(lambda part: not any(mark in part for mark in "*?["), path.parts))
+    if len(fixed) < 2:
+        raise saying(f"{info.field_name} = {pattern!r} looks through the whole machine; name a folder")
+    return Path(*fixed), str(Path(*path.parts[len(fixed) :]))
+
+
+def _mask(value: Any, info: ValidationInfo) -> Mask:
+    """A file, or ``{file = ..., label = 2}``, ``{file = ..., label = "artery"}``, ``{file = ..., level = 0.5}``."""
+    if not isinstance(value, dict):
+        return _masked(_source(value, info), None, None)
+    label, level = value.get("label"), value.get("level")
+    unknown = set(value) - {"file", "label", "level"}
+    if unknown or "file" not in value or (label is not None and level is not None):
+        allowed = "file, and label (a number or a name) or level (above 0, below 1)"
+        raise saying(f"lumen holds {', '.join(sorted(map(str, value)))}; allowed: {allowed}")
+    if label is not None and (isinstance(label, bool) or not isinstance(label, (int, str)) or label in ("", 0)):
+        raise saying(f"lumen: label = {label!r}; allowed: a number that is not 0, or a name")
+    if level is not None and not (isinstance(level, (int, float)) and not isinstance(level, bool) and 0 < level < 1):
+        raise saying(f"lumen: level = {level!r}; allowed: a number above 0 and below 1")
+    return _masked(_source(value["file"], info), label, level)
+
+
+def _masked(source: Source, label: int | str | None, level: float | None) -> Mask:
+    return Mask(source.path, source.dataset, source.item, label, level)
+
+
+SourceText = Annotated[Source, BeforeValidator(_source)]
+MaskText = Annotated[Mask, BeforeValidator(_mask)]
+Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
+PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
+
+
+class Strict(BaseModel):
+    """Unknown keys are errors; values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

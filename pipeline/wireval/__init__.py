@@ -1,0 +1,113 @@
+"""wireval for scripts and notebooks: the verbs of the command line as functions, results as pandas frames, the solver.
+
+    import wireval
+
+    wireval.check("study/manifest.toml")                          # [] where nothing is wrong
+    results = wireval.run("study/manifest.toml", "out", jobs=2)
+    results.errors.plot(x="insertion_mm", y="rms_mm")
+
+Here is no code of its own: ``check``, ``run``, ``score`` and ``calibrate`` are the verbs as typed, everything else is
+re-exported. What cannot be used raises ``InputError`` (or ``StageError``, where a scan shows nothing to go by) with the
+sentences of the terminal.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pipeline.cli import BAD_INPUT, carried_out, parsed
+from pipeline.compare import point_to_curve
+from pipeline.status import InputError, StageError
+from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
+
+from .results import Results, read_results
+
+__all__ = [
+    "Catheter",
+    "Grid",
+    "GuideWire",
+    "InputError",
+    "Insertion",
+    "Insertions",
+    "Results",
+    "Snap",
+    "Solution",
+    "StageError",
+    "Status",
+    "VesselWall",
+    "calibrate",
+    "check",
+    "point_to_curve",
+    "read_results",
+    "relax",
+    "run",
+    "score",
+]
+
+Place = str | Path
+Settings = Mapping[str, bool | float | str | Sequence[object]]
+"""``{"solver.segment_mm": 0.5}``: what --set takes, by table.key; `wireval settings` lists them."""
+
+
+def check(manifest: Place, *, settings: Settings | None = None) -> list[str]:
+    """Every problem of a manifest, or of a folder of scans, each a sentence; empty where none is found.
+
+    Headers are read, no voxels, except where a manifest is inferred from scans.
+    """
+    try:
+        _carried_out("check", manifest, settings=settings)
+    except InputError as error:
+        return list(error.problems)
+    except StageError as error:
+        return [str(error)]
+    return []
+
+
+def run(
+    manifest: Place,
+    out: Place,
+    *,
+    settings: Settings | None = None,
+    jobs: int = 1,
+    sweep: Mapping[str, Sequence[object]] | None = None,
+    **more: bool | str | Sequence[str],
+) -> Results:
+    """Run the whole pipeline over every case of a manifest (or of a folder of scans) into a folder; the results.
+
+    sweep : ``{"simulate.wall_scale": [0.5, 2]}`` runs again with each of these values.     more : any other option of
+    ``wireval run`` by its long name, as ``fresh=True``, ``only=["run1"]``, ``until="trace"``, ``quiet=True``.
+
+    A frame or case that fails raises nothing: ``results.failures`` has its sentence. Running the same again keeps what
+    is finished. Raises InputError where nothing could be run.
+    """
+    points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
+    _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, **more)
+    return read_results(out)
+
+
+def score(manifest: Place, out: Place, curves: Sequence[str], **more: bool | int | str | Settings) -> Results:
+    """Judge other simulators' wires: ``curves`` as ``["mine=DIR", ...]``; the results of the first one.
+
+    Those of the others: ``read_results(out / "simulators" / NAME)``.     more : options of ``wireval score``.
+    """
+    _carried_out("score", manifest, out=out, curves=list(curves), **more)
+    return read_results(out)
+
+
+def calibrate(manifest: Place, out: Place, **more: bool | Settings) -> Path:
+    """Parameters from the cases whose role is calibration: the file that ``run`` takes. more : as for ``score``."""
+    _carried_out("calibrate", manifest, out=out, **more)
+    return Path(out) / "parameters.toml"
+
+
+def _carried_out(verb: str, manifest: Place, settings: object = None, **options: object) -> None:
+    """The verb as typed with these options. A list repeats its option, True stands for one alone."""
+    words = [verb, str(manifest)]
+    for key, wanted in (settings if isinstance(settings, Mapping) else {}).items():
+        words += ["--set", f"{key}={json.dumps(wanted)}"]
+    for name, value in options.items():
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            if one is not None and one is not False:
+                words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
+    if carried_out(parsed(words)) == BAD_INPUT:
+        raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])

@@ -1,0 +1,74 @@
+"""What a run left in its folder, as pandas frames."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from pipeline.status import InputError
+from reports import tables
+from reports.case_files import CaseFiles, find_cases, read_case
+from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """The tables of a run; the columns are those of the files, docs/reference/columns.md explains them.
+
+    summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
+    of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
+    cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.
+    """
+
+    out: Path
+    summary: pd.DataFrame
+    overall: pd.DataFrame
+    errors: pd.DataFrame
+    failures: pd.DataFrame
+    sweep: pd.DataFrame
+    cases: dict[str, CaseFiles]
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is a case, and all frames of all cases are ok."""
+        return bool(len(self.summary)) and len(self.failures) == 0
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """Every compared point of all cases; read when asked for, since it is by far the largest table."""
+        return _of_all({name: tables.read_if_there(c.folder / POINTS.file, POINTS) for name, c in self.cases.items()})
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a row a case."""
+        shown = [
+            "case",
+            "status",
+            "frames",
+            "frames_ok",
+            "rms_mm",
+            "tip_median_mm",
+            "skill_strongest",
+            "strongest_null",
+        ]
+        return str(self.summary[shown].to_html(index=False))
+
+
+def read_results(out: str | Path) -> Results:
+    """Read the folder that ``wireval run`` wrote; raises InputError where it is none."""
+    out = Path(out)
+    cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
+    if not cases:
+        raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
+
+    def table(kind: Table, name: str = "") -> pd.DataFrame:
+        return tables.read_if_there(out / (name or kind.file), kind)
+
+    whole = table(SUMMARY, OVERALL_FILE)
+    errors = _of_all({name: case.errors for name, case in cases.items()})
+    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), cases)
+
+
+def _of_all(by_case: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """The tables of the cases below each other, with the case in front."""
+    whole = pd.concat(by_case, names=["case", None]).reset_index("case").reset_index(drop=True)
+    return whole.astype({"case": "string"})

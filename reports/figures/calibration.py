@@ -1,0 +1,86 @@
+"""The figures of a calibration, from what calibration.json holds."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports.colours import BAD, SIMULATED
+from reports.figures._drawing import Drawing, lattice, legend, new_figure, plain, positive_axis
+from reports.figures._style import BROWN, GREY
+
+HIGHEST = 12.0
+"""Rise up to which profiles are drawn: what lies above is out of the question."""
+
+
+def profiles(record: Mapping[str, Any]) -> Drawing | None:
+    """A panel for each parameter."""
+    rows = {row["name"]: row for row in record["estimates"]}
+    found = {name: points for name, points in record["profiles"].items() if points}
+    if not found:
+        return None
+    figure, panels = lattice(len(found), 3, row_inch=2.3)
+    table = []
+    for axes, (name, points) in zip(panels, found.items(), strict=True):
+        row = rows[name]
+        curve = np.array(sorted([*points, [row["value"], 0.0]]))
+        axes.plot(curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9), color=SIMULATED, marker=".", markersize=4)
+        axes.plot([row["value"]], [0.0], color=SIMULATED, marker="o")
+        axes.axhline(1.0, color=GREY, linestyle="--", linewidth=0.8)
+        low, high = _span(row)
+        if low < row["prior"] < high:
+            axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
+        axes.set_xlim(low, high)
+        axes.locator_params(axis="x", nbins=4)
+        axes.set_ylim(-0.4, HIGHEST)
+        verdict = "" if row["seen"] else ": not seen"
+        axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
+        plain(axes)
+        table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
+    return Drawing(figure, pd.DataFrame(table))
+
+
+def _span(row: Mapping[str, Any]) -> tuple[float, float]:
+    """Values three standard deviations to both sides."""
+    if row["logarithmic"]:
+        return row["value"] * np.exp(-3.0 * row["sd"]), row["value"] * np.exp(3.0 * row["sd"])
+    return row["value"] - 3.0 * row["sd"], row["value"] + 3.0 * row["sd"]
+
+
+def correlations(record: Mapping[str, Any]) -> Drawing | None:
+    """A square of numbers."""
+    names, values = record["correlation"]["names"], np.array(record["correlation"]["values"], dtype=float)
+    if len(names) < 2:
+        return None
+    figure = new_figure(0.5 * len(names) + 1.4, width_inch=0.7 * len(names) + 2.4)
+    axes = figure.subplots()
+    axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    for i, j in np.ndindex(*values.shape):
+        shade = "white" if abs(values[i, j]) > 0.6 else "black"
+        axes.text(j, i, f"{values[i, j]:.2f}", ha="center", va="center", fontsize=8, color=shade)
+    axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=8)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    return Drawing(figure, pd.DataFrame(values, columns=names).assign(parameter=names))
+
+
+def residuals(record: Mapping[str, Any]) -> Drawing | None:
+    """A panel for each insertion, in the order of its frames."""
+    table = pd.DataFrame(record["frames"])
+    if not len(table):
+        return None
+    cases = list(dict.fromkeys(table["case"]))
+    figure, panels = lattice(len(cases), 3, row_inch=2.4, more_inch=0.3)
+    for axes, case in zip(panels, cases, strict=True):
+        own = table[table["case"] == case]
+        for column, colour, label in (("before_mm", GREY, "as stated"), ("after_mm", SIMULATED, "calibrated")):
+            axes.plot(own["frame"], own[column], color=colour, marker="o", markersize=3.5, linewidth=1.0, label=label)
+        light = own[own["weight"] < 0.99]
+        axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
+        axes.set_title(str(case), fontsize=9)
+        axes.set_xlabel("frame")
+        plain(axes)
+        positive_axis(axes, [own["before_mm"].dropna(), own["after_mm"].dropna()])
+    panels[0].set_ylabel("mm rms")
+    legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
+    return Drawing(figure, table)

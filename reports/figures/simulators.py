@@ -1,0 +1,60 @@
+"""Several simulators side by side: error along the wire and over depth, and who is nearest where."""
+
+from dataclasses import dataclass
+from itertools import cycle
+
+import pandas as pd
+from matplotlib.axes import Axes
+
+from reports.colours import SIMULATED, TRACED, TRUE
+from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
+from reports.figures._style import BROWN, PURPLE, ROSE, SLATE
+
+OURS = "wireval"
+_FAINT = 0.3  # of a lead that is not clear
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatorFiles:
+    """Tables of a comparison: simulators.csv and where.csv."""
+
+    simulators: pd.DataFrame
+    where: pd.DataFrame
+
+
+def colours(names: "pd.Series[str]") -> dict[str, str]:
+    """The solver's own in its colour, every other simulator in one of its own."""
+    spare = cycle((TRACED, TRUE, PURPLE, BROWN, ROSE, SLATE))
+    return {name: SIMULATED if name == OURS else next(spare) for name in dict.fromkeys(names)}
+
+
+def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
+    """Error in bins of the distance from the tip and of the depth; a strip below with the colour of the nearest."""
+    where = files.where
+    if where.empty:
+        return None
+    figure = new_figure(4.4, 10.0)
+    panels = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(14, 1))
+    shown = colours(where["simulator"])
+    for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
+        for name, mine in rows.groupby("simulator", sort=False):
+            middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
+            axes.plot(middle, mine["rms_mm"], "o-", color=shown[str(name)], label=str(name), markersize=4)
+        plain(axes)
+        _nearest(strip, rows, shown)
+        strip.set_xlabel(f"{along}, mm")
+    positive_axis(panels[0, 0], [where["rms_mm"]])
+    panels[0, 0].invert_xaxis()
+    panels[0, 0].set_ylabel("rms distance to the traced wire, mm")
+    panels[1, 0].set_ylabel("nearest", rotation=0, ha="right", va="center", fontsize=8)
+    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    return Drawing(figure, where)
+
+
+def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:
+    """A strip with the colour of the nearest in each bin; white where several are as near."""
+    for row in rows[rows["lead"].notna() & (rows["lead"] != "tie")].to_dict("records"):
+        alpha = 1.0 if row["lead"] == "clear" else _FAINT
+        span = row["low_mm"], row["high_mm"]
+        axes.axvspan(*span, color=shown[row["simulator"]], alpha=alpha, linewidth=0)
+    axes.set_yticks([])

@@ -1,0 +1,167 @@
+"""A run as four pages on paper (``wireval report --pdf``): verdict, distribution, worst case, cases and settings."""
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from reports import _content, colours
+from reports.atomic import replacing
+from reports.case_files import WORST, read_case, read_json
+from reports.figures import declared
+from reports.html import draw_sections
+from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
+from reports.tables import read_if_there
+from reports.verdict import next_command, verdict, worst_frames
+
+_A4_INCH = (8.27, 11.69)
+_LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
+_MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
+_LEAST_WIDTH = 0.3  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
+_LINE = 0.0165  # of the page's height, for type of 9 points
+
+
+class _Page:
+    """A page that is filled from the top."""
+
+    def __init__(self, title: str) -> None:
+        self.figure = Figure(figsize=_A4_INCH)
+        self.at = _TOP
+        self.text(title, size=14, weight="bold")
+
+    def text(self, text: str, size: float = 9, width: int = 104, colour: str = "black", **look: Any) -> None:
+        """A paragraph, broken at ``width`` characters of 9 points; what does not fit the page is left out."""
+        lines = textwrap.wrap(text, round(width * 9 / size)) or [""]
+        step = _LINE * size / 9
+        for line in lines:
+            if self.at < _BOTTOM + step:
+                return
+            self.figure.text(_LEFT, self.at, line, size=size, va="top", color=colour, **look)
+            self.at -= step
+        self.at -= 0.4 * step
+
+    def picture(self, path: Path, entry: Mapping[str, str], most: float) -> None:
+        """A figure with its title and caption, at full width or as high as ``most`` of the page and as its rest."""
+        image = imread(path)
+        room = min(most, self.at - _BOTTOM - 5 * _LINE)
+        wide = _RIGHT - _LEFT
+        high = wide * image.shape[0] / image.shape[1] * _A4_INCH[0] / _A4_INCH[1]
+        shrink = min(1.0, room / high)
+        if shrink < _LEAST_WIDTH:
+            return
+        self.text(entry["title"], size=10.5, weight="bold")
+        axes = self.figure.add_axes((_LEFT, self.at - shrink * high, shrink * wide, shrink * high))
+        axes.imshow(image, interpolation="antialiased")
+        axes.set_axis_off()
+        self.at -= shrink * high + 0.015
+        self.text(entry["read"], size=8)
+
+    def table(self, rows: Sequence[Sequence[str]], widths: Sequence[float]) -> None:
+        """Rows of texts, the first as heading; ``widths``: of the columns, in sum the page's."""
+        for number, row in enumerate(rows):
+            if self.at < _BOTTOM + _LINE:
+                return
+            left = _LEFT
+            for text, width in zip(row, widths, strict=True):
+                shown = textwrap.shorten(str(text), max(round(width * 135), 4), placeholder="…")
+                self.figure.text(left, self.at, shown, size=7.5, va="top", weight="bold" if number == 0 else "normal")
+                left += width
+            self.at -= 0.85 * _LINE
+        self.at -= 0.5 * _LINE
+
+
+def write_pdf(out_dir: Path) -> Path:
+    """Write summary.pdf beside index.html; returns its path. The figures are those of the pages."""
+    summary = _content.worst_first(read_if_there(out_dir / SUMMARY.file, SUMMARY))
+    path = out_dir / "summary.pdf"
+    with replacing(path) as temporary, PdfPages(temporary, metadata={"CreationDate": None}) as pdf:
+        for page in _pages(out_dir, summary):
+            page.figure.text(_RIGHT, 0.02, f"{pdf.get_pagecount() + 1} of 4", size=8, ha="right")
+            pdf.savefig(page.figure)
+    return path
+
+
+def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[_Page]:
+    whole = read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    run = read_json(out_dir / "run.json")
+    yield _first(out_dir, summary, whole, run)
+    yield _figures("Over all cases", out_dir, ("planned_within", "cases_by_error"))
+    yield _worst_case(out_dir, summary)
+    yield _last(summary, run)
+
+
+def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
+    """Verdict, failures with the next command, tiles."""
+    failures = read_if_there(out_dir / FAILURES.file, FAILURES)
+    page = _Page("Guide-wire validation")
+    ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
+    row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    page.text(f"{len(summary)} cases, {ok} of {planned} frames have a result. {verdict(row)}", size=11)
+    if len(failures):
+        page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
+        said = failures[["case", "frame", "status", "message"]].head(_MOST_FAILURES)
+        for case, frame, status, text in said.to_numpy():
+            place = f"{case}" if pd.isna(frame) else f"{case}, frame {frame}"
+            page.text(f"{place}: {status}. {textwrap.shorten(str(text), 300, placeholder='…')}")
+        if len(failures) > _MOST_FAILURES:
+            page.text(f"… and {len(failures) - _MOST_FAILURES} more in failures.csv")
+        typed = run.get("provenance", {}).get("argv", ())
+        page.text(f"Next: do what the message says, then {next_command(failures['case'], typed)}", weight="bold")
+    for card in _content.overall(declared("overall"), whole):
+        page.text(f"{card['value']}  {card['label']}")
+    return _draw(page, out_dir, ("case_frame_map",))
+
+
+def _figures(title: str, folder: Path, names: Sequence[str]) -> _Page:
+    """A page of figures that a page on the screen has drawn, as far as there are any, with their captions."""
+    return _draw(_Page(title), folder, names)
+
+
+def _draw(page: _Page, folder: Path, names: Sequence[str]) -> _Page:
+    entries = {entry["figure"]: entry for part in ("run", "case") for entry in declared(part)}
+    for name in names:
+        path = folder / "figures" / f"{name}.png"
+        if path.exists():
+            page.picture(path, entries[name], most=0.38)
+    return page
+
+
+def _worst_case(out_dir: Path, summary: pd.DataFrame) -> _Page:
+    """The case with the greatest pooled WORST of those with a result, by its own figures."""
+    known = summary[summary[WORST].notna()]
+    worst = (known.sort_values(WORST) if len(known) else summary)["case"]
+    name = str(worst.iloc[-1]) if len(worst) else ""
+    folder = out_dir / "cases" / name
+    case = read_case(folder)
+    if not (folder / "figures").exists():
+        draw_sections("case", case, folder, embed=False)
+    page = _figures(f"The worst case: {name}", folder, ("error_by_depth", "projections"))
+    frames = [f"{row['frame']} ({row['text']} mm)" for row in worst_frames({name: case.errors}, {})]
+    page.text(f"Worst frames by {WORST}: {', '.join(frames)}." if frames else "No frame has an error.")
+    return page
+
+
+def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
+    """Cases, worst first; settings that are not defaults; versions."""
+    page = _Page("Cases, worst first")
+    heads = ("case", "status", "frames", "rms_mm", "p95_mm", "tip_median_mm", "skill_strongest")
+    rows = [
+        [str(row["case"]), str(row["status"]), f"{row['frames_ok']} of {row['frames']}"]
+        + [_content.number(row[name]) for name in heads[3:]]
+        for row in summary.head(_MOST_CASES).to_dict("records")
+    ]
+    page.table([heads, *rows], (0.22, 0.17, 0.08, 0.07, 0.07, 0.12, 0.11))
+    if len(summary) > _MOST_CASES:
+        page.text(f"… and {len(summary) - _MOST_CASES} more in summary.csv")
+    page.text("Settings that are not defaults", size=10.5, weight="bold")
+    chosen = [row for row in _content.settings(run.get("config", {})) if row[2] != "default"]
+    page.table([("setting", "value", "from"), *chosen[:_MOST_SETTINGS]], (0.3, 0.34, 0.2))
+    known = dict(_content.flatten(run.get("provenance", {})))
+    names = [name for name in ("wireval", "git_commit", "python") if name in known]
+    page.text("; ".join(f"{name} {known[name]}" for name in names), size=8)
+    return page

@@ -1,0 +1,114 @@
+// What every page does: tables that sort, filter and copy; contents that follow; folded parts that open for links and paper.
+(() => {
+  "use strict";
+  document.documentElement.classList.add("js");
+  const all = (selector, within = document) => [...within.querySelectorAll(selector)];
+
+  // A cell's number for sorting: what data-value says, else its text.
+  const valueOf = (cell) => {
+    const text = (cell.dataset.value ?? cell.firstChild?.textContent ?? "").trim();
+    const number = Number(text);
+    return text !== "" && Number.isFinite(number) ? number : text;
+  };
+  const inOrder = (a, b, down) => {
+    if (a === "" || b === "") return a === b ? 0 : a === "" ? 1 : -1; // empty cells last, whichever way
+    const way = typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), "en", { numeric: true });
+    return down ? -way : way;
+  };
+
+  const sortBy = (table, head, down) => {
+    const body = table.tBodies[0], at = head.cellIndex;
+    const rows = [...body.rows].map((row, i) => ({ row, i, value: valueOf(row.cells[at]) }));
+    rows.sort((a, b) => inOrder(a.value, b.value, down) || a.i - b.i);
+    body.append(...rows.map(({ row }) => row));
+    all("th", table).forEach((other) => other.removeAttribute("aria-sort"));
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+  };
+
+  const textOf = (cell) => (cell.querySelector("button") ?? cell).innerText.replace(/[\u2191\u2193]/g, "").replace(/\s*\n\s*/g, " ").trim();
+  const headOf = (cell) => cell.dataset.name ?? textOf(cell);
+  const contentOf = (table) => [
+    [...table.tHead.rows[0].cells].map(headOf),
+    ...[...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => [...row.cells].map(textOf)),
+  ];
+  const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
+  const tex = (text) => text.replace(/\\/g, "\\textbackslash ").replace(/[&%$#_{}]/g, "\\$&").replace(/~/g, "\\textasciitilde ").replace(/\^/g, "\\textasciicircum ");
+  const forms = {
+    CSV: (rows) => rows.map((row) => row.map(quoted).join(",")).join("\n") + "\n",
+    Markdown: ([head, ...rows]) => {
+      const line = (cells) => `| ${cells.map((c) => c.replace(/\|/g, "\\|")).join(" | ")} |`;
+      return [line(head), line(head.map(() => "---")), ...rows.map(line)].join("\n") + "\n";
+    },
+    LaTeX: ([head, ...rows]) => {
+      const line = (cells) => `${cells.map(tex).join(" & ")} \\\\`;
+      return [`\\begin{tabular}{${"r".repeat(head.length)}}`, "\\hline", line(head), "\\hline", ...rows.map(line), "\\hline", "\\end{tabular}"].join("\n") + "\n";
+    },
+  };
+
+  const copy = async (text, button) => {
+    const before = button.textContent;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch { // a browser that keeps the clipboard from pages of the disk
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    button.textContent = "copied";
+    setTimeout(() => { button.textContent = before; }, 1200);
+  };
+
+  for (const box of all("[data-table]")) {
+    const table = box.querySelector("table"), count = box.querySelector("output");
+    all("thead th", table).forEach((head) => {
+      head.querySelector("button")?.addEventListener("click", () => sortBy(table, head, head.getAttribute("aria-sort") === "ascending"));
+    });
+    const show = () => {
+      const words = box.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean);
+      const only = box.querySelector("select")?.value ?? "";
+      let seen = 0;
+      for (const row of table.tBodies[0].rows) {
+        const text = row.textContent.toLowerCase();
+        row.hidden = !words.every((word) => text.includes(word)) || (only === "bad" && !row.classList.contains("bad")) || (only === "good" && row.classList.contains("bad"));
+        seen += !row.hidden;
+      }
+      count.textContent = `${seen} of ${table.tBodies[0].rows.length} rows`;
+    };
+    all("input, select", box).forEach((control) => control.addEventListener("input", show));
+    all("button[data-copy]", box).forEach((button) => button.addEventListener("click", () => copy(forms[button.dataset.copy](contentOf(table)), button)));
+    show();
+  }
+  all("button[data-text]").forEach((button) => button.addEventListener("click", () => copy(button.dataset.text, button)));
+
+  const open = () => {
+    const aim = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    for (let part = aim && aim.closest("details"); part; part = part.parentElement.closest("details")) part.open = true;
+  };
+  addEventListener("hashchange", open);
+  open();
+  // paper has no folds: all parts open before printing, and go back after
+  let folded = [];
+  addEventListener("beforeprint", () => { folded = all("details:not([open])"); folded.forEach((part) => { part.open = true; }); });
+  addEventListener("afterprint", () => folded.forEach((part) => { part.open = false; }));
+
+  // a page whose template lists no contents gets them from its headings
+  const nav = document.querySelector("nav.contents");
+  if (!nav.children.length) for (const head of all("main h2[id]")) {
+    const link = document.createElement("a");
+    link.href = `#${head.id}`;
+    link.textContent = head.textContent;
+    nav.append(link);
+  }
+  const links = new Map(all("nav.contents a[href^='#']").map((link) => [link.hash.slice(1), link]));
+  const watcher = new IntersectionObserver((seen) => {
+    for (const { target, isIntersecting } of seen) if (isIntersecting) {
+      links.forEach((link) => { link.classList.remove("here"); link.removeAttribute("aria-current"); });
+      links.get(target.id).classList.add("here");
+      links.get(target.id).setAttribute("aria-current", "true");
+    }
+  }, { rootMargin: "0px 0px -75% 0px" });
+  links.forEach((_, id) => { const part = document.getElementById(id); if (part) watcher.observe(part); });
+})();

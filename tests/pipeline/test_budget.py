@@ -1,0 +1,269 @@
+"""The budget: draws, lumens that lie elsewhere, errors over their uncertainty, frames with two shapes, the files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.budget import SOURCES, Nominal, Seen, alone, drawn, frame_budget, releases, sigmas_of
+from pipeline.budget.inputs import FRICTION, ROLL_DEG, Sigmas
+from pipeline.budget.shapes import Shapes, energy_score_mm, parted, shapes_of
+from pipeline.budget.surface import offset_field
+from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
+from pipeline.cli import main
+from pipeline.model import Array, Clamp, Wire
+from pipeline.simulate.config import SimulateConfig
+from pipeline.study.manifest import ManifestError, read_manifest
+from reports import tables
+from reports.figures import figures_of
+from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY
+from solver import Grid
+
+WIRE = Wire("w", 0.18, [(0.0, 0.5), (30.0, 5.0)], [(0.0, 0.12), (8.0, 0.12), (8.0, 0.0)])
+ALONG_Z = np.column_stack([np.zeros(61), np.zeros(61), np.linspace(0.0, 30.0, 61)])
+
+
+def nominal(*, traced: bool = True, friction: float = 0.0) -> Nominal:
+    covariance = np.diag([0.04, 0.01, 0.01, 1e-4, 1e-4, 0.0])
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), covariance=covariance)
+    return Nominal(clamp, np.array([10.0, 20.0]), np.zeros(2), SimulateConfig(friction=friction), traced)
+
+
+def sigmas(of: Nominal, **stated: float) -> Sigmas:
+    return sigmas_of(stated, of, WIRE, np.full(2, 0.1), 0.3)
+
+
+def test_a_lumen_moves_by_what_is_said_and_as_smoothly_along_all_axes() -> None:
+    grid = Grid(np.zeros((80, 60, 40), np.float32), np.array([0.3, 0.3, 0.6]))
+    field = offset_field(grid, np.random.default_rng(3))
+    assert field.shape == grid.shape
+    assert field.std() == pytest.approx(1.0, abs=0.05)
+    assert abs(field.mean()) < 0.05
+    near = [float(np.mean(field[2:] * field[:-2])), float(np.mean(field[:, :, 1:] * field[:, :, :-1]))]
+    assert near[0] == pytest.approx(near[1], abs=0.06), "0.6 mm apart, by two voxels or by one"
+    assert 0.4 < near[0] < 0.8
+
+
+def test_draws_have_the_stated_spread_and_are_the_same_alone() -> None:
+    start = nominal()
+    known = sigmas(start, roll_deg=3.0, rest_curvature=0.1)
+    members = drawn(start, known, 400, 8)
+    assert np.std([m.roll_deg[0] for m in members]) == pytest.approx(3.0, rel=0.1)
+    assert np.std([m.config.rest_curvature_scale for m in members]) == pytest.approx(0.1, rel=0.1)
+    assert np.std([m.clamp.entry_mm[0] for m in members]) == pytest.approx(0.2, rel=0.1)
+    assert len({m.lumen for m in members}) == 50
+    for source in SOURCES:
+        for whole, own in zip(members[:20], drawn(start, alone(known, source), 20, 8), strict=True):
+            if source == "roll":
+                assert np.array_equal(whole.roll_deg, own.roll_deg)
+                assert np.array_equal(own.clamp.entry_mm, np.zeros(3))
+                assert np.array_equal(own.depth_mm, start.depth_mm)
+            if source == "clamp":
+                assert np.array_equal(whole.clamp.direction, own.clamp.direction)
+                assert (own.roll_deg[0], own.config.taper_scale, own.narrower_mm) == (0.0, 1.0, 0.0)
+
+
+def test_a_clamp_moved_along_the_wire_leaves_a_traced_tip_where_it_is_seen() -> None:
+    along = replace(nominal().clamp, covariance=np.diag([0.0, 0.0, 0.25, 0.0, 0.0, 0.0]))
+    for traced in (True, False):
+        start = nominal(traced=traced)._replace(clamp=along)
+        members = drawn(start, alone(sigmas(start), "clamp"), 10, 8)
+        ends = np.array([m.clamp.entry_mm[2] + m.depth_mm[0] for m in members])
+        assert (np.ptp(ends) < 1e-9) == traced
+
+
+def test_what_is_not_stated_is_a_default_that_is_said() -> None:
+    plain, told = sigmas(nominal()), sigmas(nominal(), roll_deg=0.0, friction=0.02)
+    assert (plain.roll, plain.said["roll"]) == (ROLL_DEG, f"{ROLL_DEG:g} degrees, default")
+    assert (told.roll, told.said["roll"]) == (0.0, "0 degrees, stated")
+    assert (plain.friction, told.friction) == (0.0, 0.02), "without friction none is drawn by default"
+    assert sigmas(nominal(friction=0.1)).friction == pytest.approx(FRICTION * 0.1)
+    assert min(m.config.friction or 0.0 for m in drawn(nominal(), told, 50, 8)) == 0.0
+
+
+@pytest.mark.parametrize("count", [20, 400])
+def test_ninety_five_of_a_hundred_right_errors_are_within_two_u(count: int) -> None:
+    """Whatever the covariance's axes, and though it is known from few members."""
+    rng = np.random.default_rng(count)
+    root = np.array([[0.3, 0.1, 0.05], [0.0, 0.05, 0.0], [0.1, 0.0, 0.4]])
+    axes = axes_across(ALONG_Z, np.full(1, 15.0))
+    inside = []
+    for _ in range(1500):
+        wires = rng.normal(size=(count, 1, 3)) @ root
+        moment = np.einsum("mni,mnj->nij", wires, wires) / count
+        error = rng.normal(size=(1, 3)) @ root + 0.02 * rng.normal(size=(1, 3))
+        inside.append(judged(error, moment, np.full(1, 0.02**2), axes, count).ratio[0] <= 2.0)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+
+
+def test_only_what_lies_across_counts_and_a_round_u_is_the_mean() -> None:
+    axes = axes_across(ALONG_Z, np.full(1, 15.0))
+    along = judged(np.array([[0.0, 0.0, 9.0]]), 0.01 * np.eye(3)[None], np.zeros(1), axes, 1000)
+    assert along.ratio[0] == pytest.approx(0.0, abs=1e-9)
+    assert reach_mm(0.01 * np.eye(3)[None], axes, 100_000)[0] == pytest.approx(0.1 * ROUND, rel=1e-3)
+
+
+def straight(offset: Array) -> Array:
+    """Wires along z (members, 61, 3), their tips to the side by offsets (members,)."""
+    bent = np.zeros((len(offset), 61, 3)) + ALONG_Z
+    bent[:, :, 0] += offset[:, None] * (ALONG_Z[:, 2] / 30.0) ** 2
+    return bent
+
+
+@pytest.mark.parametrize("kind", ["normal", "exponential", "uniform"])
+def test_one_shape_is_one_shape(kind: str) -> None:
+    """Also where a contact cuts off one side of the spread."""
+    draw = {"normal": lambda r: r.normal(size=100), "exponential": lambda r: r.exponential(size=100)}
+    rng = np.random.default_rng(5)
+    named = draw.get(kind, lambda r: r.uniform(-2.0, 2.0, size=100))
+    assert sum(parted(straight(0.3 * named(rng))) is not None for _ in range(200)) <= 4
+
+
+def test_two_shapes_have_their_probabilities_and_the_real_wire_has_one() -> None:
+    rng = np.random.default_rng(1)
+    offset = np.where(np.arange(100) < 20, 2.0, 0.0) + 0.1 * rng.normal(size=100)
+    wires, (held, gone) = straight(offset), straight(np.array([0.1, 1.8]))
+    found = shapes_of(wires, held, gone, ALONG_Z[:, 2])
+    assert found is not None
+    assert (found.simulated, found.real) == pytest.approx((80.5 / 101, 20.5 / 101))
+    assert not found.same
+    assert int(found.with_simulated.sum()) == 80
+    seen = Seen(ALONG_Z[:, 2], held, gone, ALONG_Z[:, 2], np.full(61, 1e-4))
+    budget = frame_budget(np.concatenate([wires, np.full((5, 61, 3), np.nan)]), seen)
+    assert budget is not None
+    assert budget.members == 100, "those that came to no rest do not count"
+    assert budget.ratio is not None
+    assert np.max(budget.input_mm) < 0.3, "the spread is that within the simulated shape"
+    assert budget.ratio[-1] > 2.0
+    assert frame_budget(wires[:4], seen) is None
+
+
+def test_the_energy_score_is_least_for_the_right_ensemble() -> None:
+    rng = np.random.default_rng(2)
+    real = straight(rng.normal(size=300))
+    right, narrow, aside = (straight(s * rng.normal(size=60) + m) for s, m in ((1.0, 0.0), (0.2, 0.0), (1.0, 1.0)))
+    scores = [np.mean([energy_score_mm(wires, y) for y in real]) for wires in (right, narrow, aside)]
+    assert scores[0] < min(scores[1:])
+    assert energy_score_mm(np.repeat(real[:1], 9, axis=0), real[0]) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_release_is_counted_once() -> None:
+    same, other = (Shapes(0.5, 0.5, s, np.ones(1, bool)) for s in (True, False))
+    assert releases([True, False, True], [None, None, same]) == ["both", "", "both"]
+    assert releases([True, False, False], [other, other, None]) == ["spurious", "", ""]
+    assert releases([False, False, True], [other, other, same]) == ["missed", "", ""], "the simulated one comes late"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    assert main(["synth", "bend", "-o", str(folder), "--frames", "3", "--size", "64", "--seed", "7"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def out(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("out")
+    words = ["--set", "budget.members=24", "--set", "budget.members_alone=8", "--sweep", "simulate.taper_scale=1.1"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WIREVAL_CACHE", str(tmp_path_factory.mktemp("store")))
+        assert main(["run", str(study / "manifest.toml"), "-o", str(folder), *words]) == 0
+        assert main(["run", str(study / "manifest.toml"), "-o", str(folder / "bare"), "--set", "budget.members=0"]) == 0
+    return folder
+
+
+def test_every_frame_has_its_uncertainty_beside_its_error(out: Path) -> None:
+    case = out / "cases" / "bend"
+    errors, points = tables.read(case / "errors.csv", ERRORS), tables.read(case / "points.csv.gz", POINTS)
+    assert (errors["u_val_mm"] > errors["u_input_mm"]).all()
+    assert (errors["u_input_mm"] > 0.01).all()
+    calm = errors[errors["release"].isna()]
+    for row in calm.itertuples():
+        ratio = points.loc[points["frame"] == row.frame, "error_over_u"]
+        assert row.share_beyond_2u == pytest.approx((ratio > 2.0).mean())
+    with h5py.File(case / "frames.h5") as file:
+        group = file["frames/002"]
+        assert group["covariance_mm2"].shape == (len(group["arc_mm"]), 3, 3)
+    summary = tables.read(out / "summary.csv", SUMMARY).iloc[0]
+    assert summary["release_frames"] == errors["release"].notna().sum()
+    assert summary["u_val_mm"] > 0.0
+    assert "budget rests on 24 insertions" in (case / "result.json").read_text()
+
+
+def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:
+    paths = [out / "cases/bend", out / "bare/cases/bend", out / "sweep/simulate.taper_scale=1.1/cases/bend"]
+    plain, bare, swept = (tables.read(path / "errors.csv", ERRORS) for path in paths)
+    assert plain["rms_mm"].tolist() == bare["rms_mm"].tolist()
+    for table, folder in ((bare, paths[1]), (swept, paths[2])):
+        assert table["u_val_mm"].isna().all()
+        assert not (folder / "budget.csv").exists()
+    assert not (paths[2] / "entries.csv").exists()
+
+
+def test_an_ensemble_that_is_too_small_says_so(study: Path, tmp_path: Path) -> None:
+    words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=0"]
+    assert main(["run", str(study / "manifest.toml"), *words, "--set", "compare.simulated_nulls=false"]) == 0
+    assert tables.read(tmp_path / "cases/bend/errors.csv", ERRORS)["u_val_mm"].isna().all()
+    assert "fewer than 90 % of the 4 insertions" in (tmp_path / "cases/bend/result.json").read_text()
+
+
+def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -> None:
+    case = out / "cases" / "bend"
+    rows = tables.read(case / "budget.csv", BUDGET).set_index("source")["u_mm"]
+    named = [name for name in SOURCES if name != "friction"]
+    assert list(rows.index) == [*named, "inputs", "segments", "trace", "u_val", "error"]
+    assert rows["u_val"] ** 2 == pytest.approx(rows[["inputs", "segments", "trace"]].pow(2).sum(), rel=1e-3)
+    together = float(np.sqrt(rows[named].pow(2).sum()))
+    assert rows["inputs"] == pytest.approx(together, rel=0.5), "with 8 and 24 members"
+    entries = tables.read(case / "entries.csv", ENTRIES)
+    pairs = list(zip(entries["clamp"], entries["depth"], strict=True))
+    assert pairs == [(c, d) for c in ("estimated", "manifest") for d in ("traced", "manifest")]
+    errors = tables.read(case / "errors.csv", ERRORS)
+    pooled = tables.read(out / "summary.csv", SUMMARY)["rms_mm"].iloc[0]
+    assert len(errors) == entries["frames"].iloc[0]
+    assert entries["rms_mm"].iloc[0] == pytest.approx(pooled, abs=1e-6), "the first row is the run's own"
+    assert entries["rms_mm"].nunique() == 4
+
+
+def test_the_pages_show_it(out: Path) -> None:
+    folder = out / "cases" / "bend" / "figures"
+    assert {"budget", "error_over_u"} <= {path.stem for path in folder.glob("*.png")}
+    assert not (out / "bare/cases/bend/figures/error_over_u.png").exists()
+    assert len(pd.read_csv(folder / "budget.csv")) == 17
+    assert "release_frames" in figures_of("case")
+
+
+MANIFEST = """
+schema = 1
+[wires.w]
+radius_mm = 0.18
+bending_stiffness_N_mm2 = 5.0
+[[case]]
+id = "tube"
+lumen = "none.stl"
+entry_mm = [0.0, 0.0, 0.0]
+entry_direction = [0.0, 0.0, 1.0]
+wire = "w"
+insertion_mm = [6.0, 12.0]
+roll_sigma_deg = 1.5
+insertion_sigma_mm = 0.3
+[case.uncertainty]
+taper = 0.2
+"""
+
+
+def test_a_manifest_states_what_it_knows(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.toml"
+    path.write_text(MANIFEST)
+    case = read_manifest(path).cases[0]
+    assert (case.roll_sigma_deg, case.insertion_sigma_mm, case.uncertainty.taper) == (1.5, 0.3, 0.2)
+    path.write_text(MANIFEST.replace("taper = 0.2", "tapper = 0.2\nlumen_mm = -1.0"))
+    with pytest.raises(ManifestError) as error:
+        read_manifest(path)
+    assert "uncertainty tapper: unknown key; did you mean 'taper'" in str(error.value)
+    assert "uncertainty lumen_mm" in str(error.value)

@@ -1,0 +1,316 @@
+"""Calibration on wires of the solver itself, which tests the fit alone; truth by the rod is ``studies/calibration``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.calibrate.design import predicted, straight_to
+from pipeline.calibrate.estimates import calibrated
+from pipeline.calibrate.fit import Problem
+from pipeline.calibrate.residuals import Evidence, weights_of
+from pipeline.calibrate.search import own_roll
+from pipeline.calibrate.trials import OWN, Point, Trial, replayed
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, unknowns
+from pipeline.cli import main
+from pipeline.compare.pooled import is_pooled
+from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
+from pipeline.run.cache import Store
+from pipeline.run.calibrated import as_calibrated, data_of
+from pipeline.run.calibration_files import misfit
+from pipeline.run.log import Log
+from pipeline.run.stages import Context, Known
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.roll import with_fitted_roll
+from pipeline.simulate.clamp import Prior, moved
+from pipeline.simulate.config import SolverConfig
+from pipeline.status import FrameStatus, StageError
+from pipeline.study.manifest import read_manifest
+from pipeline.study.parameters import ParametersError, read_parameters
+from pipeline.study.settings import Config
+from solver import Grid, VesselWall
+
+WIRE = Wire("w", 0.18, [(0.0, 0.5), (10.0, 0.5), (30.0, 2.0)], [(0.0, 0.1), (8.0, 0.1), (8.0, 0.0)])
+SETTINGS = SolverConfig(segment_mm=0.5)
+X, Y, Z = np.meshgrid(*(np.arange(a, b, 0.5) for a, b in ((-5, 16), (-5, 5), (-4, 34))), indexing="ij")
+BENT = np.hypot(X - 0.012 * np.maximum(Z, 0.0) ** 2, Y) - 1.6
+VESSEL = VesselWall(Grid(BENT, [0.5] * 3, [-5.0, -5.0, -4.0]), stiffness_N_mm2=1.0)
+DEPTHS = (10.0, 16.0, 24.0, 16.0)
+TRUE = {ROLL: 17.0, REST: np.log(1.15), TAPER: np.log(1.4), "wall:0.05": np.log(0.8), FRICTION: 0.04}
+
+
+def trial(wire: Wire = WIRE, values=TRUE, depths=DEPTHS, noise=0.0, **changes) -> Trial:
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    empty = Trial("t", VESSEL, wire, Wall(0.05), clamp, Prior(0.1, 1.0), (), 0.3, **changes)
+    planned = straight_to(empty, depths, [30.0] * len(depths))
+    (wires,) = replayed([(planned, Point(values, np.zeros(OWN + len(depths))))], SETTINGS)
+    rng, seen = np.random.default_rng(3), []
+    for frame, found in zip(planned.seen, wires, strict=True):
+        points = found.joints_mm + noise * rng.normal(size=found.joints_mm.shape)
+        seen.append(replace(frame, curve=Curve(points, np.full(len(points), 0.02), 0.05)))
+    force = changes.get("force_N")
+    force = None if force is None else np.array([found.push_force_N for found in wires])
+    return replace(planned, seen=tuple(seen), force_N=force)
+
+
+def all_of(*trials: Trial, weighed=False):
+    return unknowns([t.wall.stiffness_N_mm2 for t in trials], 0.0, weighed=weighed)
+
+
+def test_parameters_are_found_again_and_the_clamp_with_them():
+    shifted = replace(trial(), given=replace(trial().given, entry_mm=np.array([0.05, -0.04, 0.0])))
+    fit = calibrated(all_of(shifted), [Evidence(shifted)], SETTINGS)
+    for estimate in fit.estimates:
+        true = TRUE[estimate.unknown.name]
+        assert abs(estimate.value - true) < max(2.0 * estimate.sd, 1e-3), estimate.unknown.name
+    by_name = {e.unknown.name: e for e in fit.estimates}
+    assert by_name[ROLL].seen
+    assert by_name[REST].seen
+    own = fit.fit.linear.x[fit.fit.problem.parts()[0]]
+    # stated 0.064 mm beside where it is held
+    assert np.linalg.norm(moved(shifted.given, own[:5]).entry_mm[:2]) < 0.03
+    assert all(frame.after_mm < frame.before_mm for frame in fit.frames)
+
+
+def test_a_straight_uniform_wire_shows_no_roll_and_no_taper():
+    plain = replace(WIRE, bending_stiffness_N_mm2=1.0, rest_curvature_per_mm=0.0)
+    one = trial(plain, {FRICTION: 0.0})
+    fit = calibrated(all_of(one), [Evidence(one)], SETTINGS)
+    unseen = {e.unknown.name for e in fit.estimates if not e.seen}
+    assert {ROLL, REST, TAPER} <= unseen
+    assert all(fit.values[name] == 0.0 for name in (ROLL, REST, TAPER))
+
+
+def test_derivatives_are_those_of_whole_insertions():
+    one = Evidence(trial())
+    problem = Problem(all_of(one.trial), {}, (one,), SETTINGS)
+    x = np.concatenate([[TRUE[u.name] for u in problem.free], np.zeros(OWN + len(DEPTHS))])
+    linear = problem.linear(x)
+    for k in (0, 1, 2, 3, 5, 9):
+        way = np.zeros(len(x))
+        way[k] = 0.5 * problem.columns(0).get(k, 0.1)
+        (there,), (back,) = problem.residuals([x + way, x - way], linear.weights, linear.scale)
+        central = (back - there) / (2 * way[k])
+        assert linear.jacobian[0][:, k] == pytest.approx(central, abs=0.12 * np.abs(central).max())
+
+
+def test_a_frame_that_lets_go_does_not_decide():
+    weights, scale = weights_of([np.array([1.0, 1.2, 0.9, 80.0])], stated=True)
+    assert scale == pytest.approx(1.1)
+    assert weights[0][:3] == pytest.approx(1.0)
+    assert weights[0][3] * 80.0 == pytest.approx(4.0 * scale)
+
+
+def test_stated_noise_is_never_made_smaller():
+    assert weights_of([np.full(5, 0.1)], stated=True)[1] == 1.0
+    assert weights_of([np.full(5, 0.1)], stated=False)[1] == pytest.approx(0.1)
+
+
+def test_stiffness_has_a_scale_only_with_forces():
+    stiffer = TRUE | {BENDING: np.log(1.3)}
+    one = trial(values=stiffer, force_N=np.zeros(len(DEPTHS)), force_sigma_N=1e-4)
+    silent = replace(one, force_N=None)
+    free = all_of(one, weighed=True)
+    x = np.concatenate([[stiffer[u.name] for u in free], np.zeros(OWN + len(DEPTHS))])
+    at = [u.name for u in free].index(BENDING)
+    sd = [
+        float(np.sqrt(Problem(free, {}, (Evidence(t),), SETTINGS).linear(x).covariance[at, at])) for t in (one, silent)
+    ]
+    assert sd[0] < 0.2 < 0.65 < sd[1]
+
+
+def test_a_sag_scan_weighs_the_wire():
+    wide = VesselWall(Grid(np.hypot(X - 5.0, Y) - 9.0, [0.5] * 3, [-5.0, -5.0, -4.0]), stiffness_N_mm2=1.0)
+    heavy = replace(WIRE, bending_stiffness_N_mm2=0.8, rest_curvature_per_mm=0.0, weight_N_per_mm=2e-5)
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]), None, down=np.array([1.0, 0.0, 0.0]))
+    one = Trial("sag", wide, heavy, Wall(0.05), clamp, Prior(0.05, 0.5), (), 0.3)
+    known = {}
+    for name, weight in (("sags", 2e-5), ("floats", 0.0)):
+        light = replace(one, wire=replace(heavy, weight_N_per_mm=weight))
+        planned = straight_to(light, (20.0, 30.0), (0.0, 0.0))
+        known[name] = {p.unknown.name: p.sd for p in predicted(all_of(one, weighed=True), [planned], SETTINGS)}
+    assert known["sags"][BENDING] < 0.1
+    assert known["floats"][BENDING] == pytest.approx(0.7, rel=0.01)
+
+
+def test_a_misfit_is_told():
+    one = trial()
+    fit = calibrated(all_of(one)[:1], [Evidence(one)], SETTINGS)
+    assert misfit(replace(fit, scale=1.0)) == []
+    assert "lumen, stated rolls" in misfit(replace(fit, scale=9.0))[0]
+
+
+def test_the_roll_of_one_frame_is_found_from_anywhere():
+    for true in (-150.0, 10.0, 120.0):
+        one = trial(values=TRUE | {ROLL: 0.0}, depths=(14.0,))
+        turned = tuple(replace(frame, roll_deg=30.0 - true) for frame in one.seen)
+        found = own_roll(Evidence(replace(one, seen=turned, wire=bent(WIRE, TRUE), roll_free=True)), 0.04, SETTINGS)
+        assert found.roll_deg == pytest.approx(true, abs=3.0)
+        assert found.sd_deg < 5.0
+
+
+def test_more_frames_tell_more():
+    few, many = (
+        straight_to(trial(), depths, [0.0] * len(depths)) for depths in ((10.0, 16.0), (10.0, 16.0, 24.0, 16.0))
+    )
+    free = all_of(few)
+    for a, b in zip(predicted(free, [few], SETTINGS), predicted(free, [many], SETTINGS), strict=True):
+        assert b.sd <= 1.01 * a.sd, a.unknown.name
+
+
+PARAMETERS = """schema = 1
+wire = "w"
+bending_stiffness_N_mm2 = [[0.0, 0.6], [30.0, 2.5]]
+rest_curvature_per_mm = 0.05
+friction = 0.03
+roll_offset_deg = 12.5
+depth_offset_mm = 0.4
+absolute_stiffness = false
+[[wall]]
+stated_N_mm2 = 2.0
+stiffness_N_mm2 = 1.5
+[[estimate]]
+name = "taper"
+value = 1.1
+sd = 0.5
+logarithmic = true
+seen = false
+used = 1.0
+[[used]]
+case = "a"
+group = "a"
+data = []
+"""
+STUDY = """schema = 1
+[wires.w]
+radius_mm = 0.18
+bending_stiffness_N_mm2 = 1.0
+[[case]]
+id = "a"
+role = "calibration"
+lumen = "tube.swc"
+traces = ["0.csv", "1.csv", "2.csv"]
+insertion_mm = [8.0, 10.0, 12.0]
+entry_mm = [0.0, 0.0, 0.0]
+entry_direction = [0.0, 0.0, 1.0]
+wire = "w"
+roll_deg = 5.0
+[[case]]
+id = "b"
+lumen = "tube.swc"
+traces = ["3.csv"]
+insertion_mm = [9.0]
+entry_mm = [0.0, 0.0, 0.0]
+entry_direction = [0.0, 0.0, 1.0]
+wire = "w"
+[case.wall]
+stiffness_N_mm2 = 7.0
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Two cases with traces of their own; the first was calibrated with."""
+    (tmp_path / "manifest.toml").write_text(STUDY)
+    (tmp_path / "tube.swc").write_text("1 3 0 0 -3 2 -1\n2 3 0 0 20 2 1\n")
+    for n in range(4):
+        lines = "\n".join(f"0.{n},0,{z}" for z in np.linspace(0, 8 + n, 9))
+        (tmp_path / f"{n}.csv").write_text(f"x,y,z\n{lines}\n")
+    (first, _) = read_manifest(tmp_path / "manifest.toml").cases
+    data = json.dumps(list(data_of(first))[:1])
+    (tmp_path / "p.toml").write_text(PARAMETERS.replace("data = []", f"data = {data}"))
+    return tmp_path
+
+
+def test_a_run_takes_the_parameters(study):
+    cases = read_manifest(study / "manifest.toml").cases
+    (case,), notes = as_calibrated(cases, study / "p.toml")
+    assert case.id == "b"
+    assert case.wire.bending_stiffness_N_mm2 == [(0.0, 0.6), (30.0, 2.5)]
+    assert (case.wall.stiffness_N_mm2, case.wall.friction) == (7.0, 0.03)
+    assert case.roll_deg == 12.5
+    assert case.insertion_mm == (9.4,)
+    assert "taper" in case.calibrated
+    assert "no wall stated at 7 N/mm2" in case.calibrated
+    assert "'a' was calibrated with and is not scored" in notes[0]
+
+
+def test_a_case_does_not_score_itself_under_another_name(study):
+    text = (study / "manifest.toml").read_text()
+    renamed = text.replace('id = "a"\nrole = "calibration"', 'id = "innocent"')
+    (study / "manifest.toml").write_text(renamed)
+    cases = read_manifest(study / "manifest.toml").cases
+    with pytest.raises(ParametersError, match=r"'innocent': its scans or traces were calibrated with \(as case 'a'\)"):
+        as_calibrated(cases, study / "p.toml")
+    (case, _), notes = as_calibrated(cases, study / "p.toml", own=True)
+    assert case.role == "calibration"  # out of every figure over cases
+    assert "say nothing about the model" in notes[0]
+
+
+def test_one_frame_in_common_is_enough(study):
+    text = (study / "manifest.toml").read_text().replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
+    (study / "manifest.toml").write_text(text)
+    with pytest.raises(ParametersError, match="'b'"):
+        as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("friction = 0.03", "friction = -1"), "friction"),
+        (('wire = "w"', 'wire = "other"'), "its wire is 'w', the parameters are those of 'other'"),
+        (("schema = 1", "schema = 1\nroll = 3"), "unknown key"),
+        (("schema = 1", "schema = "), "cannot be read as TOML"),
+    ],
+)
+def test_bad_parameters_are_told(study, change, told):
+    (study / "p.toml").write_text((study / "p.toml").read_text().replace(*change))
+    with pytest.raises(ParametersError, match=told):
+        as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
+
+
+def test_the_verb_refuses_what_it_cannot_use(study, capsys):
+    manifest = study / "manifest.toml"
+    manifest.write_text(manifest.read_text().replace('role = "calibration"\n', ""))
+    assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
+    assert 'no case has role = "calibration"' in capsys.readouterr().err
+    assert main(["run", str(manifest), "-o", str(study / "out"), "--parameters", str(study / "none.toml")]) == 2
+    assert "no such file; wireval calibrate" in capsys.readouterr().err
+
+
+def test_the_verb_writes_what_it_reads(study, capsys):
+    assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "out"), "--no-cache"]) == 0
+    found = read_parameters(study / "out" / "parameters.toml")
+    assert [used.case for used in found.used] == ["a"]
+    assert {"taper", "roll_offset_deg"} <= set(found.unseen)
+    assert "UNIDENTIFIABLE" in capsys.readouterr().out
+    page = (study / "out" / "calibration.html").read_text()
+    assert "not seen" in page
+    assert (study / "out" / "figures" / "profiles.png").exists()
+
+
+def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
+    manifest = study / "manifest.toml"
+    manifest.write_text(manifest.read_text().replace("roll_deg = 5.0", 'roll_deg = "fit"'))
+    case, other = read_manifest(manifest).cases
+    assert case.stated_roll_deg == 0.0
+    run = Context(case.model_copy(update={"wire": bent(WIRE, TRUE)}), Config(), Store(None), Log(lambda *_: None))
+    made = trial(values=TRUE | {ROLL: -75.0}, depths=(12.0, 16.0))
+    lumen = Lumen(VESSEL.distance)
+    curves = [None, *(frame.curve for frame in made.seen)]
+    frames = tuple(Frame(n, curve=curve) for n, curve in enumerate(curves))
+    frames = (frames[0].failed("trace", FrameStatus.NO_WIRE), *frames[1:])
+    known = with_fitted_roll(run, Known(lumen=lumen, frames=frames))
+    assert [frame.status for frame in known.frames] == ["no_wire", "roll_fitted", "ok"]
+    assert [frame.roll_deg for frame in known.frames] == pytest.approx([-45.0] * 3, abs=3.0)
+    assert known.frames[1].ok
+    assert not is_pooled({"status": known.frames[1].status}, np.ones(3))
+    assert "the roll was fitted on frame 1, which is not scored" in run.log.assumptions[0]
+    nothing = Known(lumen=lumen, frames=frames[:1])
+    with pytest.raises(StageError, match="no frame has a trace to fit it on"):
+        with_fitted_roll(run, nothing)
+    untouched = replace(run, case=other)
+    assert with_fitted_roll(untouched, known) is known

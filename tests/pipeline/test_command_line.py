@@ -1,0 +1,153 @@
+"""What is typed wrong is said in a line, with exit code 2 and no traceback; what is typed right does what it says."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipeline.cli import main
+from pipeline.run.gate import Gate, gate
+from pipeline.study.explain import described, in_words
+from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scans")
+    assert main(["synth", "straight", "-o", str(folder), "--size", "72", "--frames", "2"]) == 0
+    return folder
+
+
+@pytest.fixture
+def scans(study: Path, tmp_path: Path) -> Path:
+    """A folder of scans without a manifest."""
+    folder = tmp_path / "own scans"
+    shutil.copytree(study, folder, ignore=shutil.ignore_patterns("*.toml", "*.json"))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("runn x -o y", "did you mean 'run'?"),
+        ("run x -o y --resme", "did you mean '--resume'?"),
+        ("cache --info x", "one argument too many"),
+        ("check STUDY/reference.mha", "a scan is no manifest; give its folder"),
+        ("run STUDY/reference.mha -o y", "wireval init"),
+        ("run STUDY -o STUDY/reference.mha", "this is a file; name a folder"),
+        ("run STUDY -o STUDY/reference.mha/below", "cannot be written: Not a directory"),
+        ("run STUDY -o /proc/none", "cannot be written: No such file or directory"),
+        ("run STUDY -o y --junit STUDY", "this is a folder; name a file"),
+        ("run STUDY -o y --junit STUDY/reference.mha/x.xml", "cannot be written"),
+        ("synth straight -o /proc/none", "cannot be written"),
+        ("bench --quick -o /proc/none", "cannot be written"),
+        ("run STUDY -o y --fail-if rms>1", "did you mean 'rms_mm'?"),
+        ("run STUDY -o y --fail-if rms_mm", "write a column"),
+        ("run STUDY -o y --fail-if rms_mm>nan", "write a column"),
+        ("run STUDY -o y --fail-if case>1", "no number 'case'"),
+        ("init STUDY", "is there already"),
+        ("init STUDY/none", "no such folder"),
+        ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    words: str, said: str, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    typed = [str(tmp_path / "y") if w == "y" else w.replace("STUDY", str(study)) for w in words.split()]
+    assert main(typed) == 2
+    heard = capsys.readouterr().err.strip().splitlines()
+    assert said in heard[0]
+    assert len(heard) == 2, "the problem, and that nothing was run"
+    assert not (tmp_path / "y").exists(), "nothing is left behind"
+
+
+def test_a_place_is_tried_without_leaving_anything(tmp_path: Path) -> None:
+    from pipeline.commands import unwritable
+
+    assert unwritable(tmp_path / "a" / "b", "-o") == []
+    assert unwritable(tmp_path / "a" / "b.xml", "--junit") == []
+    (tmp_path / "there.xml").write_text("before")
+    assert unwritable(tmp_path / "there.xml", "--junit") == []
+    assert [path.name for path in tmp_path.iterdir()] == ["there.xml"]
+    assert unwritable(Path("x" * 300), "-o")
+
+
+def test_a_folder_is_checked_as_it_is_run(study: Path, scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(study)]) == 0
+    assert main(["check", str(scans)]) == 0
+    assert "assumed: reference: reference.mha" in capsys.readouterr().out
+    assert not list(scans.rglob("*.toml")), "check writes nothing"
+
+
+def test_init_leaves_what_run_infers_and_names_scans_from_there(scans: Path, tmp_path: Path) -> None:
+    assert main(["init", str(scans)]) == 0
+    text = (scans / "manifest.toml").read_text(encoding="utf-8")
+    assert "# assumed: wire" in text
+    case = tomllib.loads(text)["case"][0]
+    assert case["frames"] == ["frames/frame_000.mha", "frames/frame_001.mha"]
+    assert main(["check", str(scans.rename(tmp_path / "moved"))]) == 0, "the folder may be moved"
+
+
+def test_settings_are_a_file_that_reads_back_as_the_defaults(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["settings"]) == 0
+    path = tmp_path / "all.toml"
+    path.write_text(capsys.readouterr().out)
+    assert resolve(read_settings(path)).config == Config()
+    for one in described():
+        assert one.meaning.endswith("."), f"{one.name} has no sentence"
+        assert one.allowed not in ("any", "a text", "a list"), f"{one.name} says not what it may be"
+    assert main(["settings", "solver.hull"]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "[solver]"
+
+
+def test_what_settings_call_allowed_is_what_is_allowed() -> None:
+    """A number on the wrong side of the range that is shown is refused, for every setting with a range."""
+    for one in described():
+        for word, wrong in (("above ", 0), ("from ", -1e-3)):
+            if word in one.allowed and f"{word}0" in one.allowed:
+                with pytest.raises(SettingsError):
+                    resolve([parse_assignment(f"{one.name}={wrong}")])
+    assert (
+        in_words({"anyOf": [{"type": "null"}, {"type": "integer", "minimum": 2}]})
+        == "left out or a whole number from 2"
+    )
+
+
+def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None:
+    assert gate("rms_mm > 0.5") == Gate("rms_mm", ">", 0.5)
+    assert "rms_mm is 0.6" in gate("rms_mm>0.5").closed({"rms_mm": 0.6})
+    assert not gate("rms_mm>0.5").closed({"rms_mm": 0.5})
+    assert gate("rms_mm>=0.5").closed({"rms_mm": 0.5})
+    assert gate("frames_ok<3").closed({"frames_ok": 2})
+    for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
+        assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
+
+
+def test_other_settings_ask_before_they_overwrite(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Until load: what is under test is the door, and the gate behind it."""
+    words = ["run", str(study), "-o", str(tmp_path / "out"), "--until", "load", "-q"]
+    assert main([*words, "--fail-if", "rms_mm>1"]) == 1
+    heard = capsys.readouterr().err
+    assert "cannot be shown to hold" in heard
+    assert "[straight]" not in heard, "-q prints the result alone"
+    assert main([*words, "--set", "solver.step_mm=0.5"]) == 2
+    assert "solver.step_mm 1.0 before, 0.5 now" in capsys.readouterr().err
+    code = main(words)
+    assert main([*words, "--set", "solver.step_mm=0.5", "--fresh"]) == code != 2
+    assert main([*words, "--set", "solver.step_mm=0.25", "--resume"]) == code
+
+
+def test_the_package_runs_and_completes() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "pipeline", "--print-completion", "bash"], capture_output=True, text=True, check=True
+    )
+    assert "--fail-if" in done.stdout

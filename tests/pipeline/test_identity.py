@@ -1,0 +1,159 @@
+"""Identity of the data: what a kept result hangs on, in which order frames come, whose geometry is whose."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import SimpleITK as sitk
+
+from pipeline.cli import main
+from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, read_headers
+from pipeline.load.config import LoadConfig
+from pipeline.load.geometry import Mask
+from pipeline.load.order import natural_key
+from pipeline.run.store import digest
+from pipeline.study.infer import _scans_in
+from pipeline.study.manifest import ManifestError, read_manifest
+from tests.pipeline.test_load import SPACING, image_of, numbered
+from tests.pipeline.test_manifest import GOOD
+from tests.studies.formats import variants
+
+
+def test_voxels_of_a_detached_file_belong_to_the_key_of_a_crop(tmp_path: Path) -> None:
+    """New .raw, same header: another scan."""
+    keys = []
+    for values in (numbered(), numbered() + 1):
+        sitk.WriteImage(image_of(values), str(tmp_path / "a.mhd"))
+        header = read_header(tmp_path / "a.mhd")
+        keys.append(digest(Crop(header, header.box)))
+    assert keys[0] != keys[1]
+
+
+def test_datasets_labels_and_levels_belong_to_keys(tmp_path: Path) -> None:
+    path = tmp_path / "study.h5"
+    path.write_bytes(b"same file")
+    sources = [Source(path, "/frames"), Source(path, "/run2"), Source(path, "/frames", 1), Mask(path, "/frames")]
+    sources += [
+        Mask(path, "/frames", label=label, level=level) for label, level in ((1, None), ("a", None), (None, 0.5))
+    ]
+    assert len({digest(source) for source in sources}) == len(sources)
+
+
+def test_natural_order_over_whole_paths(tmp_path: Path) -> None:
+    for name in ("depth_10", "depth_2", "depth_1"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "recon.mha").touch()
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "depth_*/recon.mha"))
+    frames = read_manifest(tmp_path / "m.toml").cases[0].frames
+    assert [source.path.parent.name for source in frames] == ["depth_1", "depth_2", "depth_10"]
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", f"{tmp_path}/depth_*/recon.mha"))
+    assert read_manifest(tmp_path / "m.toml").cases[0].frames == frames  # an absolute pattern, too
+
+
+def test_natural_order_of_any_name() -> None:
+    names = ["f", "f01", "f1", "f2", "f10", "f" + "9" * 5000, "g", "²"]
+    assert sorted(["f01", *names[::2], *names[1::2]][1:], key=natural_key) == names
+
+
+def group(path: Path, **of_10: object) -> Source:
+    with h5py.File(path, "w") as file:
+        for i in (10, 0, 11, 2, 1):
+            data = file.create_dataset(f"frames/{i}", data=numbered().T + i)
+            data.attrs.update({"spacing_mm": SPACING} | (of_10 if i == 10 else {}))
+    return Source(path, "/frames")
+
+
+def test_datasets_of_a_group_come_in_natural_order(tmp_path: Path) -> None:
+    volumes = [load(header) for header in each_volume(read_header(group(tmp_path / "s.h5")))]
+    assert [int(v.values[0, 0, 0]) for v in volumes] == [0, 1, 2, 10, 11]
+
+
+@pytest.mark.parametrize("change", [{"spacing_mm": (0.4, 0.5, 0.9)}, {"origin_mm": (1, 0, 0)}, {"axes": "x,y,z"}])
+def test_every_dataset_has_its_own_geometry(tmp_path: Path, change: dict[str, object]) -> None:
+    with pytest.raises(LoadError, match=r"geometry differs.*\n.*\n.*/frames/10"):
+        read_header(group(tmp_path / "s.h5", **change))
+
+
+def test_a_reference_of_several_volumes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LoadError, match="holds 5 volumes; allowed: one"):
+        read_headers(group(tmp_path / "s.h5"), [], LoadConfig())
+
+
+def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
+    """What stages subtract is two bytes with a sign."""
+    sitk.WriteImage(image_of((numbered() * 70).astype(np.uint16)), str(tmp_path / "a.mha"))
+    values = load(read_header(tmp_path / "a.mha")).values
+    assert values.dtype == np.int32
+    assert values.max() == numbered().astype(int).max() * 70
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("frames", '"../frames/*.mha"', "leads out of the manifest's folder"),
+        ("frames", '["a/../../b.mha"]', "leads out of the manifest's folder"),
+        ("frames", '"/**/*.mha"', "whole machine"),
+        ("frames", "[]", "an empty list"),
+        ("frames", '"' + "x" * 300 + '.mha"', "a name of 304 bytes"),
+        ("wire", "[]", "not among"),
+        ("reference", '""', "an empty name"),
+        ("lumen", '{file = "a.nrrd", label = 0}', "a number that is not 0"),
+        ("lumen", '{file = "a.nrrd", level = 2}', "above 0 and below 1"),
+        ("lumen", '{file = "a.nrrd", label = 1, level = 0.5}', "allowed: file, and label"),
+        ("lumen", '{path = "a.nrrd"}', "allowed: file, and label"),
+    ],
+)
+def test_names_of_files_are_judged(tmp_path: Path, key: str, value: str, said: str) -> None:
+    lines = [line for line in GOOD.splitlines() if not line.startswith(f"{key} =")]
+    (tmp_path / "m.toml").write_text("\n".join([*lines, f"{key} = {value}"]))
+    with pytest.raises(ManifestError, match=said):
+        read_manifest(tmp_path / "m.toml")
+
+
+def test_a_lumen_takes_a_label_or_a_level(tmp_path: Path) -> None:
+    for value, label, level in (('"artery"', "artery", None), ("2", 2, None), (None, None, 0.4)):
+        key = f"label = {value}" if value else "level = 0.4"
+        (tmp_path / "m.toml").write_text(
+            GOOD.replace("frames/*.mha", "x.mha") + f'lumen = {{file = "s.nrrd", {key}}}\n'
+        )
+        assert read_manifest(tmp_path / "m.toml").cases[0].lumen == Mask(tmp_path / "s.nrrd", "", None, label, level)
+
+
+def test_everything_that_is_wrong_with_the_files_of_a_case_is_said_at_once(tmp_path: Path, capsys: object) -> None:
+    (tmp_path / "frames").mkdir()
+    for k, text in enumerate(("0 0.5 0.7", "0.4 0.5 0.7", "nan 0.5 0.7")):
+        path = tmp_path / "frames" / f"f_{k}.mha"
+        sitk.WriteImage(image_of(numbered()), str(path), useCompression=False)
+        raw = path.read_bytes()
+        at = raw.index(b"ElementSpacing")
+        path.write_bytes(raw[:at] + f"ElementSpacing = {text}".encode() + raw[raw.index(b"\n", at) :])
+    (tmp_path / "t.json").write_text(json.dumps({"frames": [{"points_mm": [[0, 0, float("nan")]] * 3}] * 3}))
+    (tmp_path / "l.stl").write_text("vertex 1 2 3\n" * 2)
+    (tmp_path / "m.toml").write_text(GOOD + 'lumen = "l.stl"\ntruth = "t.json"\n')
+    for verb in (["check", str(tmp_path / "m.toml")], ["run", str(tmp_path / "m.toml"), "-o", str(tmp_path / "out")]):
+        assert main(verb) == 2
+        said = capsys.readouterr().err.splitlines()  # type: ignore[attr-defined]
+        assert len(said) == 4, said
+        for part, line in zip(("f_0.mha", "f_2.mha", "l.stl", "3 problems"), said, strict=True):
+            assert part in line
+        assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["dicom, no suffixes", "dicom, enhanced", "dicom, enhanced, no suffix"])
+def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
+    """A folder of slices is one frame; folders of slices and enhanced files in it are frames."""
+    write = next(variant.write for variant in variants() if variant.name == name)
+    whole = tmp_path / "study"
+    whole.mkdir()
+    made = write(whole)
+    assert _scans_in(whole) == (None, [made])
+    below = tmp_path / "below"
+    for k in (10, 2):
+        (below / "frames" / f"f{k}").mkdir(parents=True)
+        write(below / "frames" / f"f{k}")
+    (below / "frames" / "notes").mkdir()
+    assert [path.name for path in _scans_in(below)[1]] == ["f2", "f10"]

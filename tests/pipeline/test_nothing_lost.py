@@ -1,0 +1,284 @@
+"""What is finished is kept, what is missing is made again, what is not as it was written is not believed."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import signal
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.cli import main
+from pipeline.model import Curve
+from pipeline.run import launch, ledger
+from pipeline.run.cache import Store
+from pipeline.run.occupied import held, owner_of
+from pipeline.run.outcome import Outcome
+from reports import atomic
+from tests.studies.trees import differences
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    assert main(["synth", "bifurcation", "-o", str(folder), "--size", "64", "--frames", "2", "--seed", "7"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("store")
+
+
+@pytest.fixture(autouse=True)
+def _one_store(store: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WIREVAL_CACHE", str(store))
+
+
+@pytest.fixture(scope="module")
+def whole(study: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("WIREVAL_CACHE", str(store))
+        assert run(study, out) == 0
+    return out
+
+
+@pytest.fixture
+def out(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "out"))
+
+
+def run(study: Path, out: Path, *more: str) -> int:
+    return main(["run", str(study / "manifest.toml"), "-o", str(out), *more])
+
+
+def case_of(out: Path) -> Path:
+    return out / "cases" / "bifurcation"
+
+
+@pytest.mark.parametrize("lost", ["report.html", "figures"])
+def test_pages_are_made_again_without_the_rest(study: Path, whole: Path, out: Path, lost: str) -> None:
+    """Killed between the result and its pages, or a picture lost since."""
+    case = case_of(out)
+    path = case / lost
+    _ = shutil.rmtree(path) if path.is_dir() else path.unlink()
+    before = (case / "frames.h5").stat().st_mtime_ns
+    assert run(study, out) == 0
+    assert differences(whole, out) == []
+    assert (case / "frames.h5").stat().st_mtime_ns == before
+
+
+def test_a_run_that_ended_before_its_pages_gets_them(study: Path, whole: Path, out: Path) -> None:
+    case = case_of(out)
+    known = ledger.read(case)
+    assert known is not None
+    for name in known.drawn:
+        (case / name).unlink()
+    ledger.write(case, known.key)
+    assert run(study, out) == 0
+    assert differences(whole, out) == []
+
+
+@pytest.mark.parametrize(("name", "how"), [("errors.csv", "altered"), ("view/lumen.vtp", "gone")])
+def test_what_is_not_as_it_was_written_is_computed_again(
+    study: Path, whole: Path, out: Path, name: str, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = case_of(out) / name
+    content = path.read_bytes()
+    path.unlink()
+    if how == "altered":
+        path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))  # of the same size
+    assert run(study, out) == 0
+    words = "is not as it was written" if how == "altered" else "is missing"
+    assert f"{name} {words}: computed again" in capsys.readouterr().err
+    assert differences(whole, out) == []
+
+
+def test_no_number_is_pooled_from_a_table_that_was_changed(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = case_of(out) / "errors.csv"
+    path.write_text(path.read_text(encoding="utf-8").replace(",ok,", ",ok, "), encoding="utf-8")
+    assert main(["report", str(out)]) == 1
+    assert "errors.csv is not as it was written" in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+
+
+def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:
+    shutil.rmtree(case_of(out) / "figures")
+    (case_of(out) / "report.html").write_text("half a pa")
+    assert main(["report", str(out)]) == 0
+    assert differences(whole, out) == []
+
+
+def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(study: Path, whole: Path, out: Path) -> None:
+    dead, living = (out / f".tmp-{atomic.HOST}-{n}-0123abcd-run.json" for n in (2**22 + 1, os.getppid()))
+    inside = case_of(out) / f".tmp-{atomic.HOST}-1-0123abcd-errors.csv"
+    for path in (dead, living, inside):
+        path.write_text("half")
+    assert run(study, out, "--fresh", "--until", "load") == 0
+    assert [path.exists() for path in (dead, living, inside)] == [False, True, False]
+
+
+def test_a_run_that_left_nothing_but_half_a_file_goes_on(study: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".tmp-host-1-0123abcd-run.json").write_text("{")
+    assert run(study, tmp_path / "out", "--dry-run") == 0
+
+
+def test_a_shard_of_another_study_is_refused(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.1-2.json").write_text('{"manifest_sha256": "another"}')
+    assert run(study, out, "--shard", "1/1") == 2
+    assert "made from another manifest" in capsys.readouterr().err
+
+
+def test_a_disk_that_fills_up_is_named_and_the_rest_comes_later(
+    study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr("pipeline.run.outputs.export.write_surface_vtp", with_full_disk)
+        assert run(study, out) == 1
+    said = capsys.readouterr().err
+    assert "lumen.vtp: cannot be written: No space left on device; make room" in said
+    assert "Traceback" not in said
+    assert run(study, out) == 0
+    assert differences(whole, out) == []
+
+
+def with_full_disk(path: Path, *_: object) -> None:
+    with atomic.replacing(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_an_output_that_cannot_be_written_is_named_before_anything_is_run(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert run(study, tmp_path / "file" / "out") == 2
+    said = capsys.readouterr().err
+    assert "run.json: cannot be written: Not a directory" in said
+    assert "nothing was run" in said
+
+
+def test_a_store_that_cannot_be_written_costs_a_warning(
+    study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path / "file" / "store"))
+    assert run(study, tmp_path / "out") == 0
+    assert capsys.readouterr().err.count("the stage store keeps nothing from here on") == 1
+    assert differences(whole, tmp_path / "out") == []
+
+
+@pytest.mark.parametrize("how", ["altered", "cut", "of another"])
+def test_a_stored_result_that_was_changed_is_not_used(tmp_path: Path, how: str) -> None:
+    said: list[str] = []
+    mine = Store(tmp_path, said.append)
+    for letter in "ab":
+        mine.put("trace", letter * 64, Curve(np.eye(3) * (1 + (letter == "b")), np.ones(3)))
+    first, second = (path for path, _, _ in mine.entries())
+    content = first.read_bytes()
+    place = content.index(np.eye(3).tobytes())
+    altered = content[:place] + np.float64(1.5).tobytes() + content[place + 8 :]
+    first.write_bytes({"altered": altered, "cut": content[:-9], "of another": second.read_bytes()}[how])
+    assert mine.get("trace", "a" * 64) is None
+    assert "is not as it was written" in said[0]
+    assert mine.get("trace", "b" * 64) is not None
+
+
+def test_the_cache_has_a_limit_and_a_check(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path))
+    mine, foreign = Store(tmp_path), tmp_path / "letters" / "de" / "brief.result"
+    foreign.parent.mkdir(parents=True)
+    foreign.write_text("of somebody who named this folder as the store")
+    for age, letter in enumerate("abcd"):
+        mine.put("trace", letter * 64, Curve(np.eye(3), np.ones(3)))
+        os.utime(mine.entries()[-1][0], (1e9 - age, 1e9 - age))  # d is the oldest
+    assert mine.get("trace", "d" * 64) is not None  # and now the youngest
+    one = mine.entries()[0][1]
+    assert main(["cache", "--limit", str(2 * one)]) == 0
+    assert [path.stem[0] for path, _, _ in mine.entries()] == ["a", "d"]
+    assert mine.limit == 2 * one
+    assert main(["cache", "--check"]) == 0
+    path = mine.entries()[0][0]
+    path.write_bytes(path.read_bytes()[:-1])
+    assert main(["cache", "--check"]) == 1
+    assert f"{path}: not as it was written" in capsys.readouterr().err
+    assert [path.stem[0] for path, _, _ in mine.entries()] == ["d"]
+    assert main(["cache", "--limit", "lots"]) == 2
+    assert main(["cache", "--prune"]) == 0
+    assert mine.entries() == []
+    assert foreign.exists()
+
+
+def test_the_second_run_says_who_is_at_work(study: Path, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    done: list[int] = []
+    second = threading.Thread(target=lambda: done.append(run(study, out)))
+    with held(case_of(out), print):
+        second.start()
+        log = case_of(out) / "log.txt"
+        while "is at work" not in log.read_text(encoding="utf-8"):
+            time.sleep(0.01)
+        assert not done
+        assert f"process {os.getpid()} on " in owner_of(case_of(out))
+    second.join()
+    assert done == [0]
+    assert f"[bifurcation] process {os.getpid()} on " in capsys.readouterr().err
+    assert owner_of(case_of(out)) == ""
+    assert not (case_of(out) / ".at-work").exists()
+
+
+def test_a_case_that_another_run_works_on_is_left_to_it(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its files are not cleared away for the sake of a message that this run's worker was lost."""
+    job = SimpleNamespace(folder=case_of(out), case=SimpleNamespace(id="bifurcation"))
+    with held(case_of(out), print):
+        launch._write_lost(Outcome(job, None, "over", "over", "over_limit"))  # type: ignore[arg-type]
+    assert "bifurcation: over; left to process" in capsys.readouterr().err
+    assert (case_of(out) / "result.json").exists()
+
+
+def test_an_executor_that_is_not_there_is_refused(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(study, tmp_path / "out", "--executor", "nonsense://") == 2
+    assert "--executor nonsense://: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signals_have_their_exit_codes(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, code: int
+) -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr("pipeline.run.case.run_stages", lambda *_: os.kill(os.getpid(), number))
+    assert run(study, tmp_path / "out") == code
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+@pytest.mark.parametrize(
+    "words", [["--case-timeout", "0"], ["--case-memory", "nan"], ["--case-timeout", "9", "--executor", "tcp://x:1"]]
+)
+def test_limits_that_make_no_sense_are_refused(study: Path, tmp_path: Path, words: list[str]) -> None:
+    assert run(study, tmp_path / "out", *words) == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_beyond_its_time_is_named_with_its_stage(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(study, tmp_path / "out", "--no-cache", "--case-timeout", "0.01") == 1
+    failures = pd.read_csv(tmp_path / "out" / "failures.csv")
+    assert list(failures["status"]) == ["over_limit"]
+    assert "took longer than the 0.01 s" in failures["message"][0]

@@ -1,0 +1,112 @@
+"""The whole run in one row: one population, whatever failed; two runs compared by ratios on the frames they share."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.cli import main
+from pipeline.run.aggregate import aggregate
+from pipeline.run.launch import last_line
+from pipeline.run.overall import found_cases, overall, ratio
+from reports import tables
+from reports.html import render_index
+from reports.schema import ERRORS, POINTS
+
+GOOD, BAD = 0.3, 5.0
+
+
+def write_case(out: Path, name: str, errors_mm: list[float], statuses: list[str] | None = None, **result: Any) -> None:
+    """A case whose frames have 50 points each, all as far off as stated; the null is off by 1 mm."""
+    folder, statuses = out / "cases" / name, statuses or ["ok"] * len(errors_mm)
+    folder.mkdir(parents=True)
+    rows = [
+        {"frame": i, "status": s, "insertion_mm": 10.0 + i, "rms_mm": mm, "p95_mm": mm, "tip_mm": mm}
+        | {"null_centreline_rms_mm": 1.0}
+        for i, (s, mm) in enumerate(zip(statuses, errors_mm, strict=True))
+    ]
+    tables.write(folder / "errors.csv", ERRORS, rows)
+    frame, error = np.repeat(np.arange(len(rows)), 50), np.repeat(errors_mm, 50)
+    tables.write(folder / "points.csv.gz", POINTS, {"frame": frame, "error_mm": error})
+    good = statuses.count("ok")
+    status = "ok" if good == len(rows) else next(s for s in statuses if s != "ok")
+    summary = {"case": name, "group": name, "role": "validation", "status": status, "frames": len(rows)}
+    summary |= {"frames_ok": good, "frames_failed": len(rows) - good}
+    said = [{"frame": r["frame"], "status": r["status"], "sentence": "", "message": ""} for r in rows]
+    whole = {"case": name, "role": "validation", "group": name, "status": status, "sentence": "", "frames": said}
+    whole |= {"failures": [], "summary": summary | {k: v for k, v in result.items() if k in summary}} | result
+    (folder / "result.json").write_text(json.dumps(whole))
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """Four insertions with two frames that failed, both far off, and a calibration case that is far off, too."""
+    write_case(tmp_path, "a", [GOOD, GOOD, BAD], ["ok", "ok", "length_mismatch"])
+    write_case(tmp_path, "b", [GOOD * 1.2, BAD], ["ok", "max_iterations"])
+    write_case(tmp_path, "c", [GOOD * 0.9, GOOD])
+    write_case(tmp_path, "d", [GOOD, GOOD * 1.1])
+    write_case(tmp_path, "tuned", [BAD, BAD], role="calibration")
+    return tmp_path
+
+
+def test_one_population_everywhere(study: Path) -> None:
+    """Headline, last line, overall.csv and the figures: frames that are ok, of validation cases. It was 5 mm in one."""
+    totals = aggregate(study, {})
+    good = GOOD * np.array([1, 1, 1.2, 0.9, 1, 1, 1.1])
+    rms = float(np.sqrt(np.mean(good**2)))
+    whole = pd.read_csv(study / "overall.csv").iloc[0]
+    assert whole["rms_mm"] == pytest.approx(rms)
+    assert json.loads((study / "run.json").read_text())["overall"]["rms_mm"] == pytest.approx(rms)
+    assert (whole["frames"], whole["frames_ok"], whole["insertions"]) == (9, 7, 4)
+    line = last_line(totals, study / "index.html")
+    assert f"median point error {np.median(good):.3f} mm" in line
+    assert f"rms {rms:.3f} mm (95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, wide: 4 ins" in line
+    page = render_index(study).read_text(encoding="utf-8")
+    assert f"<b>{rms:.3f}</b>" in page
+    curve = pd.read_csv(study / "figures" / "planned_within.csv")
+    assert curve["share_of_planned"].max() == pytest.approx(7 / 9), "frames that failed are planned ones, too"
+    assert curve.loc[curve["p95_mm"] < BAD, "p95_mm"].max() == pytest.approx(GOOD * 1.2)
+    assert whole["within_1mm"] == pytest.approx(7 / 9)
+
+
+def test_leaving_frames_out_cannot_improve_the_share(study: Path) -> None:
+    before = overall(found_cases(study))["within_1mm"]
+    write_case(study, "e", [GOOD, BAD, BAD], ["ok", "no_wire", "no_wire"])
+    assert overall(found_cases(study))["within_1mm"] < before
+
+
+def test_two_insertions_have_no_interval(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        write_case(tmp_path, name, [0.2, 0.3] * 9)
+    totals = aggregate(tmp_path, {})
+    assert np.isnan(totals.pooled["rms_low_mm"])
+    assert "(interval withheld: 2 insertions, at least 3 needed)" in last_line(totals, tmp_path)
+
+
+def test_two_runs_are_compared_on_the_frames_that_both_have(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The second run is twice as far off everywhere, and lost a frame more: the ratio is 2, and certain."""
+    other = tmp_path / "other"
+    write_case(other, "a", [2 * GOOD, BAD, BAD], ["ok", "no_wire", "length_mismatch"])
+    write_case(other, "b", [2 * GOOD * 1.2, BAD], ["ok", "max_iterations"])
+    write_case(other, "c", [2 * GOOD * 0.9, 2 * GOOD])
+    write_case(other, "d", [2 * GOOD, 2 * GOOD * 1.1])
+    found = ratio(found_cases(study), found_cases(other))
+    assert found is not None
+    assert found.frames == 6
+    assert (found.value, found.low, found.high) == pytest.approx((2.0, 2.0, 2.0))
+    assert main(["diff", str(study), str(other)]) == 1
+    said = "rms of the second run / the first, on 6 frames: 2.000 (95 %: 2.000 to 2.000, wide: 4 insertions)"
+    assert said in capsys.readouterr().out
+
+
+def test_runs_without_a_frame_in_common_have_no_ratio(tmp_path: Path) -> None:
+    write_case(tmp_path / "a", "one", [0.1])
+    write_case(tmp_path / "b", "two", [0.1])
+    assert ratio(found_cases(tmp_path / "a"), found_cases(tmp_path / "b")) is None

@@ -1,0 +1,292 @@
+"""Other simulators' wires: read by what they state, judged as the solver's own, told apart, refused by name."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.cli import main
+from pipeline.load.geometry import LoadError, Source
+from pipeline.load.vtk import read_vtk_points
+from pipeline.load.wires import numbered_frames, read_wires
+from pipeline.model import arc_length
+from pipeline.simulate.others import begun, not_to_depth, oddity
+from reports.export import write_markups_curve, write_polyline_vtp
+from tests.pipeline.known_study import FRAMES, PEERS, QUICK, errors_of, peers, simulated, write_csv, write_study
+
+Array = NDArray[np.float64]
+Known = tuple[Path, list[Array]]
+ADAPTERS = Path(__file__).parents[2] / "docs" / "adapters.md"
+
+
+def synth(name: str, folder: Path) -> Path:
+    assert main(["synth", name, "-o", str(folder), "--size", "64", "--frames", str(FRAMES), "--seed", "7"]) == 0
+    return folder / "manifest.toml"
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
+    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
+    manifest = write_study(tmp_path_factory.mktemp("known"))
+    out = manifest.parent / "out"
+    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
+    return manifest, simulated(out)
+
+
+def run_with(known: Known, files: str, name: str) -> tuple[int, pd.DataFrame, dict[str, object]]:
+    """A run of the study with ``simulated`` in its manifest."""
+    manifest, out = known[0].with_name(f"{name}.toml"), known[0].parent / name
+    manifest.write_text(known[0].read_text().replace('id = "bend"', f'id = "bend"\nsimulated = {files}'))
+    code = main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK])
+    if code == 2:
+        return code, pd.DataFrame(), {}
+    return code, errors_of(out), json.loads((out / "cases" / "bend" / "result.json").read_text())
+
+
+def test_traces_without_scans_are_compared(known: Known) -> None:
+    """They used to be "5 ok" with every error empty."""
+    table = errors_of(known[0].parent / "out")
+    assert list(table["status"]) == ["ok"] * FRAMES
+    assert table["rms_mm"].notna().all()
+    assert table["null_centreline_rms_mm"].notna().all()
+    assert 0.0 < table["rms_mm"].max() < 1.5
+    assert pd.read_csv(known[0].parent / "out" / "overall.csv")["within_1mm"].notna().all()
+
+
+def test_a_trace_that_begins_at_its_tip_fails_by_name(known: Known) -> None:
+    folder, traces = known[0].parent, peers("bend")
+    write_csv(folder / "turned", [traces[0], traces[1][::-1], *traces[2:]])
+    (folder / "turned.toml").write_text(known[0].read_text().replace("traces/*.csv", "turned/*.csv"))
+    assert main(["run", str(folder / "turned.toml"), "-o", str(folder / "out-turned"), *QUICK]) == 1
+    assert list(errors_of(folder / "out-turned")["status"])[1] == "trace_failed"
+    assert "tip first" in (folder / "out-turned" / "failures.csv").read_text()
+
+
+SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
+"""Columns that only the solver itself can fill."""
+
+
+def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
+    """And a third party's are told apart from one without the tip's curve; all beside each other, every page drawn."""
+    manifest, run = synth("bend", tmp_path / "study"), tmp_path / "run"
+    assert main(["run", str(manifest), "-o", str(run), "--until", "compare", *QUICK]) == 0
+    curves = write_csv(tmp_path / "ours", simulated(run))
+    wanted = [str(curves), f"PyElastica={PEERS / 'bend'}", f"straight-tip={PEERS / 'bend-straight-tip'}"]
+    out = tmp_path / "out"
+    assert main(["score", str(manifest), *(x for c in wanted for x in ("--curves", c)), "-o", str(out), *QUICK]) == 0
+    before, after = errors_of(run), errors_of(out)
+    same = [c for c in before if not c.endswith("_s") and c not in (*SOLVERS, "max_penetration_mm")]
+    pd.testing.assert_frame_equal(before[same], after[same], check_exact=True)
+    assert after[list(SOLVERS)].isna().all(axis=None), "what nobody knows is empty, never 0"
+    assert np.abs(before["max_penetration_mm"] - after["max_penetration_mm"]).max() < 0.01
+    table = pd.read_csv(out / "simulators.csv").set_index(["simulator", "against"])["rms_ratio"]
+    assert table["ours", "wireval"] == pytest.approx(1.0, abs=1e-12)
+    assert 0.8 < table["PyElastica", "wireval"] < 1.5, "two programs, one physics"
+    assert table["straight-tip", "PyElastica"] > 2.0
+    assert table["wireval", "straight-tip"] == pytest.approx(1 / table["straight-tip", "wireval"], rel=0.03)
+    where = pd.read_csv(out / "where.csv")
+    assert not where.loc[where["simulator"] == "straight-tip", "lead"].notna().any(), "nearest nowhere"
+    for page in ("simulators.html", "index.html", "simulators/wireval/index.html", "simulators/PyElastica/index.html"):
+        assert (out / page).exists()
+    assert "simulators.html" in (out / "index.html").read_text()
+    (out / "simulators.html").unlink()
+    assert main(["report", str(out)]) == 0
+    assert "straight-tip" in (out / "simulators.html").read_text()
+
+
+def test_a_third_party_in_a_bifurcation(tmp_path: Path) -> None:
+    manifest, out = synth("bifurcation", tmp_path / "study"), tmp_path / "out"
+    assert (
+        main(["score", str(manifest), "--curves", f"PyElastica={PEERS / 'bifurcation'}", "-o", str(out), *QUICK]) == 0
+    )
+    table = pd.read_csv(out / "simulators.csv").set_index(["simulator", "against"])
+    assert 0.8 < table.loc[("PyElastica", "wireval"), "rms_ratio"] < 1.5
+    assert errors_of(out, "bifurcation")["branch_ok"].all()
+
+
+ENTRY, ALONG = np.array([10.0, -40.0, 7.0]), np.array([0.0, 0.6, 0.8])
+
+
+def made(length_mm: float = 40.0) -> Array:
+    """A wire that leaves an entry along its direction and bends away."""
+    s = np.linspace(0.0, length_mm, 81)[:, None]
+    return np.asarray(ENTRY + s * ALONG + 0.006 * s**2 * [1.0, 0.0, 0.0])
+
+
+def judged(wire: Array, folder: Path) -> str:
+    """What is said of a wire in a file: by the reader, by where it lies, by its length."""
+    write_csv(folder, [wire])
+    (found,) = read_wires([Source(folder / "wire_000.csv")], 1)
+    if found.points_mm is None:
+        return found.problem
+    length = float(arc_length(begun(found.points_mm, ENTRY, ALONG))[-1])
+    return oddity(found.points_mm, ENTRY, ALONG) or not_to_depth(length, float(arc_length(made())[-1]), 2.0)
+
+
+def nan(wire: Array) -> Array:
+    return np.concatenate([wire[:3], [[np.nan] * 3], wire[3:]])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (nan, "1 of 82 points are NaN or infinite, the first is 3"),
+        (lambda wire: wire[:1], "1 different points"),
+        (lambda wire: np.repeat(wire[:1], 5, axis=0), "1 different points"),
+        (lambda wire: wire[:, :2], "x_mm"),
+        (lambda wire: wire[::-1], "read from its other end (tip first)"),
+        (lambda wire: wire / 1000.0, "if it were in m"),
+        (lambda wire: wire / 25.4, "if it were in inch"),
+        (lambda wire: wire * [-1.0, -1.0, 1.0], "if it were RAS"),
+        (lambda wire: wire[::-1] * [-0.1, -0.1, 0.1], "tip first) and RAS and in cm"),
+        (lambda wire: wire + 30.0 * np.eye(3)[2], "mm from entry_mm"),
+        (lambda wire: wire @ np.diag([1.0, 1.0, -1.0]) + [0.0, 0.0, 14.0], "degrees away"),
+        (lambda wire: ENTRY + 1e-3 * (wire - ENTRY), "is it in m?"),
+        (lambda wire: wire[:50], "mm long"),
+        (lambda wire: ENTRY + 1.2 * (wire - ENTRY), "mm long"),
+    ],
+)
+def test_a_bad_wire_is_told_by_name(tmp_path: Path, spoil: Callable[[Array], Array], said: str) -> None:
+    assert judged(made(), tmp_path / "good") == ""
+    assert said in judged(spoil(made()), tmp_path / "bad")
+
+
+def test_a_wire_begins_at_the_clamps_plane() -> None:
+    """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
+    wire = made()
+    introducer = ENTRY - np.array([[30.0], [0.4]]) * ALONG
+    np.testing.assert_allclose(begun(np.concatenate([introducer, wire[1:]]), ENTRY, ALONG)[:2], wire[:2], atol=2e-3)
+    late = begun(wire[3:], ENTRY, ALONG)
+    assert (late[0] - ENTRY) @ ALONG == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_array_equal(late[1:], wire[3:])
+    back = np.concatenate([introducer, wire[1:], wire[-1] - np.array([[50.0], [80.0]]) * ALONG, wire[-1:]])
+    assert len(begun(back, ENTRY, ALONG)) == len(back) - 2 + 1
+    np.testing.assert_array_equal(begun(wire, ENTRY, ALONG), wire)
+
+
+def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> None:
+    """A missing file, an empty one and a wire that stops half way: none is left out, each says why."""
+    wires = known[1]
+    folder = write_csv(tmp_path / "sim", [*wires[:3], wires[3][: len(wires[3]) // 2]])
+    (folder / "wire_001.csv").unlink()
+    (folder / "wire_002.csv").write_text("")
+    code, table, result = run_with(known, f'"{folder}/*.csv"', "spoilt")
+    assert code == 1
+    assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
+    assert "wire_003.csv: it is" in str(result["failures"])
+    assert pd.DataFrame([result["summary"]])["frames_ok"].item() == 1
+
+
+def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wires = known[1]
+    for name, folder, said in (
+        ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space is not stated"),
+        ("unit", write_csv(tmp_path / "unit", wires, "# space: LPS\nx,y,z"), "unit is not stated"),
+        ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "unit 'ft'"),
+        ("five", write_csv(tmp_path / "five", [*wires, wires[-1]]), "5 files, wire_000.csv to wire_004.csv, for 4"),
+        ("late", write_csv(tmp_path / "late", wires[1:3], first=1), "not known which belongs to which"),
+        ("turned", write_csv(tmp_path / "turned", [w[::-1] for w in wires]), "tip first"),
+        ("ras", write_csv(tmp_path / "ras", [w * [-1, -1, 1] + [0, 40, 0] for w in wires]), "entry_mm"),
+    ):
+        assert run_with(known, f'"{folder}/*.csv"', f"all-{name}")[0] == 2
+        assert said in capsys.readouterr().err, name
+    stated = f'{{files = "{tmp_path}/bare/*.csv", space = "LPS", unit = "mm"}}'
+    assert run_with(known, stated, "stated")[0] == 0
+    both = f'{{files = "{tmp_path}/feet/*.csv", space = "RAS"}}'
+    assert run_with(known, both, "both")[0] == 2
+    assert "the file says LPS, stated was RAS" in capsys.readouterr().err
+
+
+def test_every_format_and_what_it_states(tmp_path: Path) -> None:
+    """All give the same points: in RAS, in metres, as nodes that wait at the base, numbered from 1."""
+    wires = [made(20.0), made(30.0)]
+    for kind in ("vtp", "mrk", "vtk"):
+        (tmp_path / kind).mkdir()
+    for n, w in enumerate(wires):
+        write_polyline_vtp(tmp_path / "vtp" / f"a{n}.vtp", w)
+        write_markups_curve(tmp_path / "mrk" / f"a{n}.mrk.json", w, "wire")
+        ras = (w * [-1, -1, 1]).astype(">f8").tobytes()
+        line = np.array([len(w), *range(len(w))], ">i4").tobytes()
+        head = f"# vtk DataFile Version 3.0\nSPACE=RAS\nBINARY\nDATASET POLYDATA\nPOINTS {len(w)} double\n".encode()
+        rest = f"\nLINES 1 {len(w) + 1}\n".encode() + line + b"\n"
+        (tmp_path / "vtk" / f"a{n}.vtk").write_bytes(head + ras + rest)
+    with h5py.File(tmp_path / "all.h5", "w") as file:
+        for n, w in enumerate(wires):
+            file[f"frames/{n:03d}/simulated_mm"] = w
+    write_csv(tmp_path / "ras", [w * [-1e-3, -1e-3, 1e-3] for w in wires], "# space: RAS\n# unit: m\nx,y,z")
+    write_csv(tmp_path / "waiting", [np.concatenate([w[:1], w[:1], w]) for w in wires], first=1)
+    for place in ("vtp", "mrk", "vtk", "all.h5", "ras", "waiting"):
+        path = tmp_path / place
+        files = [Source(p) for p in ([path] if path.is_file() else sorted(path.iterdir()))]
+        for found, wire in zip(read_wires(files, 2), wires, strict=True):
+            np.testing.assert_allclose(found.points_mm, wire, atol=1e-6, err_msg=place)
+
+
+def test_which_file_is_which_frame() -> None:
+    """By number from 0 or 1, with gaps where that is certain; else by order; never by a guess."""
+
+    def frames(names: str, count: int) -> dict[int, str]:
+        found = numbered_frames([Path(f"{name}.csv") for name in names.split()], count)
+        return {frame: path.stem for frame, path in found.items()}
+
+    assert frames("w0 w2", 4) == {0: "w0", 2: "w2"}
+    assert frames("w1 w2 w4", 4) == {0: "w1", 1: "w2", 3: "w4"}
+    assert frames("w10.5 w20.5", 2) == {0: "w10.5", 1: "w20.5"}
+    assert frames("a b", 2) == {0: "a", 1: "b"}
+    for names, count in (("w1 w2", 4), ("w0 w7", 4), ("a b", 3), ("w0 w1 w2", 2)):
+        with pytest.raises(LoadError, match="not known which belongs to which"):
+            frames(names, count)
+
+
+def test_the_other_vtk_layouts(tmp_path: Path) -> None:
+    text = "# vtk DataFile Version 5.1\nvtk output\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0\n1 2 0\n"
+    text += "LINES 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n2 1 0\n"
+    (tmp_path / "a.vtk").write_text(text)
+    np.testing.assert_array_equal(read_vtk_points(tmp_path / "a.vtk"), [[1, 2, 0], [1, 0, 0], [0, 0, 0]])
+
+
+def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mixed = write_csv(tmp_path / "mixed", known[1])
+    write_polyline_vtp(mixed / "a.vtp", known[1][0])
+    full = tmp_path / "full"
+    write_csv(full, known[1])
+    for curves, out, said in (
+        (tmp_path / "nowhere", "o", "found neither bend/ nor bend.h5"),
+        (mixed, "o", ".csv and .vtp files"),
+        (f"wireval={full}", "o", "the name 'wireval'"),
+        (full, "full", "holds no score"),
+    ):
+        assert main(["score", str(known[0]), "--curves", str(curves), "-o", str(tmp_path / out), *QUICK]) == 2
+        assert said in capsys.readouterr().err
+
+
+def script(name: str) -> str:
+    found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(), re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def test_the_adapters_of_the_manual(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each on a file of the layout that the simulator writes."""
+    wire = np.array([[0.0, 0, 0], [0, 0, 10], [1, 0, 20]])
+    monkeypatch.chdir(tmp_path)
+    nodes = [[0, 0, 0, 0, 0, 0, 1]] * 3 + [[*point, 0, 0, 0, 1] for point in wire.tolist()]
+    numbers = " ".join(str(x) for node in nodes for x in node)
+    Path("wire.state").write_text("".join(f"T= {t}\n  X= {numbers} \n  V= {'0 ' * 36}\n" for t in (0.5, 1.0)))
+    exec(script("sofa"), {})
+    found = read_wires([Source(Path(f"wire_00{n}.csv")) for n in (0, 1)], 2)
+    np.testing.assert_allclose(found[1].points_mm, wire)
+    info = {"geom_pos": [wire / 1000.0 * (step + 1) for step in range(4)], "head_pos": []}
+    Path("trajectory").write_bytes(pickle.dumps({"obs": [], "info": info}))
+    exec(script("cathsim"), {})
+    found = read_wires([Source(Path(f"wire_00{n}.csv")) for n in (0, 1)], 2)
+    np.testing.assert_allclose(found[0].points_mm, 2 * wire, atol=1e-9)

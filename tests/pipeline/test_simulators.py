@@ -1,0 +1,128 @@
+"""Simulators side by side: ratios of pairs on common frames, and who is nearest where, on errors that are known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.run.simulators import write_comparison
+from reports import tables
+from reports.schema import ERRORS, POINTS
+from reports.simulators import render_simulators
+
+Array = NDArray[np.float64]
+Law = Callable[[Array, Array, np.random.Generator], Array]
+"""Errors (n,) at distances from the tip (n,) and depths (n,)."""
+CASES, DEPTHS = 6, (20.0, 30.0, 40.0, 50.0)
+
+
+def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) -> Path:
+    """An output of a run: six insertions of four frames. failed : (case, frame) of frames without a result."""
+    for c in range(CASES):
+        rng, folder = np.random.default_rng([c, len(out.name)]), out / "cases" / f"c{c}"
+        folder.mkdir(parents=True)
+        rows, parts = [], []
+        for f, depth in enumerate(DEPTHS):
+            arc = np.arange(10.0, depth + 0.1, 0.5)
+            error = law(depth - arc, np.full(len(arc), depth), rng) * (1 + 0.1 * c)
+            bad = (c, f) in failed
+            row = {"frame": f, "status": "curve_missing" if bad else "ok", "insertion_mm": depth}
+            rows.append(row | {} if bad else row | {"rms_mm": np.sqrt(np.mean(error**2)), "p95_mm": error.max()})
+            if not bad:
+                parts.append(pd.DataFrame({"frame": f, "arc_mm": arc, "error_mm": error}))
+        tables.write(folder / ERRORS.file, ERRORS, rows)
+        tables.write(folder / POINTS.file, POINTS, pd.concat(parts))
+        good = sum(row["status"] == "ok" for row in rows)
+        status = "ok" if good == len(rows) else "curve_missing"
+        summary = {"case": f"c{c}", "frames": len(rows), "frames_ok": good, "frames_failed": len(rows) - good}
+        said = [{"frame": r["frame"], "status": r["status"], "sentence": "", "message": ""} for r in rows]
+        whole = {
+            "case": f"c{c}",
+            "role": "validation",
+            "group": f"c{c}",
+            "status": status,
+            "sentence": "",
+            "frames": said,
+        }
+        whole |= {"failures": [], "summary": summary | {"status": status}}
+        (folder / "result.json").write_text(json.dumps(whole))
+    return out
+
+
+def even(level: float) -> Law:
+    return lambda tip, _depth, rng: level * (1 + 0.05 * rng.random(len(tip)))
+
+
+@pytest.fixture
+def compared(tmp_path: Path) -> Path:
+    """Ours 0.2 mm everywhere; "tip" better near the tip, worse behind it; "worse" twice as far, with failures."""
+    ours = write_tree(tmp_path / "wireval", even(0.2))
+    tip = write_tree(
+        tmp_path / "tip", lambda tip, depth, rng: even(0.2)(tip, depth, rng) * np.where(tip < 15, 0.5, 1.5)
+    )
+    worse = write_tree(tmp_path / "worse", even(0.4), failed=((0, 3), (1, 3), (2, 0)))
+    write_comparison(tmp_path, {"tip": tip, "worse": worse, "wireval": ours})
+    return tmp_path
+
+
+def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
+    table = pd.read_csv(compared / "simulators.csv").set_index(["simulator", "against"])
+    pair = table.loc[("worse", "wireval")]
+    assert pair["rms_ratio"] == pytest.approx(2.0, rel=0.02)
+    assert pair["rms_ratio_low"] < pair["rms_ratio"] < pair["rms_ratio_high"]
+    assert pair["common_frames"] == CASES * len(DEPTHS) - 3
+    alone = pd.read_csv(compared / "simulators.csv").query("against.isna()").set_index("simulator")
+    assert list(alone["frames"]) == [24, 24, 24], "planned ones, whatever failed"
+    assert alone.loc["worse", "frames_ok"] == 21
+    assert alone.loc["worse", "within_1mm"] == pytest.approx(21 / 24)
+
+
+def test_who_is_nearest_where(compared: Path) -> None:
+    where = pd.read_csv(compared / "where.csv")
+    lead = where[where["lead"].notna() & (where["along"] == "distance from the tip")].set_index("low_mm")
+    assert dict(lead["simulator"]) == {0.0: "tip", 5.0: "tip", 10.0: "tip"} | dict.fromkeys(
+        (15.0, 20.0, 25.0, 30.0, 35.0, 40.0), "wireval"
+    )
+    assert (lead["lead"].drop(40.0) == "clear").all()
+    assert lead.loc[0.0, "ratio_to_next"] == pytest.approx(0.5, rel=0.02)
+    depth = where[where["along"] == "insertion depth"]
+    assert set(depth["low_mm"]) == set(DEPTHS)
+    assert list(depth.query("low_mm == 50")["frames"]) == [CASES - 2] * 3, "frames that count for all"
+
+
+def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
+    both = {name: write_tree(tmp_path / name, even(0.2)) for name in ("wireval", "another")}
+    said = write_comparison(tmp_path, both)
+    assert set(pd.read_csv(tmp_path / "where.csv")["lead"].dropna()) == {"tie"}
+    assert "another / wireval, on 24 frames: 1.000 (95 %: 1.000 to 1.000" in said[0]
+
+
+def test_the_page(compared: Path) -> None:
+    page = render_simulators(compared).read_text(encoding="utf-8")
+    assert "rms_<wbr>ratio_<wbr>to_<wbr>wireval" in page
+    assert page.count('<tr class="bad">') == 1, "the one with failed frames"
+    assert (compared / "figures" / "who_is_nearest.png").exists()
+
+
+def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
+    ours = write_tree(tmp_path / "wireval", even(0.2))
+    none = write_tree(tmp_path / "none", even(0.2))
+    for folder in (none / "cases").iterdir():
+        (folder / POINTS.file).unlink()
+        result = json.loads((folder / "result.json").read_text())
+        result["summary"] |= {"frames_ok": 0, "frames_failed": 4}
+        (folder / "result.json").write_text(json.dumps(result))
+    assert write_comparison(tmp_path, {"none": none, "wireval": ours}) == []
+    table = pd.read_csv(tmp_path / "simulators.csv").set_index("simulator")
+    assert (table.loc["none", "frames"], table.loc["none", "frames_ok"], table.loc["none", "within_1mm"]) == (
+        24,
+        0,
+        0.0,
+    )
+    assert "none" in render_simulators(tmp_path).read_text(encoding="utf-8")

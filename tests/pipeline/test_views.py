@@ -1,0 +1,216 @@
+"""X-ray projections: what the source sees of a wire, what a shift may explain, and the same answer as in space."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.cli import main
+from pipeline.compare.views import screen_of, shift_of
+from pipeline.load.geometry import LoadError
+from pipeline.load.views import CArm, read_views
+from tests.pipeline.known_study import QUICK, errors_of, peers, simulated, write_csv, write_study
+
+Array = NDArray[np.float64]
+Known = tuple[Path, list[Array]]
+CENTRE = np.array([12.0, 0.0, 10.0])
+WITHIN_MM = 0.02
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
+    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
+    manifest = write_study(tmp_path_factory.mktemp("known"))
+    out = manifest.parent / "out"
+    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
+    return manifest, simulated(out)
+
+
+def c_arm(beam: tuple[float, float, float] = (0.3, -0.95, 0.1)) -> CArm:
+    """810 mm to the isocentre, 1113 mm to a detector of 1024 pixels, as an angiography unit has them."""
+    n = np.array(beam) / np.linalg.norm(beam)
+    u = np.cross(n, [0.0, 0.0, 1.0])
+    u /= np.linalg.norm(u)
+    v, source = np.cross(n, u), CENTRE - 810.0 * n
+    corner = source + 1113.0 * n - 512 * 0.25 * (u + v)
+    return CArm(source_mm=tuple(source), corner_mm=tuple(corner), u_mm=tuple(0.25 * u), v_mm=tuple(0.25 * v))
+
+
+def seen(arm: CArm, points: Array) -> Array:
+    """Pixels (n, 2): where the ray through each point meets the detector, by similar triangles alone."""
+    source, corner, u, v = (np.array(x) for x in (arm.source_mm, arm.corner_mm, arm.u_mm, arm.v_mm))
+    normal = np.cross(u, v)
+    ray = points - source
+    hit = source + ray * (((corner - source) @ normal) / (ray @ normal))[:, None]
+    return np.column_stack([(hit - corner) @ u / (u @ u), (hit - corner) @ v / (v @ v)])
+
+
+def helix(length: float = 150.0) -> Array:
+    s = np.linspace(0.0, length, 301)
+    return np.column_stack([20 * np.cos(s / 30), 20 * np.sin(s / 30), 0.6 * s]) + CENTRE - [0, 0, 40]
+
+
+def test_a_c_arm_is_the_matrix_of_its_rays() -> None:
+    arm, points = c_arm(), helix()
+    h = np.column_stack([points, np.ones(len(points))]) @ arm.matrix.T
+    np.testing.assert_allclose(h[:, :2] / h[:, 2:], seen(arm, points), atol=1e-8)
+
+
+def test_the_plane_holds_what_lies_on_it_and_shows_v_as_the_image_does() -> None:
+    arm = c_arm()
+    screen = screen_of(arm.matrix, CENTRE, seen(arm, helix()))
+    on_it = CENTRE + np.random.default_rng(1).normal(size=(20, 2)) * 30 @ screen.axes
+    np.testing.assert_allclose(screen.flat(on_it), on_it, atol=1e-9)
+    np.testing.assert_allclose(screen.curve_mm, screen.flat(helix()), atol=1e-6)
+    assert screen.axes[0] @ np.array(arm.u_mm) > 0
+    assert screen.axes[1] @ np.array(arm.v_mm) > 0
+    np.testing.assert_allclose(
+        screen_of(-3.0 * arm.matrix, CENTRE, seen(arm, helix())).curve_mm, screen.curve_mm, atol=1e-6
+    )
+    with pytest.raises(ValueError, match="behind the source"):
+        screen.flat(
+            np.array(arm.source_mm)[None] - 5 * screen.normal * np.sign((CENTRE - arm.source_mm) @ screen.normal)
+        )
+
+
+def test_a_patient_who_moved_is_found_and_the_end_takes_no_part() -> None:
+    """A shift of 6 mm in the plane comes back; bending the last 40 mm away does not change it."""
+    arm, wire = c_arm(), helix()
+    screen = screen_of(arm.matrix, CENTRE, seen(arm, wire))
+    moved = wire + np.array([4.0, -4.5]) @ screen.axes
+    found = shift_of(screen, moved, True) @ screen.axes.T
+    np.testing.assert_allclose(found, [-4.0, 4.5], atol=0.1)
+    bent = moved.copy()
+    bent[-76:, 0] += np.linspace(0, 15, 76) ** 2 / 15
+    cut = np.concatenate([bent[:-80], moved[-80:-76], bent[-76:]])
+    assert np.linalg.norm(shift_of(screen, cut, True) @ screen.axes.T - found) < 0.35
+    np.testing.assert_array_equal(shift_of(screen, moved, False), 0.0)
+    with pytest.raises(ValueError, match=r"50\.0 mm long"):
+        shift_of(screen, np.array([[0.0, 0, 0], [0, 0, 50.0]]) + CENTRE, True)
+
+
+def study(known: Known, folder: Path, translation: str = "none") -> Path:
+    """The study that is known in space, its traces projected, at the depths of the run in space."""
+    text, arm = known[0].read_text(), c_arm()
+    traces = peers("bend")
+    frames = [{"c_arm": arm.model_dump(), "points_px": seen(arm, trace).tolist()} for trace in traces]
+    views = {"isocentre_mm": CENTRE.tolist(), "leaf_mm": traces[-1][-1].tolist(), "translation": translation}
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "projections.json").write_text(json.dumps(views | {"frames": frames}))
+    depths = errors_of(known[0].parent / "out")["insertion_mm"].tolist()
+    text = re.sub(r"insertion_mm = .*", f"insertion_mm = {depths}", text)
+    text = text.replace('traces = "traces/*.csv"', 'projections = "projections.json"')
+    (folder / "manifest.toml").write_text(text.replace("vessel.swc", str(known[0].parent / "vessel.swc")))
+    return folder / "manifest.toml"
+
+
+def in_plane(wire: Array, trace: Array, beam: Array) -> float:
+    """The part across the line of sight of the distances of a wire, beyond its first 10 mm, to a curve; mm rms.
+
+    Parallel rays and a curve of points 0.01 mm apart: nothing of the product is used.
+    """
+
+    def dense(curve: Array, step: float) -> tuple[Array, Array]:
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+        at = np.append(np.arange(0.0, s[-1] - 1e-6, step), s[-1])
+        return np.column_stack([np.interp(at, s, curve[:, a]) for a in range(3)]), at
+
+    points, at = dense(wire, 0.5)
+    beam = beam / np.linalg.norm(beam)
+    across = np.eye(3) - np.outer(beam, beam)
+    points, target = points[at >= min(10.0, max(at[-1] - 2.0, 0.5 * at[-1]))] @ across, dense(trace, 0.01)[0] @ across
+    gaps = [np.linalg.norm(target - point, axis=1).min() for point in points]
+    return float(np.sqrt(np.mean(np.square(gaps))))
+
+
+def test_a_projected_study_gives_the_in_plane_part_of_the_answer(known: Known, tmp_path: Path) -> None:
+    """The bar: 0.02 mm, in every frame."""
+    manifest = study(known, tmp_path / "study")
+    assert main(["check", str(manifest)]) == 0
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), *QUICK]) == 0
+    table = errors_of(tmp_path / "out")
+    traces = peers("bend")
+    wanted = [
+        in_plane(wire, trace, np.mean(trace[-20:], axis=0) - c_arm().source_mm)
+        for wire, trace in zip(known[1], traces, strict=True)
+    ]
+    for wire, again in zip(known[1], simulated(tmp_path / "out"), strict=True):
+        np.testing.assert_allclose(wire, again, atol=1e-6, err_msg="the same wire, or nothing is compared")
+    np.testing.assert_allclose(table["rms_mm"], wanted, atol=WITHIN_MM)
+    assert max(wanted) > 5 * WITHIN_MM, "there is something to find"
+    assert table["null_centreline_rms_mm"].notna().all()
+    assert table["skill"].notna().all()
+    assert table[["arc_rms_mm", "branch_ok", "tip_along_mm"]].isna().all(axis=None), "a projection has none of these"
+    case = tmp_path / "out" / "cases" / "bend"
+    assert (case / "figures" / "views.png").exists()
+    assert not (case / "figures" / "projections.png").exists(), "there is no scan to show"
+    assert "no curve was fitted" not in (case / "report.html").read_text(), "the assumptions say what was"
+
+
+def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known: Known, tmp_path: Path) -> None:
+    manifest = study(known, tmp_path / "study")
+    file = manifest.parent / "projections.json"
+    views = json.loads(file.read_text())
+    for frame in views["frames"]:
+        frame["points_px"] = np.add(frame["points_px"], [0.0, 20.0]).tolist()
+    file.write_text(json.dumps(views))
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
+    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text())
+    said = r"registration-limited: centreline \d\.\d mm in a lumen of \d\.\d mm radius; no skill can be claimed"
+    assert re.search(said, result["warnings"][0])
+    assert "skill" not in {k for k, v in result["summary"].items() if v is not None}
+    assert errors_of(tmp_path / "out")["rms_mm"].notna().all()
+
+
+def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path) -> None:
+    manifest = study(known, tmp_path / "study", "fitted")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
+    assert set(errors_of(tmp_path / "out")["status"]) == {"view_failed"}
+    assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text()
+
+
+def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> None:
+    file = study(known, tmp_path).with_name("projections.json")
+    good = json.loads(file.read_text())
+    assert len(read_views(file, 4)) == 4
+    arm = good["frames"][0]["c_arm"]
+    for change, said in (
+        ({"frames": good["frames"][:3]}, "holds 3 frames for 4"),
+        ({"leaf_mm": [0.0, 1.0]}, "leaf_mm"),
+        ({"frames": [{"points_px": [[0, 0], [1, 1]]}] * 4}, "one of matrix and c_arm"),
+        ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, 0]]}] * 4}, "two different points"),
+        ({"frames": [{"c_arm": arm, "points_px": [[0, 0], [0, float("nan")]]}] * 4}, "points_px"),
+        ({"frames": [{"matrix": np.eye(4)[[0, 1, 3]].tolist(), "points_px": [[0, 0], [1, 1]]}] * 4}, "source"),
+        ({"translate": "none"}, "translate"),
+    ):
+        file.write_text(json.dumps(good | change))
+        with pytest.raises(LoadError, match=said):
+            read_views(file, 4)
+    file.write_text("{")
+    with pytest.raises(LoadError, match="cannot be read as projections"):
+        read_views(file, 4)
+
+
+def test_projections_stand_for_scans_alone(known: Known, tmp_path: Path) -> None:
+    manifest = study(known, tmp_path)
+    write_csv(tmp_path / "traces", known[1])
+    manifest.write_text(manifest.read_text().replace("projections =", 'traces = "traces/*.csv"\nprojections ='))
+    assert main(["check", str(manifest)]) == 2
+
+
+def test_other_simulators_are_scored_in_projections_too(known: Known, tmp_path: Path) -> None:
+    """Own wires handed in as another simulator's: the same errors."""
+    manifest = study(known, tmp_path / "study")
+    text = manifest.read_text()
+    curves = write_csv(tmp_path / "sim", known[1])
+    manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='))
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
+    manifest.write_text(text)
+    assert main(["run", str(manifest), "-o", str(tmp_path / "own"), "--until", "compare", *QUICK]) == 0
+    pd.testing.assert_series_equal(errors_of(tmp_path / "out")["rms_mm"], errors_of(tmp_path / "own")["rms_mm"])

@@ -1,0 +1,75 @@
+"""``import wireval``: the verbs as typed, results as frames; wrong input raises what the terminal says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import wireval
+from pipeline.cli import main
+from pipeline.run.sweep import PLAIN
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scans")
+    assert main(["synth", "straight", "-o", str(folder), "--size", "72", "--frames", "2"]) == 0
+    return folder
+
+
+def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
+    for name in wireval.__all__:
+        assert getattr(wireval, name).__doc__, name
+    promised = {"check", "run", "read_results", "point_to_curve", "GuideWire", "Insertion", "Insertions", "VesselWall"}
+    assert promised | {"score", "calibrate", "Grid", "relax", "InputError"} <= set(wireval.__all__)
+
+
+def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
+    assert wireval.check(study) == []
+    assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
+    assert "greater than 0" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
+    assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
+
+
+def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
+    wall = {"simulate.wall_scale": [0.5]}
+    kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}
+    results = wireval.run(study, tmp_path / "out", sweep=wall, **kept)
+    assert results.ok
+    assert list(results.errors["case"]) == ["straight"] * 2
+    assert list(results.sweep["parameter"]) == [PLAIN, "simulate.wall_scale"]
+    assert results.cases["straight"].result["config"]["solver"]["segment_mm"]["value"] == 2.0
+    last = results.points[results.points["frame"] == 1]
+    rms = (last["error_mm"] ** 2).mean() ** 0.5
+    assert rms == pytest.approx(results.errors["rms_mm"].iloc[1], rel=1e-6)
+    assert results.cases["straight"].read_frame(1).simulated_mm is not None
+    assert "straight" in results._repr_html_()
+    assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
+
+
+def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    typed: list[str] = []
+    monkeypatch.setattr(wireval, "parsed", lambda words: typed.extend(words))
+    monkeypatch.setattr(wireval, "carried_out", lambda args: 0)
+    wireval.calibrate("m.toml", tmp_path, design=True, no_cache=False, settings={"solver.segment_mm": "auto"})
+    setting = ["--set", 'solver.segment_mm="auto"']
+    assert typed == ["calibrate", "m.toml", *setting, "--out", str(tmp_path), "--design"]
+    typed.clear()
+    with pytest.raises(wireval.InputError, match="no cases"):
+        wireval.score("m.toml", tmp_path, ["a=x", "b=y"], jobs=2)
+    assert typed == ["score", "m.toml", "--out", str(tmp_path), "--curves", "a=x", "--curves", "b=y", "--jobs", "2"]
+    monkeypatch.setattr(wireval, "carried_out", lambda args: 2)
+    with pytest.raises(wireval.InputError, match="nothing was run"):
+        wireval.calibrate("m.toml", tmp_path)
+
+
+def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:
+    with pytest.raises(wireval.InputError, match="no such case"):
+        wireval.run(study, tmp_path / "out", only=["none"])
+    with pytest.raises(wireval.InputError, match="did you mean '--fresh'"):
+        wireval.run(study, tmp_path / "out", fesh=True)
+    with pytest.raises(wireval.InputError, match="wireval run"):
+        wireval.read_results(tmp_path)
+    with pytest.raises(wireval.InputError, match="cannot be written"):
+        wireval.run(study, study / "manifest.toml" / "out")

@@ -1,0 +1,139 @@
+"""Worker processes: they die alone, keep to limits, and never outlive the run."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from pipeline.run import workers
+from pipeline.run.batch import run_all
+from pipeline.run.workers import Limits, in_processes
+
+LONG_S = 300
+
+
+@pytest.fixture(autouse=True)
+def _nothing_heavy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """These jobs need none of the pipeline's modules."""
+    monkeypatch.setattr(workers, "PRELOADED", "time")
+
+
+def hungry(job: str) -> str:
+    """Takes too long, takes too much, or does neither."""
+    if job == "long":
+        time.sleep(LONG_S)
+    if job == "much":
+        held = [bytearray(os.urandom(2**20)) for _ in range(400)]
+        time.sleep(LONG_S)
+        return str(len(held))
+    return job
+
+
+def test_who_takes_more_than_allowed_is_named_and_the_others_go_on() -> None:
+    limits = Limits(seconds=20.0, memory_mib=resident_of_a_worker() + 200.0)
+    found = {o.job: o for o in run_all(["a", "much", "b"], hungry, 2, limits=limits)}
+    assert (found["a"].result, found["b"].result) == ("a", "b")
+    assert found["much"].status == "over_limit"
+    assert "MiB of memory, more than" in found["much"].error
+    (late,) = run_all(["long"], hungry, limits=Limits(seconds=0.5))
+    assert "took longer than the 0.5 s of --case-timeout (peak memory " in late.error
+
+
+def resident_of_a_worker() -> float:
+    (found,) = in_processes([0], own_memory, 1)
+    assert found.result is not None
+    return found.result
+
+
+def own_memory(_: int) -> float:
+    return workers.resident_mib(os.getpid())
+
+
+def test_the_signal_that_ended_a_worker_is_told() -> None:
+    (found,) = run_all(["x"], killed, limits=Limits(seconds=LONG_S))
+    assert (found.status, "signal 9, SIGKILL" in found.log) == ("worker_lost", True)
+
+
+def killed(_: str) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+PARENT = """
+import sys
+from pathlib import Path
+from pipeline.run import workers
+from tests.pipeline.test_workers import deaf
+workers.PRELOADED = "time"
+if __name__ == "__main__":
+    list(workers.in_processes([Path(sys.argv[1], name) for name in "ab"], deaf, 2))
+"""
+
+
+def deaf(path: Path) -> None:
+    """Keeps the interpreter to itself, so that no thread and no handler of this process gets a turn."""
+    path.with_suffix(".tmp").write_text(str(os.getpid()))
+    path.with_suffix(".tmp").rename(path)
+    ctypes.PyDLL(None).sleep(LONG_S)
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_worker_outlives_its_parent(tmp_path: Path, how: signal.Signals) -> None:
+    """The parent may have no chance to say anything, the worker none to listen."""
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    with subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)], stderr=subprocess.DEVNULL, env=with_root()
+    ) as parent:
+        wait_for(lambda: all((tmp_path / name).exists() for name in "ab"))
+        numbers = [int((tmp_path / name).read_text()) for name in "ab"]
+        assert all(Path(f"/proc/{n}").exists() for n in numbers)
+        parent.send_signal(how)
+    wait_for(lambda: not any(running(n) for n in numbers))
+
+
+def with_root() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+
+
+def running(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(condition) -> None:  # type: ignore[no-untyped-def]
+    """A minute is long on any machine, and a fifth of what the jobs sleep."""
+    for _ in range(3000):
+        if condition():
+            return
+        time.sleep(0.02)
+    pytest.fail("it has not come about")
+
+
+def test_leaving_early_ends_the_workers(tmp_path: Path) -> None:
+    outcomes = in_processes(["a", "long", "b"], hungry, 2)
+    assert next(outcomes).result == "a"
+    clock = time.monotonic()
+    outcomes.close()
+    assert time.monotonic() - clock < LONG_S / 2
+
+
+def with_a_child(_: int) -> int | None:
+    """The stress study's scenes run in forks of their worker."""
+    child = multiprocessing.get_context("fork").Process(target=os._exit, args=(7,))
+    child.start()
+    child.join()
+    return child.exitcode
+
+
+def test_a_job_may_have_processes_of_its_own() -> None:
+    assert [outcome.result for outcome in in_processes([0], with_a_child, 1)] == [7]

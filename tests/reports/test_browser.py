@@ -1,0 +1,191 @@
+"""The pages in a browser: from a copied folder, by keys, without a network; `make browser` brings what it needs.
+
+Skipped without playwright (extra ``browser``) or a Chromium on the path.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from reports.case_files import find_cases
+from reports.html import render_case, render_index
+from tests.reports.fake_results import FakeCase, write_run
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: run `make browser`")
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the path: `apt-get install chromium`"),
+    # of the driver's own event loop, at its end
+    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+CASES = (
+    FakeCase("good", frames=6, truth=True),
+    FakeCase("phantom <run> 2", frames=6, seed=3, failed=(2, 3), error_mm=0.35),
+    FakeCase("dry", frames=4, simulated_only=True),
+)
+WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 390, "height": 844}
+Opener = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = write_run(tmp_path_factory.mktemp("run") / "out", CASES, sweep=True)
+    for folder in find_cases(out):
+        render_case(folder)
+    render_index(out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        flags = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Opener]:
+    """Open a page; what it asks the network for and what it complains of fail the test at its end."""
+    contexts, complaints = [], []
+
+    def open_page(path: Path, viewport: Any = WIDE, **options: Any) -> Any:
+        context = browser.new_context(viewport=viewport, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda asked: asked.url.startswith(("file:", "data:")) or complaints.append(asked.url))
+        page.goto(path.as_uri())
+        page.wait_for_timeout(200)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not complaints
+
+
+def copied(run: Path, case: str, target: Path) -> Path:
+    """The folder of one case alone, somewhere else."""
+    shutil.copytree(run / "cases" / case, target / "elsewhere")
+    return target / "elsewhere" / "report.html"
+
+
+def painted(page: Any, canvas: str) -> int:
+    """How many pixels of a canvas are not empty."""
+    count = """(name) => { const c = document.querySelector(name);
+        const seen = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+        return seen.filter((v, i) => i % 4 === 3 && v).length }"""
+    return int(page.evaluate(count, canvas))
+
+
+def test_the_viewer_of_a_copied_case_goes_by_keys(run: Path, tmp_path: Path, opened: Opener) -> None:
+    page = opened(copied(run, "good", tmp_path))
+    page.focus("#frame")
+    page.keyboard.press("Home")
+    page.wait_for_timeout(150)
+    assert page.inner_text("#frame-text").startswith("frame 0 (1 of 6), 20.0 mm deep, ok, rms 0.")
+    mark = page.locator(".plot i").first
+    before = mark.evaluate("line => line.style.left")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(150)
+    assert page.inner_text("#frame-text").startswith("frame 2 (3 of 6)")
+    assert float(mark.evaluate("line => line.style.left")[:-1]) > float(before[:-1]) + 5
+    for canvas in ("canvas[data-axis='0']", "canvas[data-axis='2']", "#wires", "#straight"):
+        assert painted(page, canvas) > 500, canvas
+    page.focus("#wires")
+    turned = page.evaluate("document.getElementById('wires').toDataURL()")
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_timeout(150)
+    assert page.evaluate("document.getElementById('wires').toDataURL()") != turned
+
+
+def test_the_place_on_the_wire_and_the_zoom_drive_all_views(run: Path, tmp_path: Path, opened: Opener) -> None:
+    page = opened(copied(run, "good", tmp_path))
+    pictures = "[...document.querySelectorAll('canvas[data-axis], #straight')].map((c) => c.toDataURL())"
+    before = page.evaluate(pictures)
+    page.fill("#zoom", "3")
+    page.fill("#place", "0.5")
+    page.wait_for_timeout(150)
+    assert all(a != b for a, b in zip(before, page.evaluate(pictures), strict=True))
+    assert "mm from the entry, 0." in page.inner_text("#place-text")
+
+
+def test_worst_frames_of_the_run_open_in_the_viewer(run: Path, opened: Opener) -> None:
+    page = opened(run / "index.html")
+    link = page.locator("main p", has_text="Worst frames").locator("a").first
+    frame = link.inner_text().split()[-1]
+    link.click()
+    page.wait_for_timeout(300)
+    assert page.inner_text("#frame-text").startswith(f"frame {frame} (")
+
+
+def test_tables_sort_filter_and_copy(run: Path, opened: Opener) -> None:
+    page = opened(run / "index.html")
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    box = page.locator("[data-table]", has=page.locator("th[data-name='rms_mm']")).first
+    names = "rows => rows.map((r) => r.cells[0].innerText)"
+    body = box.locator("tbody tr")
+    assert body.evaluate_all(names)[0] == "phantom <run> 2"  # what failed comes first
+    box.locator("th[data-name='case'] button").focus()
+    page.keyboard.press("Enter")
+    assert body.evaluate_all(names) == ["dry", "good", "phantom <run> 2"]
+    box.locator("th[data-name='rms_mm'] button").click()
+    box.locator("th[data-name='rms_mm'] button").click()
+    assert box.locator("th[data-name='rms_mm']").get_attribute("aria-sort") == "descending"
+    assert body.evaluate_all(names) == ["phantom <run> 2", "good", "dry"]  # none is last either way
+    box.locator("input[type=search]").fill("phantom")
+    assert box.locator("output").inner_text() == "1 of 3 rows"
+    copies = {}
+    for form in ("CSV", "Markdown", "LaTeX"):
+        box.locator(f"button[data-copy={form}]").click()
+        copies[form] = page.evaluate("window.copied")
+    assert copies["CSV"].splitlines()[0].startswith("case,role,status,frames,")
+    assert len(copies["CSV"].splitlines()) == 2
+    assert copies["Markdown"].splitlines()[1].startswith("| --- | ---")
+    assert r"frames\_ok" in copies["LaTeX"]
+    assert r"\end{tabular}" in copies["LaTeX"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("viewport", [WIDE, NARROW], ids=["1280", "390"])
+def test_axe_finds_nothing_serious(run: Path, opened: Opener, viewport: Any, scheme: str) -> None:
+    found = importlib.util.find_spec("axe_core_python")
+    if found is None or found.origin is None:
+        pytest.skip("axe-core-python is not installed: run `make browser`")
+    for path in (run / "index.html", *(run / "cases" / case.name / "report.html" for case in CASES[1:])):
+        page = opened(path, viewport, color_scheme=scheme)
+        page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+        page.add_script_tag(path=str(Path(found.origin).with_name("axe.min.js")))
+        violations = page.evaluate("axe.run()")["violations"]
+        bad = [v for v in violations if v["impact"] in ("serious", "critical")]
+        assert not bad, [(v["id"], v["help"], [n["html"][:160] for n in v["nodes"][:3]]) for v in bad]
+        assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_paper_shows_what_is_folded_and_cuts_nothing(run: Path, opened: Opener) -> None:
+    page = opened(run / "cases" / CASES[1].name / "report.html", {"width": 1040, "height": 720})
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.evaluate("[...document.querySelectorAll('details')].every((part) => part.open)")
+    # 277 mm of an A4 page at 96 dots per inch are 1047 pixels
+    wide = "[...document.querySelectorAll('table, img, pre')].map((e) => e.getBoundingClientRect().right)"
+    assert max(page.evaluate(wide)) <= 1041
+    assert page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
+
+
+def test_without_javascript_the_figures_and_tables_remain(run: Path, opened: Opener) -> None:
+    page = opened(run / "cases" / "good" / "report.html", java_script_enabled=False)
+    assert not page.locator(".viewer").is_visible()
+    assert page.locator("#projections").is_visible()
+    assert page.locator("table.grid tbody tr").count() == 6
+    assert not page.locator("button[data-copy]").first.is_visible()

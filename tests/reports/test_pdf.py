@@ -1,0 +1,41 @@
+"""summary.pdf: four pages, whatever the run holds, the same bytes twice."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from reports import pdf, tables
+from reports.case_files import find_cases
+from reports.html import render_case, render_index
+from reports.pdf import write_pdf
+from reports.schema import SUMMARY
+from tests.reports.fake_results import FakeCase, write_run
+
+
+def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> None:
+    cases = (FakeCase("fine", frames=3), FakeCase("poor", frames=3, failed=(1,), error_mm=0.6))
+    out = write_run(tmp_path / "out", cases)
+    for folder in find_cases(out):
+        render_case(folder)
+    render_index(out)
+    first = write_pdf(out).read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", first)) == 4
+    assert write_pdf(out).read_bytes() == first
+    summary = tables.read(out / "summary.csv", SUMMARY)
+    pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
+    said = (
+        ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
+        ("planned frames",),
+        ("worst case: poor", "Error against insertion depth"),
+    )
+    for page, words in zip(pages, (*said, ("solver.segment_mm", "frames_failed")), strict=True):
+        assert not [word for word in words if word not in page], page
+
+
+@pytest.mark.parametrize("cases", [(), (FakeCase("s", frames=2, simulated_only=True),)], ids=["none", "simulated"])
+def test_a_run_without_errors_has_its_four_pages(tmp_path: Path, cases: tuple[FakeCase, ...]) -> None:
+    path = write_pdf(write_run(tmp_path / "out", cases))
+    assert len(re.findall(rb"/Type /Page\b", path.read_bytes())) == 4

@@ -1,0 +1,42 @@
+"""Outputs that others open: spreadsheets run nothing, links lead nowhere else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from pipeline.cli import main
+from reports import tables
+from reports.inside import links_out
+from reports.schema import SUMMARY
+from tests.pipeline.test_manifest import GOOD
+
+
+def test_a_formula_in_a_table_is_a_text(tmp_path: Path) -> None:
+    rows = [{"case": "a", "group": text, "frames": 1} for text in ("=1+1", "+x", "-x", "@x", "\tx", "x=1", "'x")]
+    tables.write(tmp_path / "summary.csv", SUMMARY, rows)
+    written = pd.read_csv(tmp_path / "summary.csv", dtype=str)["group"]
+    assert list(written) == ["'=1+1", "'+x", "'-x", "'@x", "'\tx", "x=1", "'x"]
+    assert list(tables.read(tmp_path / "summary.csv", SUMMARY)["group"]) == [row["group"] for row in rows]
+
+
+def test_numbers_below_zero_stay_numbers(tmp_path: Path) -> None:
+    tables.write_csv(tmp_path / "a.csv", pd.DataFrame({"x": [-1.5], "y": ["-a"]}))
+    assert (tmp_path / "a.csv").read_text() == "x,y\n-1.5,'-a\n"
+
+
+def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    (out / "cases").mkdir(parents=True)
+    elsewhere.mkdir()
+    (out / "inner").symlink_to(out / "cases")
+    assert links_out(out) == []
+    assert links_out(tmp_path / "nothing") == []
+    (out / "cases" / "run1").symlink_to(elsewhere)
+    (out / "loop").symlink_to(out / "loop")
+    (tmp_path / "f.mha").touch()
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "f.mha"))
+    assert main(["run", str(tmp_path / "m.toml"), "-o", str(out), "--resume"]) == 2
+    assert "links lead out of it" in capsys.readouterr().err  # type: ignore[attr-defined]
+    assert list(elsewhere.iterdir()) == []

@@ -1,0 +1,143 @@
+"""The verdict on two runs: what differs comes first; the gate closes on frames and on pooled values."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.cli import main
+from pipeline.run.overall import Ratio
+from reports import tables
+from reports.schema import ERRORS, POINTS
+from reports.two_runs import Verdict
+from tests.reports.fake_results import FakeCase, write_run
+
+GROUPS = ("a", "b", "c")
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of three insertions."""
+    out = tmp_path_factory.mktemp("first") / "out"
+    write_run(out, tuple(FakeCase(name, frames=3, seed=n, error_mm=0.1) for n, name in enumerate(GROUPS)))
+    for name in GROUPS:
+        path = out / "cases" / name / "result.json"
+        result = json.loads(path.read_text(encoding="utf-8"))
+        path.write_text(json.dumps(result | {"group": name}), encoding="utf-8")
+    return out
+
+
+def times(out: Path, factor: float) -> None:
+    """Make every error of a run larger."""
+    for name in GROUPS:
+        folder = out / "cases" / name
+        for file, table in ((ERRORS.file, ERRORS), (POINTS.file, POINTS)):
+            rows = tables.read(folder / file, table)
+            for column in {"error_mm", "rms_mm"} & set(rows):
+                rows[column] *= factor
+            tables.write(folder / file, table, rows)
+
+
+@pytest.fixture
+def second(first: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(first, tmp_path / "second")
+
+
+def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diff", str(first), str(first)]) == 0
+    said = capsys.readouterr().out
+    assert "What differs" not in said
+    assert "no frame's error changed" in said
+    assert said.splitlines()[-1].startswith("not worse")
+
+
+def test_what_differs_is_said_first(first: Path, second: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = json.loads((second / "run.json").read_text(encoding="utf-8"))
+    table, key = next((table, key) for table, items in run["config"].items() for key in items)
+    run["config"][table][key] = {"value": "another", "source": "command line"}
+    run["provenance"]["git_commit"] = "0123abc"
+    (second / "run.json").write_text(json.dumps(run), encoding="utf-8")
+    path = second / "cases" / "a" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result["inputs"] = [{"path": "x/frame_000.mha", "sha256": "f" * 64, "bytes": 1}]
+    path.write_text(json.dumps(result), encoding="utf-8")
+    assert main(["diff", str(first), str(second)]) == 0, "another commit alone is no regression"
+    said = capsys.readouterr().out
+    assert said.splitlines()[0] == "What differs between the runs:"
+    for what in (f"{table}.{key}", "0123abc", "input of a: frame_000.mha"):
+        assert what in said
+
+
+def test_small_changes_of_every_frame_close_the_gate_over_all(first: Path, second: Path, tmp_path: Path) -> None:
+    """A tenth more of 0.1 mm is allowed in a frame; in all of them at once it is not."""
+    times(second, 1.1)
+    junit, page = tmp_path / "diff.xml", tmp_path / "diff.html"
+    assert main(["diff", str(first), str(second), "--junit", str(junit), "--html", str(page)]) == 1
+    failures = ET.parse(junit).findall(".//failure")
+    assert [failure.get("type") for failure in failures] == ["rms_ratio"]
+    assert "the second is worse" in str(failures[0].get("message"))
+    assert "over all frames it is worse" in page.read_text(encoding="utf-8")
+    assert main(["diff", str(second), str(first)]) == 0, "better"
+
+
+def test_a_frame_that_became_worse_stands_in_every_file(first: Path, second: Path, tmp_path: Path) -> None:
+    path = second / "cases" / "b" / ERRORS.file
+    rows = tables.read(path, ERRORS)
+    rows.loc[2, "tip_mm"] += 1.0
+    tables.write(path, ERRORS, rows)
+    files = {kind: tmp_path / f"diff.{kind}" for kind in ("json", "markdown", "junit", "html")}
+    asked = [word for kind, file in files.items() for word in (f"--{kind}", str(file))]
+    assert main(["diff", str(first), str(second), *asked]) == 1
+    plain = json.loads(files["json"].read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert plain["closed"] is True
+    assert [(row["case"], row["frame"], row["column"]) for row in plain["regressions"]] == [("b", 2, "tip_mm")]
+    suites = {suite.get("name"): suite for suite in ET.parse(files["junit"]).getroot()}
+    assert {name: suite.get("failures") for name, suite in suites.items()} == {"all": "0", "a": "0", "b": "1", "c": "0"}
+    bad = suites["b"].find("testcase[failure]")
+    assert bad is not None
+    assert bad.get("name") == "frame 2"
+    assert "| b | 2 | tip_mm |" in files["markdown"].read_text(encoding="utf-8")
+    assert "tip_mm" in files["html"].read_text(encoding="utf-8")
+
+
+def test_what_is_missing_is_worse(first: Path, second: Path, tmp_path: Path) -> None:
+    shutil.rmtree(second / "cases" / "c")
+    junit = tmp_path / "diff.xml"
+    assert main(["diff", str(first), str(second), "--junit", str(junit)]) == 1
+    assert [f.text for f in ET.parse(junit).findall(".//failure")] == ["case: present -> missing"]
+
+
+def test_golden_tables_alone_are_enough(first: Path, tmp_path: Path) -> None:
+    """A baseline in a repository is errors.csv and no more: frame by frame is all that can be said."""
+    for name in GROUPS:
+        (tmp_path / "golden" / "cases" / name).mkdir(parents=True)
+        shutil.copy(first / "cases" / name / ERRORS.file, tmp_path / "golden" / "cases" / name)
+    assert main(["diff", str(tmp_path / "golden"), str(first)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("ratio", "meaning"),
+    [
+        (Ratio(1.2, 1.1, 1.3, 5, "over 6 insertions"), "the second is worse"),
+        (Ratio(0.8, 0.7, 0.9, 5, "over 6 insertions"), "the second is better"),
+        (Ratio(1.2, 0.9, 1.5, 5, "over 6 insertions"), "no difference is shown"),
+        (Ratio(1.2, float("nan"), float("nan"), 5, "withheld"), "too few insertions"),
+        (Ratio(1.0, 1.0, 1.0, 5, "over 6 insertions"), "no frame's error changed"),
+    ],
+)
+def test_the_words_follow_the_interval(ratio: Ratio, meaning: str) -> None:
+    assert meaning in ratio.verdict
+
+
+def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
+    from reports.diff import diff_folders
+
+    frames = diff_folders(first, first, {})
+    verdict = Verdict([{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", False, frames)
+    assert "a\\|b &lt;c&gt;" in verdict._markdown()
+    assert replace(verdict, pooled_worse=True).closed

@@ -1,0 +1,47 @@
+"""The first sentence of a page, the worst frames and the next command."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from reports.verdict import next_command, verdict, worst_frames
+
+
+@pytest.mark.parametrize(
+    ("skill", "low", "said"),
+    [
+        (0.9, 0.7, "That is better than the predictor roll unknown (skill 0.900)."),
+        (0.9, None, "That is better than the predictor roll unknown (skill 0.900)."),
+        (
+            0.4,
+            -0.1,
+            "That it is better than the predictor roll unknown is not shown: the skill's interval reaches -0.100.",
+        ),
+        (-0.2, -0.5, "That is no better than the predictor roll unknown (skill -0.200)."),
+    ],
+)
+def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None, said: str) -> None:
+    row = {"rms_mm": 0.25, "p95_mm": 0.5, "skill": 0.99, "skill_strongest": skill, "strongest_null": "roll_unknown"}
+    text = verdict(row | {"skill_strongest_low": low})
+    assert text.startswith("The simulated wire lies 0.250 mm (rms) from the traced one; 95 % of its points lie within")
+    assert text.endswith(said)
+
+
+def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:
+    assert verdict({"frames_ok": 0}) == ""
+    assert "95 % interval 0.200 to 0.310 mm" in verdict({"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31})
+
+
+def test_worst_frames_leave_out_what_failed() -> None:
+    table = pd.DataFrame({"frame": [0, 1, 2], "status": ["ok", "no_wire", "ok"], "p95_mm": [0.5, 9.0, 0.7]})
+    rows = worst_frames({"a": table, "b": table.assign(p95_mm=0.6)}, {"a": "cases/a/report.html"})
+    assert [(r["case"], r["frame"]) for r in rows] == [("a", 2), ("b", 0), ("b", 2), ("a", 0)]
+    assert rows[0]["link"] == "cases/a/report.html"
+
+
+def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo() -> None:
+    typed = ["wireval", "run", "m.toml", "-o", "out", "--only", "x", "--fresh", "-j", "2"]
+    assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c"
+    assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c"
+    assert "--only" not in next_command(map(str, range(20)))

@@ -1,0 +1,95 @@
+"""How often intervals over insertions hold the true value: ``python -m tests.studies.interval_coverage [REPETITIONS]``.
+
+A frame's mean square is log-normal (its logarithm has a standard deviation of 0.8, as in the circle of Willis), follows
+the frame before with a correlation, and shares a part of its variance with all frames of its insertion; one frame in
+twenty is off by four times as much. The predictor's mean square is ten times as large and goes along, correlated 0.6.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from pipeline.compare.intervals import of_log_ratio, of_medians
+
+SEED = 100
+SPREAD, OUTLIERS, LARGER, NULL, SHARED = 0.8, 0.05, 16.0, 10.0, 0.6
+FRAMES, FEWER, MORE = 30, 10, 50
+"""Frames of an insertion; where lengths are unequal, from the fewest to the most."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Correlation of neighbours, insertions, share of variance between them, unequal lengths, outliers."""
+
+    lag: float
+    insertions: int
+    between: float
+    unequal: bool
+    outliers: bool
+
+    @property
+    def lengths(self) -> list[int]:
+        ends = (FEWER, MORE) if self.unequal else (FRAMES, FRAMES)
+        return [round(n) for n in np.linspace(*ends, self.insertions)]
+
+
+CONDITIONS = [
+    Condition(*c) for c in itertools.product((0.5, 0.8), (3, 6, 20), (0.0, 0.35), (False, True), (False, True))
+]
+
+
+def normal(draw: np.random.Generator, frames: int, c: Condition) -> np.ndarray:
+    """Standard normal values (frames,) of one insertion."""
+    steps = draw.normal(size=frames)
+    steps[1:] *= np.sqrt(1 - c.lag**2)
+    own = lfilter([1.0], [1.0, -c.lag], steps)
+    return np.sqrt(1 - c.between) * own + np.sqrt(c.between) * draw.normal()
+
+
+def covered(draw: np.random.Generator, c: Condition) -> tuple[bool, bool, bool]:
+    """Whether mean square, its ratio to the predictor's, and median error of one draw hold the true value."""
+    squares, nulls, points, errors = [], [], [], []
+    for frames in c.lengths:
+        first, count = normal(draw, frames, c), np.linspace(20, 130, frames)
+        second = SHARED * first + np.sqrt(1 - SHARED**2) * normal(draw, frames, c)
+        factor = np.where(draw.random(frames) < OUTLIERS * c.outliers, LARGER, 1.0)
+        mean_square = np.exp(SPREAD * first - 0.5 * SPREAD**2) * factor
+        errors.append(np.sqrt(np.exp(SPREAD * first)))
+        points.append(count.sum())
+        squares.append(mean_square @ count)
+        nulls.append(NULL * np.exp(SPREAD * second - 0.5 * SPREAD**2) @ count)
+    s, n, p = map(np.array, (squares, nulls, points))
+    true = np.log(1 + OUTLIERS * c.outliers * (LARGER - 1))
+    (a, b), (d, e), (f, g) = of_log_ratio(s, p, p), of_log_ratio(s, n, p), of_medians(errors)
+    return bool(a <= true <= b), bool(d <= true - np.log(NULL) <= e), bool(f <= 1.0 <= g)
+
+
+def coverage(c: Condition, repetitions: int) -> np.ndarray:
+    """Shares (3,) of repetitions in which the interval of mean square, ratio and median holds the true value."""
+    draw = np.random.default_rng([SEED, CONDITIONS.index(c)])
+    return np.mean([covered(draw, c) for _ in range(repetitions)], axis=0)
+
+
+def main(repetitions: int = 4000) -> None:
+    """Print a line for each condition, and the extremes."""
+    print("lag  insertions  between  unequal  outliers   mean square   skill  median tip")
+    table = []
+    for c in CONDITIONS:
+        table.append(coverage(c, repetitions))
+        row = f"{c.lag:3.1f}  {c.insertions:10d}  {c.between:7.2f}  {c.unequal!s:7}  {c.outliers!s:8}"
+        print(row + "   {:11.3f}  {:6.3f}  {:10.3f}".format(*table[-1]), flush=True)
+    low, high = np.min(table, axis=0), np.max(table, axis=0)
+    print(
+        "from {:.3f} to {:.3f} (mean square), {:.3f} to {:.3f} (skill), {:.3f} to {:.3f} (median)".format(
+            *np.column_stack([low, high]).ravel()
+        )
+    )
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

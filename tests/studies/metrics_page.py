@@ -1,0 +1,36 @@
+"""docs/metrics.md from the columns that are registered: ``python -m tests.studies.metrics_page`` writes it anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pipeline.compare.nulls  # noqa: F401 - registers
+from reports.schema import ERRORS, POOLED, Column
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "metrics.md"
+HEAD = """# What is measured of a frame
+
+w are points of the simulated wire, c of the traced curve, both at equal steps (`compare.sample_mm`) of the arc length s
+from the entry. A case pools over its frames that are ok, and so does overall.csv over all validation cases. This page
+is written by `python -m tests.studies.metrics_page` from reports/columns.toml.
+
+| column | unit | what | how | of a case |
+|---|---|---|---|---|
+"""
+
+
+def row(column: Column) -> str:
+    pooled = f"`{column.pooled_name}`: {POOLED[column.pooled]}" if column.pooled else ""
+    formula = column.formula.replace("|", "\\|")
+    return f"| `{column.name}` | {column.unit} | {column.meaning} | {formula} | {pooled} |"
+
+
+def text() -> str:
+    """The page: every column with a formula, and the predictors."""
+    shown = [c for c in ERRORS if c.formula or c.name.startswith("null_")]
+    return HEAD + "\n".join(map(row, shown)) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.parent.mkdir(exist_ok=True)
+    PAGE.write_text(text(), encoding="utf-8")

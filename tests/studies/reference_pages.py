@@ -1,0 +1,281 @@
+"""docs/reference and docs/schema from the code: ``make pages`` (or ``python -m tests.studies.reference_pages``) writes
+them anew; tests/test_documents.py fails where they are not what the code says."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pipeline.compare.nulls  # noqa: F401 - registers
+import wireval
+from pipeline.cli import parsers
+from pipeline.run.results import LOST, RESULT
+from pipeline.status import FrameStatus
+from pipeline.study.explain import described, in_words
+from pipeline.study.manifest import Case, ManifestTables
+from reports import frames_file, schema
+from reports.frames_file import ATTRIBUTES
+from reports.schema import Table
+from solver import Status
+from tests.studies import metrics_page
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+NOTE = "*Written by `make pages` from the code; do not edit.*\n"
+KEYS = {
+    "id": "Name of the case and of its folder in OUT.",
+    "role": "What the case is for: a calibration case counts in no score.",
+    "group": "Insertions of one group are one unit of the intervals. Default: the case itself.",
+    "reference": "Scan without the wire. Without it the lumen is segmented from the first frame.",
+    "frames": "With the wire: a pattern in natural order, or a list; files, DICOM folders, `study.h5#/frames`.",
+    "entry_mm": "Where the wire enters the lumen, LPS mm.",
+    "entry_direction": "Where the wire points at the entry.",
+    "entry": 'Take the clamp from another insertion of the same fixation: `"case:ID"`.',
+    "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel.",
+    "entry_direction_sigma_deg": "How well entry_direction is known; 0 is exact.",
+    "material_axis": "Where material axis 1 points at roll 0. Default: the world axis least along the direction.",
+    "wire": "Name of one of `[wires.*]`.",
+    "insertion_mm": "Expected depths, one per frame, held against the traces. Without frames: depths to simulate.",
+    "spacing_mm": "Voxel size, for files that lack it; reported as assumed.",
+    "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json).",
+    "traces": "Own or corrected centrelines instead of traced ones, one file per frame.",
+    "parameters": "What `wireval calibrate` wrote.",
+    "roll_deg": "Roll about entry_direction, right-handed: one number, or one per frame.",
+    "push_force_N": "Measured push force, one per frame.",
+    "push_force_sigma_N": "Standard deviation of the measured push force.",
+    "roll_sigma_deg": "How well the roll is known.",
+    "insertion_sigma_mm": "How well the depth is known.",
+    "simulated": "Another simulator's wires instead of simulated ones, one file per frame.",
+    "projections": "Two-dimensional views instead of frames.",
+    "lumen_seed_mm": "Points in the lumen, LPS mm. Default: the entry.",
+    "truth": "True wires of a synthetic study.",
+    "wall": "The wall's stiffness and friction, below.",
+    "down": "Where gravity points; needed by a wire with a weight.",
+    "catheter": "An outer tube over the wire, below.",
+    "radius_mm": "Outer radius.",
+    "bending_stiffness_N_mm2": "EI. A wire's may change along it: `[[distance from the tip in mm, EI], ...]`.",
+    "rest_curvature_per_mm": "Curvature of the wire when nothing touches it, towards material axis 1 where positive.",
+    "torsional_stiffness_N_mm2": "GJ. Default: inf, the tip turns with the hand.",
+    "weight_N_per_mm": "Weight per length; needs `down`.",
+    "stiffness_N_mm2": "Force per mm of wire and mm of way into the wall.",
+    "friction": "Coulomb's coefficient.",
+    "insertion_mm of the catheter": "Depth of the catheter's own tip, one for all frames or one per frame.",
+}
+"""What the keys of the manifest mean; their kinds and defaults stand in the code."""
+HIDDEN = {"name"} | {key for key, field in Case.model_fields.items() if "_not_written" in str(field.metadata)}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    escaped = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows]
+    lines = [" | ".join(row) for row in ([*head], ["---"] * len(head), *escaped)]
+    return "\n".join(f"| {line} |" for line in lines) + "\n"
+
+
+def settings() -> str:
+    groups = dict.fromkeys(one.table for one in described())
+    parts = [
+        "# Settings\n",
+        NOTE,
+        "`--set table.key=value` for one, `-c FILE.toml` for many, `wireval settings > FILE.toml` for a file of all;\n"
+        "the command line wins over a file, a file over the default. `config.resolved.toml` in OUT says what\n"
+        "was in force and where it came from. *Left out* means: taken from the data or the manifest.\n",
+    ]
+    for group in groups:
+        rows = [(f"`{s.key}`", s.meaning, s.allowed, s.value or "left out") for s in described() if s.table == group]
+        parts += [f"## {group}\n", table(("setting", "meaning", "allowed", "default"), rows)]
+    return "\n".join(parts)
+
+
+def plain(node: Any) -> Any:
+    """A schema without titles, hidden keys and pydantic's view of what is a text in the file."""
+    if isinstance(node, list):
+        return [plain(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    if node.get("$ref") == "#/$defs/Source":
+        return {"type": "string"}
+    kept = {key: plain(value) for key, value in node.items() if key != "title" or not isinstance(value, str)}
+    if kept.get("default") == math.inf:
+        del kept["default"]  # JSON has none
+    for key in HIDDEN & set(kept.get("properties", {})):
+        del kept["properties"][key]
+        kept["required"] = [name for name in kept.get("required", []) if name != key]
+    return kept
+
+
+def manifest_schema() -> dict[str, Any]:
+    made = plain(ManifestTables.model_json_schema())
+    made["$defs"].pop("Source")
+    case = made["$defs"]["Case"]["properties"]
+    several = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
+    case |= {name: several for name in ("frames", "traces", "simulated") if name in case} | {"wire": {"type": "string"}}
+    for name, owner in made["$defs"].items():
+        for key, value in owner.get("properties", {}).items():
+            owner["properties"][key] = {"description": meaning(key, name), **value}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "wireval manifest", **made}
+
+
+def meaning(key: str, owner: str = "Case") -> str:
+    return KEYS[f"{key} of the catheter" if (key, owner) == ("insertion_mm", "OverWire") else key]
+
+
+def result_schema() -> dict[str, Any]:
+    made = plain(RESULT.json_schema())
+    made["properties"].pop("details", None)
+    made["properties"] = {"schema": {"const": 1}, **made["properties"]}
+    made["required"] = ["schema", *made["required"]]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "wireval result.json", **made}
+
+
+def allowed(node: dict[str, Any], definitions: dict[str, Any]) -> str:
+    if "$ref" in node:
+        return "a table"
+    if "anyOf" in node:
+        return " or ".join(allowed(one, definitions) for one in node["anyOf"] if one.get("type") != "null")
+    return in_words(node)
+
+
+def manifest() -> str:
+    made = manifest_schema()
+    parts = [
+        "# The manifest\n",
+        NOTE,
+        "TOML; paths are relative to the file; an unknown key is an error that names the nearest known one. `wireval\n"
+        "init FOLDER` writes one from a folder of scans, `wireval check FILE` lists every problem at once. For\n"
+        "editors: [manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
+    ]
+    names = {"Wire": "[wires.NAME]", "Case": "[[case]]", "Wall": "[case.wall]", "OverWire": "[case.catheter]"}
+    for name, title in names.items():
+        owner = made["$defs"][name]
+        needed = owner.get("required", [])
+        rows = []
+        for key, value in owner["properties"].items():
+            default = "required" if key in needed else json.dumps(value.get("default"))
+            default = "" if default in ("null", '""', "[]") else default
+            rows.append((f"`{key}`", meaning(key, name), allowed(value, made["$defs"]), default))
+        parts += [f"## `{title}`\n", table(("key", "meaning", "allowed", "default"), rows)]
+    return "\n".join(parts)
+
+
+def columns() -> str:
+    parts = [
+        "# Columns\n",
+        NOTE,
+        "A name carries its unit (`_mm`, `_deg`, `_N`, `_s`); what does not apply is an empty field, never 0.\n"
+        "[How the errors of a frame are computed](../metrics.md), formula by formula. overall.csv has the columns of\n"
+        "summary.csv.\n",
+    ]
+    for one in (value for value in vars(schema).values() if isinstance(value, Table)):
+        rows = [(f"`{column.name}`", column.unit, column.kind, column.meaning) for column in one]
+        parts += [f"## {one.file}\n", table(("column", "unit", "kind", "meaning"), rows)]
+    return "\n".join(parts)
+
+
+def statuses() -> str:
+    parts = [
+        "# Statuses\n",
+        NOTE,
+        "A frame is `ok` only if it was traced, simulated to its depth, converged and compared.\n",
+    ]
+    for title, pairs in (
+        ("Of a frame", [(one.identifier, one.value) for one in FrameStatus]),
+        (
+            "Of a simulated wire, where it is not at rest: the frame's status, too",
+            [(s.identifier, s.value) for s in Status],
+        ),
+        ("Of a case without a result", [*LOST.items()]),
+    ):
+        parts += [f"## {title}\n", table(("status", "sentence"), [(f"`{name}`", text) for name, text in pairs])]
+    return "\n".join(parts)
+
+
+def command_line() -> str:
+    parser, verbs = parsers()
+    parts = [
+        "# Command line\n",
+        NOTE,
+        f"{parser.epilog}\n",
+        "`wireval --print-completion bash` (zsh, fish, ...) completes.\n",
+    ]
+    for name, verb in verbs.items():
+        parts += [
+            f"## wireval {name}\n",
+            f"{verb.description}\n",
+            table(("argument", "meaning"), map(argument, shown(verb))),
+        ]
+    return "\n".join(parts)
+
+
+def shown(parser: argparse.ArgumentParser) -> list[argparse.Action]:
+    return [action for action in parser._actions if action.dest != "help"]
+
+
+def argument(action: argparse.Action) -> tuple[str, str]:
+    value = action.metavar or ("{" + ",".join(map(str, action.choices)) + "}" if action.choices else "")
+    names = [" ".join(filter(None, (name, str(value) if action.nargs != 0 else ""))) for name in action.option_strings]
+    return ", ".join(f"`{name}`" for name in names or [str(value)]), action.help or ""
+
+
+def api() -> str:
+    parts = ["# Python\n", NOTE, f"```text\n{inspect.getdoc(wireval)}\n```\n"]
+    for name in sorted(wireval.__all__, key=str.lower):
+        thing = getattr(wireval, name)
+        call = f"{name}{signature(thing)}" if inspect.isfunction(thing) else name
+        parts += [f"## `{name}`\n", f"```text\n{call}\n\n{inspect.getdoc(thing)}\n```\n"]
+        parts += [member(name, key, value) for key, value in public(thing)]
+    return "\n".join(parts)
+
+
+def public(thing: Any) -> list[tuple[str, Any]]:
+    if not inspect.isclass(thing) or issubclass(thing, Exception):
+        return []
+    members = [(key, value) for key, value in vars(thing).items() if not key.startswith("_") or key == "__init__"]
+    kept = (inspect.isfunction, lambda value: isinstance(value, property))
+    found = [(key, value) for key, value in members if any(kind(value) for kind in kept) and inspect.getdoc(value)]
+    return [pair for pair in found if pair[0] != "__init__" or pair[1].__doc__]
+
+
+def member(owner: str, name: str, value: Any) -> str:
+    call = f"{owner}.{name}" if isinstance(value, property) else f"{owner}.{name}{signature(value)}"
+    call = call.replace(f"{owner}.__init__", owner)
+    return f"```text\n{call}\n\n{inspect.getdoc(value)}\n```\n"
+
+
+def signature(thing: Callable[..., Any]) -> str:
+    found = inspect.signature(thing)
+    inputs = [
+        one.replace(annotation=inspect.Parameter.empty) for one in found.parameters.values() if one.name != "self"
+    ]
+    return str(found.replace(parameters=inputs, return_annotation=inspect.Signature.empty))
+
+
+def frames() -> str:
+    rows = [(f"`{name}`", str(value)) for name, value in ATTRIBUTES.items()]
+    text = (inspect.getdoc(frames_file) or "").partition("\n\n")[2]
+    return "\n".join(
+        ["# frames.h5\n", NOTE, f"```text\n{text}\n```\n", "Attributes of the file:\n", table(("name", "value"), rows)]
+    )
+
+
+PAGES: dict[str, Callable[[], str]] = {
+    "metrics.md": metrics_page.text,
+    "reference/settings.md": settings,
+    "reference/manifest.md": manifest,
+    "reference/columns.md": columns,
+    "reference/statuses.md": statuses,
+    "reference/command-line.md": command_line,
+    "reference/python.md": api,
+    "reference/frames.md": frames,
+    "schema/manifest.schema.json": lambda: json.dumps(manifest_schema(), indent=1) + "\n",
+    "schema/result.schema.json": lambda: json.dumps(result_schema(), indent=1) + "\n",
+}
+
+
+if __name__ == "__main__":
+    for name, write in PAGES.items():
+        (DOCS / name).parent.mkdir(parents=True, exist_ok=True)
+        (DOCS / name).write_text(write(), encoding="utf-8")

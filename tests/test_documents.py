@@ -1,0 +1,141 @@
+"""What README and docs/ say is true: their blocks run as typed, in one folder, page after page; links lead somewhere;
+reference pages are what the code says."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from pipeline.cli import main
+from pipeline.study.manifest import ManifestTables
+from tests.studies import reference_pages
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^\n]+) -->\n)?^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.M | re.S)
+QUICK = [DOCS / "tutorial.md", ROOT / "README.md", *(p for p in PAGES[1:] if p.name != "tutorial.md")]
+"""The tutorial first: it makes the study and the output that the others speak of."""
+
+
+def label(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def blocks(path: Path, *kinds: str) -> list[str]:
+    found = BLOCK.finditer(path.read_text(encoding="utf-8"))
+    return [block["text"] for block in found if block["kind"] in kinds and not block["why"]]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder in which a reader types all that."""
+    return tmp_path_factory.mktemp("desk")
+
+
+@pytest.fixture(scope="module")
+def done() -> set[tuple[str, ...]]:
+    """The commands that were typed so far."""
+    return set()
+
+
+def typed(line: str, done: set[tuple[str, ...]]) -> None:
+    words = shlex.split(line, comments=True)
+    # a study that a page before made is not made again
+    if words and not (tuple(words) in done and words[1] == "synth"):
+        done.add(tuple(words))
+        assert words[0] == "wireval", f"{line}: only wireval is run; say <!-- not run: why --> above the block"
+        assert main(words[1:]) == 0, line
+
+
+@pytest.mark.parametrize("page", QUICK, ids=label)
+def test_blocks_run_as_typed(
+    page: Path, desk: Path, done: set[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(desk)
+    names: dict[str, Any] = {}
+    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        if block["why"]:
+            continue
+        if block["kind"] == "":
+            for line in block["text"].splitlines():
+                typed(line, done)
+        elif block["kind"] == "python":
+            exec(compile(block["text"], label(page), "exec"), names)
+        else:
+            assert block["kind"] in ("toml", "yaml", "text"), "what is neither run nor said not to be"
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=label)
+def test_notebooks_are_executed_and_still_run(path: Path, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(desk)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    names: dict[str, Any] = {}
+    for number, cell in enumerate(cells, 1):
+        assert cell["execution_count"] == number
+        assert cell["outputs"], "a cell that shows nothing"
+        text = "".join(line for line in cell["source"] if not line.startswith("%"))
+        exec(compile(text, label(path), "exec"), names)
+    assert not re.search(r"/(?:work|tmp|root|home)/", path.read_text(encoding="utf-8")), "a machine's path"
+
+
+def test_the_blocks_are_found() -> None:
+    assert len(blocks(ROOT / "README.md", "")) == 1
+    assert len(blocks(ROOT / "README.md", "python", "toml")) == 2
+    assert BLOCK.search("<!-- not run: x -->\n```\nmake\n```")["why"] == "x"  # type: ignore[index]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=label)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        there = (page.parent / path).resolve() if path else page
+        assert there.exists(), f"{label(page)}: {target}"
+        if anchor:
+            heads = re.findall(r"^#+ (.+)$", there.read_text(encoding="utf-8"), re.M)
+            slugs = [re.sub(r"[^\w\- ]", "", head).strip().lower().replace(" ", "-") for head in heads]
+            assert anchor in slugs, f"{label(page)}: {target}; {slugs}"
+
+
+@pytest.mark.parametrize("name", reference_pages.PAGES)
+def test_reference_is_what_the_code_says(name: str) -> None:
+    assert (DOCS / name).read_text(encoding="utf-8") == reference_pages.PAGES[name](), "run: make pages"
+
+
+def test_manifests_of_the_manual_fit_the_schema_and_the_code(tmp_path: Path) -> None:
+    made = reference_pages.manifest_schema()
+    texts = [text for page in PAGES for text in blocks(page, "toml") if "[[case]]" in text]
+    assert texts
+    for name in ("f0.mha", "f1.mha"):
+        (tmp_path / "frames").mkdir(exist_ok=True)
+        (tmp_path / "frames" / name).touch()
+    for text in texts:
+        jsonschema.validate(tomllib.loads(text), made)
+        ManifestTables.model_validate(tomllib.loads(text), context={"folder": tmp_path})
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"entry_mm": [0, 0]}, {"frame": "x"}, {"role": "test"}, {"wire": 3}, {"catheter": {"radius_mm": 1}}]
+)
+def test_the_schema_refuses_what_the_code_refuses(wrong: dict[str, Any]) -> None:
+    manifest = tomllib.loads(blocks(ROOT / "README.md", "toml")[0])
+    manifest["case"][0] |= wrong
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(manifest, reference_pages.manifest_schema())
+
+
+def test_a_result_fits_its_schema(desk: Path) -> None:
+    result = json.loads(next(desk.glob("out/cases/*/result.json")).read_text(encoding="utf-8"))
+    jsonschema.validate(result, reference_pages.result_schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(result | {"schema": 2}, reference_pages.result_schema())
