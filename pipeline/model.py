@@ -32,8 +32,8 @@ class Wire:
     radius_mm: Radius
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
-    torsional_stiffness_N_mm2: Annotated[float, Number, Field(gt=0)] = float("inf")
-    weight_N_per_mm: Annotated[float, Number, Field(ge=0, le=1)] = 0.0
+    torsional_stiffness_N_mm2: Annotated[float, Field(gt=0), Number] = float("inf")
+    weight_N_per_mm: Annotated[float, Field(ge=0, le=1), Number] = 0.0
 
 
 @dataclass(frozen=True)

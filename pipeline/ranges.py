@@ -15,22 +15,22 @@ def _number(value: Any) -> Any:
 
 
 Number = BeforeValidator(_number)
-Finite = Annotated[float, Number, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
-Positive = Annotated[float, Number, Field(gt=0, le=1e9, allow_inf_nan=False)]
-NonNegative = Annotated[float, Number, Field(ge=0, le=1e9, allow_inf_nan=False)]
-Share = Annotated[float, Number, Field(ge=0, le=1)]
-Count = Annotated[int, Number, Field(ge=0, le=10**6)]
-PositiveCount = Annotated[int, Number, Field(ge=1, le=10**6)]
-Millimetres = Annotated[float, Number, Field(ge=0, le=50, allow_inf_nan=False)]
-Reach = Annotated[float, Number, Field(ge=0.1, le=50, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
+Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]
+NonNegative = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False), Number]
+Share = Annotated[float, Field(ge=0, le=1), Number]
+Count = Annotated[int, Field(ge=0, le=10**6), Number]
+PositiveCount = Annotated[int, Field(ge=1, le=10**6), Number]
+Millimetres = Annotated[float, Field(ge=0, le=50, allow_inf_nan=False), Number]
+Reach = Annotated[float, Field(ge=0.1, le=50, allow_inf_nan=False), Number]
 """Distances beside a vessel or along it."""
-Depth = Annotated[float, Number, Field(gt=0, le=5000, allow_inf_nan=False)]
+Depth = Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False), Number]
 """How far a wire is pushed in: no wire is longer than 5 m."""
-Factor = Annotated[float, Number, Field(ge=1e-6, le=1e6, allow_inf_nan=False)]
-Step = Annotated[float, Number, Field(ge=0.01, le=100, allow_inf_nan=False)]
+Factor = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), Number]
+Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """A length in mm that curves are cut into: below 10 µm it is a hang, not a resolution."""
-Radius = Annotated[float, Number, Field(ge=1e-3, le=20, allow_inf_nan=False)]
-Place = Annotated[float, Number, Field(ge=-1e4, le=1e4, allow_inf_nan=False)]
+Radius = Annotated[float, Field(ge=1e-3, le=20, allow_inf_nan=False), Number]
+Place = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False), Number]
 Point = tuple[Place, Place, Place]
 """LPS mm."""
 Vector = tuple[Finite, Finite, Finite]

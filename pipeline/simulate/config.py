@@ -29,7 +29,7 @@ class SolverConfig:
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d{0,2})$")] = "offset"
     """offset (the smooth limit) or samples:N."""
-    tolerance: Annotated[float, Number, Field(gt=0, lt=1)] = 1e-9
+    tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
     max_iterations: PositiveCount = 200
     """Iterations allowed for one relaxation."""

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from pipeline.study.settings import Config
 
 LIMITS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+VAST = 1e6  # a bound against overflow, of which nobody needs to be told
 KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "a text"}
 
 
@@ -81,7 +82,7 @@ def in_words(schema: dict[str, Any]) -> str:
         return _list_in_words(schema)
     if "pattern" in schema:
         return f"a text like {schema['pattern']}"
-    limits = [f"{word} {schema[key]:g}" for key, word in LIMITS.items() if key in schema]
+    limits = [f"{word} {schema[key]:g}" for key, word in LIMITS.items() if abs(schema.get(key, VAST)) < VAST]
     return " ".join([KINDS.get(schema.get("type", ""), "any"), *limits])
 
 
@@ -90,5 +91,6 @@ def _list_in_words(schema: dict[str, Any]) -> str:
     if schema.get("maxItems") == 0:
         return "empty"
     if parts and all(part == parts[0] for part in parts):
-        return f"[{', '.join(['number'] * len(parts))}]" if parts[0] == {"type": "number"} else f"{len(parts)} values"
+        numbers = parts[0].get("type") == "number"
+        return f"[{', '.join(['number'] * len(parts))}]" if numbers else f"{len(parts)} values"
     return f"a list, each {in_words(schema['items'])}" if "items" in schema else "a list"

@@ -41,15 +41,28 @@ KEYS = {
     "wire": "Name of one of `[wires.*]`.",
     "insertion_mm": "Expected depths, one per frame, held against the traces. Without frames: depths to simulate.",
     "spacing_mm": "Voxel size, for files that lack it; reported as assumed.",
-    "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json).",
+    "lumen": "Own lumen instead of a segmented one: label map, .stl, .vtp, or centreline with radii (.swc, .mrk.json); "
+    '`{file = "seg.nrrd", label = 2}` takes one label, by number or name, `{file = ..., level = 0.5}` a probability.',
     "traces": "Own or corrected centrelines instead of traced ones, one file per frame.",
     "parameters": "What `wireval calibrate` wrote.",
-    "roll_deg": "Roll about entry_direction, right-handed: one number, or one per frame.",
+    "roll_deg": 'Roll about entry_direction, right-handed: one number, one per frame, or `"fit"`: on the first frame, '
+    "which is not scored.",
     "push_force_N": "Measured push force, one per frame.",
     "push_force_sigma_N": "Standard deviation of the measured push force.",
     "roll_sigma_deg": "How well the roll is known.",
     "insertion_sigma_mm": "How well the depth is known.",
-    "simulated": "Another simulator's wires instead of simulated ones, one file per frame.",
+    "simulated": "Another simulator's wires instead of simulated ones, one file per frame; or "
+    '`{files = ..., space = "RAS", unit = "mm"}` where the files do not state them.',
+    "files": "The files, as `simulated` alone names them.",
+    "space": "LPS or RAS, where the files do not state it.",
+    "unit": "mm, cm or m, where the files do not state it.",
+    "uncertainty": "How well other inputs are known, below: what the budget draws from.",
+    "lumen_mm": "Of the lumen's surface, from place to place.",
+    "lumen_bias_mm": "Of the lumen's surface, common to all of it.",
+    "rest_curvature": "Of the rest curvature, relative.",
+    "taper": "Of the lengths over which the stiffness changes, of their logarithm.",
+    "wall_stiffness": "Of the wall's stiffness, of its logarithm.",
+    "friction of Uncertainty": "Of the coefficient of friction.",
     "projections": "Two-dimensional views instead of frames.",
     "lumen_seed_mm": "Points in the lumen, LPS mm. Default: the entry.",
     "truth": "True wires of a synthetic study.",
@@ -63,7 +76,7 @@ KEYS = {
     "weight_N_per_mm": "Weight per length; needs `down`.",
     "stiffness_N_mm2": "Force per mm of wire and mm of way into the wall.",
     "friction": "Coulomb's coefficient.",
-    "insertion_mm of the catheter": "Depth of the catheter's own tip, one for all frames or one per frame.",
+    "insertion_mm of OverWire": "Depth of the catheter's own tip, one for all frames or one per frame.",
 }
 """What the keys of the manifest mean; their kinds and defaults stand in the code."""
 HIDDEN = {"name"} | {key for key, field in Case.model_fields.items() if "_not_written" in str(field.metadata)}
@@ -90,6 +103,23 @@ def settings() -> str:
     return "\n".join(parts)
 
 
+MASK = {
+    "anyOf": [
+        {"type": "string"},
+        {
+            "type": "object",
+            "properties": {
+                "file": {"type": "string"},
+                "label": {"anyOf": [{"type": "integer"}, {"type": "string"}]},
+                "level": {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
+            },
+            "required": ["file"],
+            "additionalProperties": False,
+        },
+    ]
+}
+
+
 def plain(node: Any) -> Any:
     """A schema without titles, hidden keys and pydantic's view of what is a text in the file."""
     if isinstance(node, list):
@@ -98,6 +128,8 @@ def plain(node: Any) -> Any:
         return node
     if node.get("$ref") == "#/$defs/Source":
         return {"type": "string"}
+    if node.get("$ref") == "#/$defs/Mask":
+        return MASK
     kept = {key: plain(value) for key, value in node.items() if key != "title" or not isinstance(value, str)}
     if kept.get("default") == math.inf:
         del kept["default"]  # JSON has none
@@ -110,9 +142,12 @@ def plain(node: Any) -> Any:
 def manifest_schema() -> dict[str, Any]:
     made = plain(ManifestTables.model_json_schema())
     made["$defs"].pop("Source")
+    made["$defs"].pop("Mask", None)
     case = made["$defs"]["Case"]["properties"]
     several = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
-    case |= {name: several for name in ("frames", "traces", "simulated") if name in case} | {"wire": {"type": "string"}}
+    case["simulated"] = {"anyOf": [*several["anyOf"], case["simulated"]]}
+    made["$defs"]["Others"]["properties"]["files"] = several
+    case |= {name: several for name in ("frames", "traces") if name in case} | {"wire": {"type": "string"}}
     for name, owner in made["$defs"].items():
         for key, value in owner.get("properties", {}).items():
             owner["properties"][key] = {"description": meaning(key, name), **value}
@@ -120,7 +155,7 @@ def manifest_schema() -> dict[str, Any]:
 
 
 def meaning(key: str, owner: str = "Case") -> str:
-    return KEYS[f"{key} of the catheter" if (key, owner) == ("insertion_mm", "OverWire") else key]
+    return KEYS.get(f"{key} of {owner}", KEYS.get(key, "")) or KEYS[key]
 
 
 def result_schema() -> dict[str, Any]:
@@ -149,6 +184,7 @@ def manifest() -> str:
         "editors: [manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
     ]
     names = {"Wire": "[wires.NAME]", "Case": "[[case]]", "Wall": "[case.wall]", "OverWire": "[case.catheter]"}
+    names |= {"Uncertainty": "[case.uncertainty]", "Others": "[case.simulated]"}
     for name, title in names.items():
         owner = made["$defs"][name]
         needed = owner.get("required", [])
