@@ -18,6 +18,8 @@ from tests.studies.seeing.table import look
         ("gap of 5 to 8 mm", 5),
         ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 0),
         ("layered filling", 1),
+        ("tip 2 to 5 voxels from the scan's side", 0),
+        ("tip 2 to 5 voxels from the scan's side", 2),
     ],
 )
 def test_what_can_be_seen_is_traced(case, seed):
@@ -31,6 +33,7 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("two wires 0.8 mm apart", 0, "TRACE_AMBIGUOUS"),
         ("tip folded back on itself", 0, "TRACE_AMBIGUOUS"),
         ("wire out of the scan", 0, "TRACE_LEFT_SCAN"),
+        ("wire out of the scan at a shallow angle", 1, "TRACE_LEFT_SCAN"),
         ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
         ("stenosis", 1, "TRACE_LEFT_LUMEN"),
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pipeline.model import Volume
 from tests.studies.seeing import render as r
@@ -332,3 +333,36 @@ def bone(rng, seed):
     d.lattice = r.Lattice.around(np.concatenate([d.axis, spine]), 5.0, 0.3, rng, 0.8)
     d.more = [(r.vessel(d.lattice, spine, size), rng.uniform(1.2, 2.2) * r.CONTRAST)]
     return d.scan((8, 16)[seed % 2], reference=seed % 2 == 0)
+
+
+def at_a_side(rng, sine, at, beyond):
+    """A vessel whose wire makes an angle with the scan's third side at its point ``at`` (share of its length); the scan
+    ends ``beyond`` (mm) that point.
+    """
+    while True:
+        d = Draft(rng, bend=0.03)
+        n = round(at * (len(d.path) - 1))
+        t = d.path[n] - d.path[n - 20]
+        phi, flat = rng.uniform(0, 2 * np.pi), np.sqrt(1 - sine**2)
+        to = [flat * np.cos(phi), flat * np.sin(phi), sine]
+        turn = Rotation.align_vectors([to], [t / np.linalg.norm(t)])[0]
+        d.axis, d.path = turn.apply(d.axis), turn.apply(d.path)
+        full = d.lattice = r.Lattice.around(d.axis, d.radius.max() + 2.5, 0.3, rng, d.lattice.blur)
+        layers = min(full.shape[2], round((d.path[n, 2] + beyond - full.origin[2]) / 0.3))
+        top = full.origin[2] + 0.3 * layers
+        # only scenes in which nothing else of the wire comes near that side
+        if d.path[: n - 60, 2].max() < top - 1.0 and (at == 1 or d.path[-1, 2] > top + 0.5):
+            d.lattice = r.Lattice((*full.shape[:2], layers), full.spacing, full.origin, full.blur)
+            return d
+
+
+@case("wire out of the scan at a shallow angle")
+def leaves_slowly(rng, seed):
+    d = at_a_side(rng, rng.uniform(0.15, 0.5), rng.uniform(0.55, 0.9), 0.0)
+    return d.scan((4, 8, 16)[seed % 3], reference=seed % 4 < 3)
+
+
+@case("tip 2 to 5 voxels from the scan's side")
+def tip_at_side(rng, seed):
+    d = at_a_side(rng, rng.uniform(0.0, 1.0), 1, rng.uniform(0.9, 1.5))
+    return d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)
