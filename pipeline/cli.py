@@ -58,7 +58,6 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
         raise _usage(f"{unknown[0]}: not an option of wireval {args.command or ''}; {hint}".replace(" ;", ";"))
     if not args.command and not args.version:
         parser.print_help()
-        raise SystemExit(BAD_INPUT)
     return args
 
 
@@ -107,6 +106,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
             print(f"wireval {package_version()}")
             return OK
+        if not args.command:
+            return BAD_INPUT
         with _ended_by_signal():
             return carried_out(args)
     except InputError as error:

@@ -68,7 +68,8 @@ def decimate(points_mm: Array, corners: Index, max_triangles: int = _MAX_TRIANGL
 
 def _frame(frame: FrameArrays, row: Any, shrink: float) -> dict[str, Any]:
     status = str(row.get("status", ""))
-    sigma = frame.trace_sigma_mm
+    sigma = np.zeros(0) if frame.trace_sigma_mm is None else np.asarray(frame.trace_sigma_mm)
+    known = sigma[np.isfinite(sigma)]
     good = status in GOOD and frame.error_mm is not None
     return {
         "frame": frame.frame,
@@ -76,7 +77,7 @@ def _frame(frame: FrameArrays, row: Any, shrink: float) -> dict[str, Any]:
         "good": good,
         **{name: _number(row.get(name)) for name in ("insertion_mm", "rms_mm", "p95_mm")},
         "curves": {name: _flat(_few(points)) for name, points in frame.curves.items()},
-        "sigma_mm": None if sigma is None or not len(sigma) else _number(np.sqrt(np.nanmean(np.square(sigma)))),
+        "sigma_mm": _number(np.sqrt(np.mean(np.square(known)))) if len(known) else None,
         "arc_mm": _flat(_few(frame.arc_mm)) if good and frame.arc_mm is not None else [],
         "error_mm": _flat(_few(frame.error_mm)) if good and frame.error_mm is not None else [],
         "pictures": {axis: _jpeg(picture, shrink) for axis, picture in frame.mips.items()},

@@ -38,16 +38,16 @@ def test_an_edited_callee_is_compiled_again(package: str, tmp_path: Path) -> Non
     (folder / "_compile.py").write_text((ROOT / package / "_compile.py").read_text(encoding="utf-8"))
     head = f"from {package}._compile import on_disk\n"
     kernel = head + "{imports}\n\n@on_disk()\ndef {name}():\n    return {value}\n"
-    (folder / "callee.py").write_text(kernel.format(imports="", name="callee", value=1))
+    (folder / "callee.py").write_text(kernel.format(imports="", name="callee", value=1), encoding="utf-8")
     middle = kernel.format(imports=f"from {package}.callee import callee", name="middle", value="callee()")
-    (folder / "middle.py").write_text(middle)
+    (folder / "middle.py").write_text(middle, encoding="utf-8")
     caller = kernel.format(
         imports=f"from {package} import middle as m\nmiddle = m.middle", name="caller", value="middle()"
     )
-    (folder / "caller.py").write_text(caller)
+    (folder / "caller.py").write_text(caller, encoding="utf-8")
     assert [called(tmp_path, package) for _ in range(2)] == ["1", "1"]
     path, state = folder / "callee.py", (folder / "callee.py").stat()
-    path.write_text(kernel.format(imports="", name="callee", value=2))
+    path.write_text(kernel.format(imports="", name="callee", value=2), encoding="utf-8")
     os.utime(path, ns=(state.st_atime_ns, state.st_mtime_ns))
     assert called(tmp_path, package) == "2"
 
@@ -72,6 +72,6 @@ def test_sources_are_followed_through_imports_of_every_form(tmp_path: Path) -> N
         "four": "from solver import six",
     }
     for name, text in texts.items():
-        (folder / f"{name}.py").write_text(text)
+        (folder / f"{name}.py").write_text(text, encoding="utf-8")
     found = {path.stem for path in sources_of(folder / "start.py")}
     assert found == {"start", "one", "two", "three", "four", "five", "six"}

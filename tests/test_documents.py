@@ -20,7 +20,7 @@ from tests.studies import reference_pages
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^\n]+) -->\n)?^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.M | re.S)
+BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^\n]+) -->\n)?^```(?P<kind>\w*)[^\n]*\n(?P<text>.*?)^```$", re.M | re.S)
 QUICK = [DOCS / "tutorial.md", ROOT / "README.md", *(p for p in PAGES[1:] if p.name != "tutorial.md")]
 """The tutorial first: it makes the study and the output that the others speak of."""
 

@@ -66,10 +66,10 @@ def test_functions_stay_readable() -> None:
 
 def test_the_limits_bite(tmp_path: Path) -> None:
     path = tmp_path / "grown.py"
-    path.write_text("def grown(a, b, c, d, e, f, g, *, h):\n" + "    a += 1\n" * MAX_LINES)
+    path.write_text("def grown(a, b, c, d, e, f, g, *, h):\n" + "    a += 1\n" * MAX_LINES, encoding="utf-8")
     assert list(beyond([path], code_lines, MAX_LINES).values()) == [MAX_LINES + 1]
     assert list(beyond([path], argument_count, MAX_ARGUMENTS).values()) == [MAX_ARGUMENTS + 1]
-    path.write_text("def small(a, b, c, d, e, f, g):\n" + "    a += 1\n" * (MAX_LINES - 1))
+    path.write_text("def small(a, b, c, d, e, f, g):\n" + "    a += 1\n" * (MAX_LINES - 1), encoding="utf-8")
     assert not beyond([path], code_lines, MAX_LINES) | beyond([path], argument_count, MAX_ARGUMENTS)
 
 

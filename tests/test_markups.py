@@ -27,7 +27,7 @@ def test_both_readers_agree_on_the_coordinate_system(tmp_path: Path, said: dict[
     radius = {"name": "Radius", "controlPointValues": [1.0, 1.0, 1.0]}
     points = [{"position": p.tolist()} for p in POINTS]
     curve = {"type": "Curve", "controlPoints": points, "measurements": [radius]} | said
-    path.write_text(json.dumps({"markups": [curve]}))
+    path.write_text(json.dumps({"markups": [curve]}), encoding="utf-8")
     expected = POINTS * [flip, flip, 1.0]
     np.testing.assert_array_equal(read_curve(path).points_mm, expected)
     np.testing.assert_array_equal(read_markups_branches(path).start_mm, expected[:-1])

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.calibrate.residuals import Evidence, Rows, weights_of
-from pipeline.calibrate.trials import DEEPER_MM, OWN, OWN_STEPS, Point, replayed
+from pipeline.calibrate.trials import OWN, OWN_STEPS, Point, replayed
 from pipeline.calibrate.unknowns import ROLL, WALL, Unknown
 from pipeline.model import Array
+from pipeline.simulate.clamp import STEP_DEPTH_MM
 from pipeline.simulate.config import SolverConfig
 
 ROUNDS, SETTLED = 12, 0.15
@@ -120,7 +121,7 @@ class Problem:
         here, pairs, steps = self.points(x), [], []
         for i, one in enumerate(self.evidence):
             part, columns = self.parts()[i], self.columns(i)
-            deeper = x + DEEPER_MM * (np.arange(len(x)) >= part.start + OWN) * (np.arange(len(x)) < part.stop)
+            deeper = x + STEP_DEPTH_MM * (np.arange(len(x)) >= part.start + OWN) * (np.arange(len(x)) < part.stop)
             changed = [x + step * (np.arange(len(x)) == k) for k, step in columns.items()]
             pairs += [(one.trial, self.points(v)[i]) for v in (x, *changed, deeper)]
             steps.append(columns)
@@ -132,7 +133,7 @@ class Problem:
             across, push = np.zeros((*base[-1].across_mm.shape, len(x))), np.zeros((len(still), len(x)))
             for k, step in columns.items():
                 across[:, :, k], push[:, k] = one.slopes(still, next(wires), (here[i], next(points)), step)
-            change, more = one.slopes(still, next(wires), (here[i], next(points)), DEEPER_MM)
+            change, more = one.slopes(still, next(wires), (here[i], next(points)), STEP_DEPTH_MM)
             first = self.parts()[i].start + OWN
             for f, end in enumerate(np.cumsum(one.counts)):
                 run = slice(end - one.counts[f], end)

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.calibrate.unknowns import FRICTION, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
 from pipeline.simulate import inserted
-from pipeline.simulate.clamp import Prior, Seen, depth_from, moved
+from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, Seen, depth_from, moved
 from pipeline.simulate.config import SolverConfig
 from pipeline.simulate.resolution import lengths_mm
 from solver import Insertion, Insertions, Solution, VesselWall
@@ -17,8 +17,7 @@ LUMEN_VOXELS = 0.15
 """How far the wall may stand off where it was segmented, one standard deviation: it hides in the wall's stiffness."""
 OWN = 7
 """Unknowns of an insertion itself: the clamp's place (3) and tilts (2), the wall's offset, its own roll."""
-OWN_STEPS = np.array([0.05] * 3 + [np.radians(0.5)] * 2 + [0.02, 1.0])
-DEEPER_MM = 0.1
+OWN_STEPS = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [0.02, 1.0])
 UNKNOWN_ROLL_DEG = 104.0
 """Standard deviation of a roll of which nothing is known."""
 
@@ -47,7 +46,7 @@ class Trial:
     @property
     def sigmas(self) -> Array:
         """Prior standard deviations (OWN + frames,) of what belongs to this insertion alone; 0 is exact."""
-        tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], 0.25 * self.voxel_mm)
+        tips = np.hypot([np.nan_to_num(f.curve.tip_sigma_mm) for f in self.seen], TIP_VOXELS * self.voxel_mm)
         roll = UNKNOWN_ROLL_DEG if self.roll_free else 0.0
         return np.concatenate([self.prior.sigmas, [LUMEN_VOXELS * self.voxel_mm, roll], tips])
 

@@ -29,9 +29,22 @@ _TYPES = {
 }  # fmt: skip
 
 
+_IN_COMMENT = re.compile(rb"SPACE\"?\s*[:=]\s*\"?(LPS|RAS)")
+_IN_FIELD = re.compile(rb"Name=\"SPACE\"[^>]*>([\d\s]*)<")  # the text's characters, by their numbers
+
+
+def space_of(head: bytes) -> str:
+    """LPS or RAS as the beginning of a file of 3D Slicer says: in a comment, or in VTK's field data; else empty."""
+    if said := _IN_COMMENT.search(head):
+        return said[1].decode()
+    if field := _IN_FIELD.search(head):
+        return "".join(map(chr, map(int, field[1].split()))).strip("\0")
+    return ""
+
+
 def to_lps(text: bytes, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (n, 3) of a file in LPS mm: 3D Slicer says SPACE=RAS in a comment or header, all else is taken as LPS."""
-    return points * RAS_TO_LPS if b"SPACE=RAS" in text[:4096] else points
+    """Points (n, 3) of a file in LPS mm, which is what a file that states no space is taken for."""
+    return points * RAS_TO_LPS if space_of(text[:4096]) == "RAS" else points
 
 
 class _Vtp:

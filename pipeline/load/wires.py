@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.load.curves import READERS, read_csv_points
 from pipeline.load.geometry import LoadError, Source, refused, unusable
-from pipeline.load.surfaces import RAS_TO_LPS
+from pipeline.load.surfaces import RAS_TO_LPS, space_of
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
 
@@ -137,9 +137,9 @@ def _stated(path: Path, kind: str) -> tuple[str, str]:
         head = "\n".join(line for line in rows if line.lstrip().startswith("#"))
         default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
     else:
-        # 3D Slicer's files: LPS and mm unless they say otherwise; of VTK's it writes SPACE= into the first lines
-        slicer = kind == ".mrk.json"
-        default = ("LPS" if slicer else "", "mm" if slicer or _SPACE.search(head) else "")
+        # 3D Slicer's files: LPS and mm unless they say otherwise; in VTK's it writes the space
+        slicer, vtk = kind == ".mrk.json", space_of(head.encode("latin-1"))
+        default = ("LPS" if slicer else vtk, "mm" if slicer or vtk else "")
     space, unit = _SPACE.search(head), _UNIT.search(head)
     said = {"1": "LPS", "0": "RAS"}.get(space[1], space[1].upper()) if space else default[0]
     return said, (unit[1] or unit[2]).lower() if unit else default[1]

@@ -30,7 +30,9 @@ def as_calibrated(
             kept.append(case)
             continue
         try:
-            found = read.setdefault(path, read_parameters(path)) if path not in read else read[path]
+            if path not in read:
+                read[path] = read_parameters(path)
+            found = read[path]
             changed = _with_clamp(case, with_parameters(case, found, data_of(case)), found)
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]

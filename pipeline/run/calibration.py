@@ -12,11 +12,10 @@ from pipeline.calibrate.estimates import Calibration, calibrated
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.trials import Trial, depths_at
 from pipeline.calibrate.unknowns import Unknown, unknowns
-from pipeline.load.curves import read_curve
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
-from pipeline.run.stages import Context, Known, run_stages
+from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.load import each_frame
 from pipeline.status import InputError
@@ -70,7 +69,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
     for case in cases:
         log = Log(lambda *_: None)
         run = Context(case, config, store, log)
-        known = _with_own_curves(run, run_stages(run, "trace"))
+        known = run_stages(run, "trace")
         frames = [frame for frame in known.frames if frame.trusted_curve is not None]
         notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
         if known.failure is not None or len(frames) < LEAST_FRAMES:
@@ -84,14 +83,6 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
     if not trials:
         raise CalibrationError(notes)
     return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(notes))
-
-
-def _with_own_curves(run: Context, known: Known) -> Known:
-    """The frames with the user's own curves, in a case without scans."""
-    if not run.case.traces or run.case.frames or any(frame.curve is not None for frame in known.frames):
-        return known
-    pairs = zip(known.frames, run.case.traces, strict=True)
-    return replace(known, frames=tuple(replace(f, curve=read_curve(source.path)) for f, source in pairs))
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:

@@ -13,6 +13,7 @@ Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
 INK, GREY = "#222222", "#767676"
 PALETTE = (SIMULATED, TRACED, TRUE, PURPLE, BROWN, BAD)
+SPARE = ("#1F8A8A", "#7A7A00")  # of columns without a style: no predictor has these colours
 SEQUENTIAL = "cividis"
 STAGE_COLOURS = {
     "load": "#C8C8C8",
@@ -54,6 +55,6 @@ def predictors() -> Iterator[tuple[str, str, str, Any, str]]:
 
 def lines(place: str) -> list[tuple[str, str, Look]]:
     """Column, label and style of every line that the schema shows at a place, in the order of drawing."""
-    rank, spare = {style: i for i, style in enumerate(LINES)}, cycle(reversed(PALETTE))
+    rank, spare = {style: i for i, style in enumerate(LINES)}, cycle(SPARE)
     columns = sorted(ERRORS.shown(place), key=lambda column: rank.get(column.style, len(rank)))
     return [(c.name, c.shown[place], LINES.get(c.style) or {"color": next(spare)}) for c in columns]

@@ -288,7 +288,7 @@ def test_a_study_that_was_broken_off_goes_on_where_it_stopped(monkeypatch: pytes
     path = tmp_path / "scenes.csv"
     with pytest.raises(KeyboardInterrupt):
         run_stress(path, 5, range(4), print)
-    with path.open("a") as file:
+    with path.open("a", encoding="utf-8") as file:
         file.write('2,"roll hull",conv')
     rows = run_stress(path, 5, range(4), print)
     assert ran == [0, 1, 2, 3]

@@ -45,8 +45,8 @@ def test_nothing_is_left_of_the_earlier_study(
 
 def test_what_is_removed_is_what_was_written(longer: Study, tmp_path: Path) -> None:
     write_study(longer, tmp_path)
-    (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "frames" / "notes.txt").write_text("mine")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "frames" / "notes.txt").write_text("mine", encoding="utf-8")
     written = {str(p.relative_to(tmp_path)) for p in earlier_files(tmp_path)}
     assert written == {n for n in files(tmp_path) if not n.endswith("notes.txt")}
     write_study(longer, tmp_path, format="h5")
@@ -100,7 +100,7 @@ def test_a_manifest_that_is_not_ours_is_never_written_over(
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study").write_text("")
+    (tmp_path / "study").write_text("", encoding="utf-8")
     assert in_the_way(tmp_path / "study", "mha", 1) == [f"{tmp_path / 'study'}: is a file; give a folder"]
 
 
@@ -108,4 +108,4 @@ def test_the_manifest_names_as_many_frames_as_there_are(longer: Study, shorter: 
     for study in (longer, shorter, replace(longer, name="again")):
         case = tomllib.loads(write_study(study, tmp_path).read_text(encoding="utf-8"))["case"][0]
         assert len(list(tmp_path.glob(case["frames"]))) == len(study.truth)
-        assert len(json.loads((tmp_path / case["truth"]).read_text())["frames"]) == len(study.truth)
+        assert len(json.loads((tmp_path / case["truth"]).read_text(encoding="utf-8"))["frames"]) == len(study.truth)

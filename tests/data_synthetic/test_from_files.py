@@ -32,7 +32,7 @@ def write_swc(path: Path, jitter: float = 0.0) -> None:
     lines += [f"{i + 1} 3 {p[0]} {p[1]} {p[2]} 1.6 {i or -1}" for i, p in enumerate(points)]
     lines += [f"{i + 26} 3 {p[0]} {p[1]} {p[2]} 0.9 {13 if i == 0 else i + 25}" for i, p in enumerate(branch)]
     lines.append("36 3 80 0 0 1.0 25")
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines), encoding="utf-8")
 
 
 def write_curve(path: Path, system: str = "LPS", radii: bool = True) -> None:
@@ -40,7 +40,7 @@ def write_curve(path: Path, system: str = "LPS", radii: bool = True) -> None:
     points = [{"position": (p * sign).tolist()} for p in TRUNK]
     measured = [{"name": "Radius", "controlPointValues": [1.5] * len(TRUNK)}] if radii else []
     markup = {"coordinateSystem": system, "controlPoints": points, "measurements": measured}
-    path.write_text(json.dumps({"markups": [markup]}))
+    path.write_text(json.dumps({"markups": [markup]}), encoding="utf-8")
 
 
 def test_swc_becomes_a_smooth_way_with_its_branch(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_bad_anatomies_are_refused_by_name(tmp_path: Path) -> None:
         read_tree(tmp_path / "a.mrk.json")
     with pytest.raises(ValueError, match=r"allowed: \.swc"):
         read_tree(tmp_path / "a.stl")
-    (tmp_path / "b.swc").write_text("1 2 3\n")
+    (tmp_path / "b.swc").write_text("1 2 3\n", encoding="utf-8")
     with pytest.raises(ValueError, match="7"):
         read_tree(tmp_path / "b.swc")
 
@@ -148,7 +148,7 @@ def test_a_background_that_is_none_is_refused(tmp_path: Path, name: str) -> None
     """Not a traceback of SimpleITK or scipy."""
     path = tmp_path / name
     if name == "text.mha":
-        path.write_text("hello")
+        path.write_text("hello", encoding="utf-8")
     else:
         sitk.WriteImage(sitk.Image([4 if name == "tiny.mha" else 20] * 3, sitk.sitkInt16), str(path))
     with pytest.raises(ValueError, match=rf"{name}: .*allowed"):

@@ -110,7 +110,7 @@ def test_a_tree_from_a_file_is_measured_before_rolls_are_tried(tmp_path: Path) -
     points = [{"position": [0.0, 0.0, float(z)]} for z in range(60)]
     radii = [{"name": "Radius", "controlPointValues": [1.5] * 60}]
     markup = {"coordinateSystem": "LPS", "controlPoints": points, "measurements": radii}
-    (tmp_path / "a.mrk.json").write_text(json.dumps({"markups": [markup]}))
+    (tmp_path / "a.mrk.json").write_text(json.dumps({"markups": [markup]}), encoding="utf-8")
     scene = replace(catalogue.from_anatomy(tmp_path / "a.mrk.json"), steer=None)
     assert Wanted(size=64).problems(scene) == []
     (said,) = Wanted(size=32).problems(scene)

@@ -66,7 +66,7 @@ def judged(given: Input, base: Path, folder: Path) -> Ending:
         return Ending("died", signal.Signals(os.WTERMSIG(status)).name, spent, extra)
     if extra > BYTES:
         return Ending("memory", f"{extra / 2**20:.0f} MiB over the parent's", spent, extra)
-    verdict, detail = json.loads((folder / "ending.json").read_text())
+    verdict, detail = json.loads((folder / "ending.json").read_text(encoding="utf-8"))
     return Ending(verdict, detail, spent, extra)
 
 
@@ -91,17 +91,17 @@ def _in_child(given: Input, folder: Path) -> None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         cpu = int(used.ru_utime + used.ru_stime)
         resource.setrlimit(resource.RLIMIT_CPU, (cpu + SECONDS, cpu + SECONDS + 5))
-        (folder / "ending.json").write_text(json.dumps(_tried(given, folder, more)))
+        (folder / "ending.json").write_text(json.dumps(_tried(given, folder, more)), encoding="utf-8")
         os._exit(0)
     except BaseException:
-        (folder / "ending.json").write_text(json.dumps(["harness", traceback.format_exc()[-800:]]))
+        (folder / "ending.json").write_text(json.dumps(["harness", traceback.format_exc()[-800:]]), encoding="utf-8")
         os._exit(0)
 
 
 def _tried(given: Input, folder: Path, more: list[str]) -> tuple[str, str]:
     log, out = folder / "said.txt", folder / "out"
     manifest = str(folder / "manifest.toml")
-    with log.open("w", buffering=1) as file:
+    with log.open("w", buffering=1, encoding="utf-8") as file:
         sys.stdout = sys.stderr = file
         try:
             checked = main(["check", manifest, *more])
@@ -131,6 +131,6 @@ def _tried(given: Input, folder: Path, more: list[str]) -> tuple[str, str]:
 
 def _status(path: Path) -> str:
     try:
-        return str(json.loads(path.read_text()).get("status"))
+        return str(json.loads(path.read_text(encoding="utf-8")).get("status"))
     except ValueError:
         return "no JSON"

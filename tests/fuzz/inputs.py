@@ -114,7 +114,7 @@ def in_manifest(key: str, value: str, table: str) -> Callable[[Path], None]:
         os.mkfifo(folder / "fifo")
         (folder / "loop").symlink_to(folder / "loop")
         path = folder / "manifest.toml"
-        path.write_text(replaced(path.read_text(), key, value, table))
+        path.write_text(replaced(path.read_text(encoding="utf-8"), key, value, table))
 
     return make
 
@@ -143,11 +143,11 @@ def random_manifest(seed: int) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         rng = np.random.default_rng(seed)
         path = folder / "manifest.toml"
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         if rng.random() < 0.5:
             key = rng.choice([*NEVER, "radius_mm"])
             table = "[wires" if key == "radius_mm" else "[[case]]"
-            path.write_text(replaced(text, str(key), str(rng.choice(BAD)), table))
+            path.write_text(replaced(text, str(key), str(rng.choice(BAD)), table), encoding="utf-8")
         else:
             path.write_bytes(mutated(text.encode(), rng))
 
@@ -193,7 +193,7 @@ def as_frame(write: Callable[[Path], Path | Source]) -> Callable[[Path], None]:
         made = write(folder / "other")
         name = f"{made.path}#{made.dataset}" if isinstance(made, Source) else str(made)
         path = folder / "manifest.toml"
-        path.write_text(replaced(path.read_text(), "frames", json.dumps(name), "[[case]]"))
+        path.write_text(replaced(path.read_text(encoding="utf-8"), "frames", json.dumps(name), "[[case]]"))
 
     return make
 
@@ -225,7 +225,7 @@ def random_volume(suffix: str, seed: int) -> Callable[[Path], None]:
         else:
             path.write_bytes(mutated(raw, rng, {"nii": 352, "h5": 4000}.get(suffix, 600)))
         manifest = folder / "manifest.toml"
-        manifest.write_text(replaced(manifest.read_text(), "frames", json.dumps(name), "[[case]]"))
+        manifest.write_text(replaced(manifest.read_text(encoding="utf-8"), "frames", json.dumps(name), "[[case]]"))
 
     return make
 
@@ -251,7 +251,7 @@ def given(key: str, name: str, content: bytes) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         (folder / name).write_bytes(content)
         path = folder / "manifest.toml"
-        path.write_text(replaced(path.read_text(), key, json.dumps(name), "[[case]]"))
+        path.write_text(replaced(path.read_text(encoding="utf-8"), key, json.dumps(name), "[[case]]"))
 
     return make
 

@@ -10,8 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from data_synthetic import catalogue
+from pipeline.cli import main
 
 Array = NDArray[np.float64]
+Known = tuple[Path, list[Array]]
 PEERS = Path(__file__).parent / "peer_curves"
 QUICK = ("--set", "compare.simulated_nulls=false")
 FRAMES = 4
@@ -51,15 +53,23 @@ def write_study(folder: Path) -> Path:
     rows = zip(tube.points_mm[::4], tube.radii_mm[::4], strict=True)
     lines = [f"{n + 1} 3 {' '.join(f'{x:.5f}' for x in p)} {r:.5f} {n or -1}" for n, (p, r) in enumerate(rows)]
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "vessel.swc").write_text("\n".join(lines))
+    (folder / "vessel.swc").write_text("\n".join(lines), encoding="utf-8")
     write_csv(folder / "traces", peers("bend"))
-    (folder / "manifest.toml").write_text(MANIFEST)
+    (folder / "manifest.toml").write_text(MANIFEST, encoding="utf-8")
     return folder / "manifest.toml"
 
 
 def simulated(out: Path, case: str = "bend") -> list[Array]:
     with h5py.File(out / "cases" / case / "frames.h5") as file:
         return [np.array(file["frames"][n]["simulated_mm"]) for n in sorted(file["frames"])]
+
+
+def run_known(folder: Path) -> Known:
+    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
+    manifest = write_study(folder)
+    out = manifest.parent / "out"
+    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
+    return manifest, simulated(out)
 
 
 def errors_of(out: Path, case: str = "bend") -> pd.DataFrame:

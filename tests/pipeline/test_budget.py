@@ -192,7 +192,7 @@ def test_every_frame_has_its_uncertainty_beside_its_error(out: Path) -> None:
     summary = tables.read(out / "summary.csv", SUMMARY).iloc[0]
     assert summary["release_frames"] == errors["release"].notna().sum()
     assert summary["u_val_mm"] > 0.0
-    assert "budget rests on 24 insertions" in (case / "result.json").read_text()
+    assert "budget rests on 24 insertions" in (case / "result.json").read_text(encoding="utf-8")
 
 
 def test_the_budget_moves_nothing_and_a_sweep_pays_for_none(out: Path) -> None:
@@ -209,7 +209,7 @@ def test_an_ensemble_that_is_too_small_says_so(study: Path, tmp_path: Path) -> N
     words = ["-o", str(tmp_path), "--until", "compare", "--set", "budget.members=4", "--set", "budget.members_alone=0"]
     assert main(["run", str(study / "manifest.toml"), *words, "--set", "compare.simulated_nulls=false"]) == 0
     assert tables.read(tmp_path / "cases/bend/errors.csv", ERRORS)["u_val_mm"].isna().all()
-    assert "fewer than 90 % of the 4 insertions" in (tmp_path / "cases/bend/result.json").read_text()
+    assert "fewer than 90 % of the 4 insertions" in (tmp_path / "cases/bend/result.json").read_text(encoding="utf-8")
 
 
 def test_the_table_by_source_adds_up_and_the_four_entries_are_there(out: Path) -> None:
@@ -259,10 +259,10 @@ taper = 0.2
 
 def test_a_manifest_states_what_it_knows(tmp_path: Path) -> None:
     path = tmp_path / "manifest.toml"
-    path.write_text(MANIFEST)
+    path.write_text(MANIFEST, encoding="utf-8")
     case = read_manifest(path).cases[0]
     assert (case.roll_sigma_deg, case.insertion_sigma_mm, case.uncertainty.taper) == (1.5, 0.3, 0.2)
-    path.write_text(MANIFEST.replace("taper = 0.2", "tapper = 0.2\nlumen_mm = -1.0"))
+    path.write_text(MANIFEST.replace("taper = 0.2", "tapper = 0.2\nlumen_mm = -1.0"), encoding="utf-8")
     with pytest.raises(ManifestError) as error:
         read_manifest(path)
     assert "uncertainty tapper: unknown key; did you mean 'taper'" in str(error.value)

@@ -214,14 +214,14 @@ stiffness_N_mm2 = 7.0
 @pytest.fixture
 def study(tmp_path):
     """Two cases with traces of their own; the first was calibrated with."""
-    (tmp_path / "manifest.toml").write_text(STUDY)
-    (tmp_path / "tube.swc").write_text("1 3 0 0 -3 2 -1\n2 3 0 0 20 2 1\n")
+    (tmp_path / "manifest.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "tube.swc").write_text("1 3 0 0 -3 2 -1\n2 3 0 0 20 2 1\n", encoding="utf-8")
     for n in range(4):
         lines = "\n".join(f"0.{n},0,{z}" for z in np.linspace(0, 8 + n, 9))
-        (tmp_path / f"{n}.csv").write_text(f"x,y,z\n{lines}\n")
+        (tmp_path / f"{n}.csv").write_text(f"x,y,z\n{lines}\n", encoding="utf-8")
     (first, _) = read_manifest(tmp_path / "manifest.toml").cases
     data = json.dumps(list(data_of(first))[:1])
-    (tmp_path / "p.toml").write_text(PARAMETERS.replace("data = []", f"data = {data}"))
+    (tmp_path / "p.toml").write_text(PARAMETERS.replace("data = []", f"data = {data}"), encoding="utf-8")
     return tmp_path
 
 
@@ -239,9 +239,9 @@ def test_a_run_takes_the_parameters(study):
 
 
 def test_a_case_does_not_score_itself_under_another_name(study):
-    text = (study / "manifest.toml").read_text()
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
     renamed = text.replace('id = "a"\nrole = "calibration"', 'id = "innocent"')
-    (study / "manifest.toml").write_text(renamed)
+    (study / "manifest.toml").write_text(renamed, encoding="utf-8")
     cases = read_manifest(study / "manifest.toml").cases
     with pytest.raises(ParametersError, match=r"'innocent': its scans or traces were calibrated with \(as case 'a'\)"):
         as_calibrated(cases, study / "p.toml")
@@ -251,8 +251,8 @@ def test_a_case_does_not_score_itself_under_another_name(study):
 
 
 def test_one_frame_in_common_is_enough(study):
-    text = (study / "manifest.toml").read_text().replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
-    (study / "manifest.toml").write_text(text)
+    text = (study / "manifest.toml").read_text(encoding="utf-8").replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
+    (study / "manifest.toml").write_text(text, encoding="utf-8")
     with pytest.raises(ParametersError, match="'b'"):
         as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
 
@@ -267,14 +267,14 @@ def test_one_frame_in_common_is_enough(study):
     ],
 )
 def test_bad_parameters_are_told(study, change, told):
-    (study / "p.toml").write_text((study / "p.toml").read_text().replace(*change))
+    (study / "p.toml").write_text((study / "p.toml").read_text(encoding="utf-8").replace(*change))
     with pytest.raises(ParametersError, match=told):
         as_calibrated(read_manifest(study / "manifest.toml").cases, study / "p.toml")
 
 
 def test_the_verb_refuses_what_it_cannot_use(study, capsys):
     manifest = study / "manifest.toml"
-    manifest.write_text(manifest.read_text().replace('role = "calibration"\n', ""))
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace('role = "calibration"\n', ""))
     assert main(["calibrate", str(manifest), "-o", str(study / "out")]) == 2
     assert 'no case has role = "calibration"' in capsys.readouterr().err
     assert main(["run", str(manifest), "-o", str(study / "out"), "--parameters", str(study / "none.toml")]) == 2
@@ -287,14 +287,14 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert [used.case for used in found.used] == ["a"]
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
     assert "UNIDENTIFIABLE" in capsys.readouterr().out
-    page = (study / "out" / "calibration.html").read_text()
+    page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
     assert (study / "out" / "figures" / "profiles.png").exists()
 
 
 def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
     manifest = study / "manifest.toml"
-    manifest.write_text(manifest.read_text().replace("roll_deg = 5.0", 'roll_deg = "fit"'))
+    manifest.write_text(manifest.read_text(encoding="utf-8").replace("roll_deg = 5.0", 'roll_deg = "fit"'))
     case, other = read_manifest(manifest).cases
     assert case.stated_roll_deg == 0.0
     run = Context(case.model_copy(update={"wire": bent(WIRE, TRUE)}), Config(), Store(None), Log(lambda *_: None))

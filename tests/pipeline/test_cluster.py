@@ -36,7 +36,7 @@ if __name__ == "__main__":
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Of the scheduler; the cluster runs in another folder than the test, as one on other machines does."""
     folder = tmp_path_factory.mktemp("cluster")
-    (folder / "cluster.py").write_text(CLUSTER)
+    (folder / "cluster.py").write_text(CLUSTER, encoding="utf-8")
     words = [sys.executable, str(folder / "cluster.py")]
     path = {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])}
     with subprocess.Popen(

@@ -71,7 +71,7 @@ def test_a_place_is_tried_without_leaving_anything(tmp_path: Path) -> None:
 
     assert unwritable(tmp_path / "a" / "b", "-o") == []
     assert unwritable(tmp_path / "a" / "b.xml", "--junit") == []
-    (tmp_path / "there.xml").write_text("before")
+    (tmp_path / "there.xml").write_text("before", encoding="utf-8")
     assert unwritable(tmp_path / "there.xml", "--junit") == []
     assert [path.name for path in tmp_path.iterdir()] == ["there.xml"]
     assert unwritable(Path("x" * 300), "-o")
@@ -98,7 +98,7 @@ def test_settings_are_a_file_that_reads_back_as_the_defaults(
 ) -> None:
     assert main(["settings"]) == 0
     path = tmp_path / "all.toml"
-    path.write_text(capsys.readouterr().out)
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
     assert resolve(read_settings(path)).config == Config()
     for one in described():
         assert one.meaning.endswith("."), f"{one.name} has no sentence"

@@ -47,10 +47,10 @@ def test_natural_order_over_whole_paths(tmp_path: Path) -> None:
     for name in ("depth_10", "depth_2", "depth_1"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "recon.mha").touch()
-    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "depth_*/recon.mha"))
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "depth_*/recon.mha"), encoding="utf-8")
     frames = read_manifest(tmp_path / "m.toml").cases[0].frames
     assert [source.path.parent.name for source in frames] == ["depth_1", "depth_2", "depth_10"]
-    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", f"{tmp_path}/depth_*/recon.mha"))
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", f"{tmp_path}/depth_*/recon.mha"), encoding="utf-8")
     assert read_manifest(tmp_path / "m.toml").cases[0].frames == frames  # an absolute pattern, too
 
 
@@ -109,7 +109,7 @@ def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
 )
 def test_names_of_files_are_judged(tmp_path: Path, key: str, value: str, said: str) -> None:
     lines = [line for line in GOOD.splitlines() if not line.startswith(f"{key} =")]
-    (tmp_path / "m.toml").write_text("\n".join([*lines, f"{key} = {value}"]))
+    (tmp_path / "m.toml").write_text("\n".join([*lines, f"{key} = {value}"]), encoding="utf-8")
     with pytest.raises(ManifestError, match=said):
         read_manifest(tmp_path / "m.toml")
 
@@ -118,7 +118,7 @@ def test_a_lumen_takes_a_label_or_a_level(tmp_path: Path) -> None:
     for value, label, level in (('"artery"', "artery", None), ("2", 2, None), (None, None, 0.4)):
         key = f"label = {value}" if value else "level = 0.4"
         (tmp_path / "m.toml").write_text(
-            GOOD.replace("frames/*.mha", "x.mha") + f'lumen = {{file = "s.nrrd", {key}}}\n'
+            GOOD.replace("frames/*.mha", "x.mha") + f'lumen = {{file = "s.nrrd", {key}}}\n', encoding="utf-8"
         )
         assert read_manifest(tmp_path / "m.toml").cases[0].lumen == Mask(tmp_path / "s.nrrd", "", None, label, level)
 
@@ -131,9 +131,11 @@ def test_everything_that_is_wrong_with_the_files_of_a_case_is_said_at_once(tmp_p
         raw = path.read_bytes()
         at = raw.index(b"ElementSpacing")
         path.write_bytes(raw[:at] + f"ElementSpacing = {text}".encode() + raw[raw.index(b"\n", at) :])
-    (tmp_path / "t.json").write_text(json.dumps({"frames": [{"points_mm": [[0, 0, float("nan")]] * 3}] * 3}))
-    (tmp_path / "l.stl").write_text("vertex 1 2 3\n" * 2)
-    (tmp_path / "m.toml").write_text(GOOD + 'lumen = "l.stl"\ntruth = "t.json"\n')
+    (tmp_path / "t.json").write_text(
+        json.dumps({"frames": [{"points_mm": [[0, 0, float("nan")]] * 3}] * 3}), encoding="utf-8"
+    )
+    (tmp_path / "l.stl").write_text("vertex 1 2 3\n" * 2, encoding="utf-8")
+    (tmp_path / "m.toml").write_text(GOOD + 'lumen = "l.stl"\ntruth = "t.json"\n', encoding="utf-8")
     for verb in (["check", str(tmp_path / "m.toml")], ["run", str(tmp_path / "m.toml"), "-o", str(tmp_path / "out")]):
         assert main(verb) == 2
         said = capsys.readouterr().err.splitlines()  # type: ignore[attr-defined]

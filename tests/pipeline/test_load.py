@@ -130,9 +130,9 @@ def test_a_format_from_outside_says_what_else_belongs_to_its_files(
 
     monkeypatch.setattr("pipeline.load.FORMATS", (Vox,))
     (tmp_path / "a.vox").write_bytes(b"voxels")
-    (tmp_path / "a.json").write_text("1")
+    (tmp_path / "a.json").write_text("1", encoding="utf-8")
     before = file_hash(tmp_path / "a.vox")
-    (tmp_path / "a.json").write_text("22")
+    (tmp_path / "a.json").write_text("22", encoding="utf-8")
     assert file_hash(tmp_path / "a.vox") != before
 
 
@@ -311,7 +311,7 @@ def test_two_series_in_a_folder_are_listed(tmp_path: Path) -> None:
 def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:
     with pytest.raises(LoadError, match="no such file"):
         read_header(tmp_path / "nothing.mha")
-    (tmp_path / "text.mha").write_text("hello")
+    (tmp_path / "text.mha").write_text("hello", encoding="utf-8")
     with pytest.raises(LoadError, match="cannot read"):
         read_header(tmp_path / "text.mha")
     (tmp_path / "below" / "series").mkdir(parents=True)

@@ -28,7 +28,7 @@ def written(folder: Path, text: str, frames: int = 3) -> Path:
     for i in (10, 2, 1)[:frames]:
         (folder / "frames" / f"f_{i}.mha").touch()
     path = folder / "manifest.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

@@ -40,7 +40,7 @@ def write_case(out: Path, name: str, errors_mm: list[float], statuses: list[str]
     said = [{"frame": r["frame"], "status": r["status"], "sentence": "", "message": ""} for r in rows]
     whole = {"case": name, "role": "validation", "group": name, "status": status, "sentence": "", "frames": said}
     whole |= {"failures": [], "summary": summary | {k: v for k, v in result.items() if k in summary}} | result
-    (folder / "result.json").write_text(json.dumps(whole))
+    (folder / "result.json").write_text(json.dumps(whole), encoding="utf-8")
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_one_population_everywhere(study: Path) -> None:
     rms = float(np.sqrt(np.mean(good**2)))
     whole = pd.read_csv(study / "overall.csv").iloc[0]
     assert whole["rms_mm"] == pytest.approx(rms)
-    assert json.loads((study / "run.json").read_text())["overall"]["rms_mm"] == pytest.approx(rms)
+    assert json.loads((study / "run.json").read_text(encoding="utf-8"))["overall"]["rms_mm"] == pytest.approx(rms)
     assert (whole["frames"], whole["frames_ok"], whole["insertions"]) == (9, 7, 4)
     line = last_line(totals, study / "index.html")
     assert f"median point error {np.median(good):.3f} mm" in line

@@ -59,12 +59,12 @@ def surface():
 def test_centreline_with_radius(tmp_path):
     rows = ["# a comment", f"1 0 {START[0]} {START[1]} {START[2]} {RADIUS} -1"]
     rows += [f"{n + 2} 0 {START[0] + LENGTH * (n + 1) / 3} {START[1]} {START[2]} {RADIUS} {n + 1}" for n in range(3)]
-    (tmp_path / "tree.swc").write_text("\n".join(rows))
+    (tmp_path / "tree.swc").write_text("\n".join(rows), encoding="utf-8")
     assert np.abs(errors(lumen_in(tmp_path / "tree.swc"))).max() < 1e-5
     points = [{"position": list((START + np.array([LENGTH * t, 0, 0])) * [-1, -1, 1])} for t in (0, 0.5, 1)]
     measure = [{"name": "Radius", "controlPointValues": [RADIUS] * 3}]
     markup = {"markups": [{"coordinateSystem": "RAS", "controlPoints": points, "measurements": measure}]}
-    (tmp_path / "tree.mrk.json").write_text(json.dumps(markup))
+    (tmp_path / "tree.mrk.json").write_text(json.dumps(markup), encoding="utf-8")
     assert np.abs(errors(lumen_in(tmp_path / "tree.mrk.json"))).max() < 1e-5
 
 
@@ -85,7 +85,7 @@ def test_closed_surface(tmp_path, kind):
         write_surface_vtp(path, vertices, triangles)
     else:
         corners = "\n".join(f"vertex {p[0]} {p[1]} {p[2]}" for t in triangles for p in vertices[t])
-        path.write_text(f"solid lumen\n{corners}\nendsolid")
+        path.write_text(f"solid lumen\n{corners}\nendsolid", encoding="utf-8")
     error = errors(lumen_in(path))
     assert np.sqrt(np.mean(error**2)) < 0.02
     assert np.abs(error).max() < 0.15
@@ -177,9 +177,9 @@ def test_a_centreline_of_vmtk(tmp_path):
         f'<PointData><DataArray type="Float64" Name="MaximumInscribedSphereRadius" format="ascii">{f"{RADIUS} " * 5}'
     )
     text = vtp(points, lines=range(5)).decode().replace("<Points>", f"{radius}</DataArray></PointData><Points>")
-    (tmp_path / "c.vtp").write_text(text)
+    (tmp_path / "c.vtp").write_text(text, encoding="utf-8")
     assert np.abs(errors(lumen_in(tmp_path / "c.vtp"))).max() < 1e-5
-    (tmp_path / "c.vtp").write_text(text.replace(f"{RADIUS} ", "-1 ", 1))
+    (tmp_path / "c.vtp").write_text(text.replace(f"{RADIUS} ", "-1 ", 1), encoding="utf-8")
     with pytest.raises(LoadError, match="one finite radius above 0 for each point"):
         lumen_in(tmp_path / "c.vtp")
 
@@ -214,15 +214,15 @@ def test_curves_come_back_as_they_were_written(tmp_path):
     write_polyline_vtp(tmp_path / "a.vtp", points)
     write_markups_curve(tmp_path / "a.mrk.json", points, "wire")
     lines = [",".join(map(str, p)) for p in points]
-    (tmp_path / "a.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]))
-    (tmp_path / "bare.csv").write_text("\n".join(lines))
+    (tmp_path / "a.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]), encoding="utf-8")
+    (tmp_path / "bare.csv").write_text("\n".join(lines), encoding="utf-8")
     for name in ("a.vtp", "a.mrk.json", "a.csv", "bare.csv"):
         np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, atol=1e-6)
 
 
 @pytest.mark.parametrize("text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5"])
 def test_a_curve_that_is_none_is_refused(tmp_path, text):
-    (tmp_path / "a.csv").write_text(text)
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(LoadError, match="expected"):
         read_curve(tmp_path / "a.csv")
 
@@ -245,5 +245,5 @@ def test_ascii_and_compressed_vtp(tmp_path):
     ):
         text = f"<VTKFile type='PolyData' byte_order='LittleEndian' {extra}><PolyData><Piece><Points>"
         text += f"<DataArray type='{kind}' Name='p' NumberOfComponents='3' {body}</DataArray></Points>{cells}"
-        (tmp_path / name).write_text(text + "</Piece></PolyData></VTKFile>")
+        (tmp_path / name).write_text(text + "</Piece></PolyData></VTKFile>", encoding="utf-8")
         np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points)

@@ -44,7 +44,9 @@ def test_the_insertions_share_the_phantom_and_nothing_else(study: Path) -> None:
     assert len({(study / case["reference"]).read_bytes() for case in cases}) == 1
     for key in ("roll_deg", "entry_mm", "entry_direction"):
         assert len({str(case[key]) for case in cases}) == INSERTIONS, key
-    first = [json.loads((study / case["truth"]).read_text())["frames"][0]["insertion_mm"] for case in cases]
+    first = [
+        json.loads((study / case["truth"]).read_text(encoding="utf-8"))["frames"][0]["insertion_mm"] for case in cases
+    ]
     assert len(set(first)) == INSERTIONS
     assert np.ptp(first) <= 1.0
     frames = [sorted((study / str(n)).glob("frames/*.mha"))[0].read_bytes() for n in range(1, INSERTIONS + 1)]
@@ -52,14 +54,16 @@ def test_the_insertions_share_the_phantom_and_nothing_else(study: Path) -> None:
 
 
 def test_another_folder_of_ours_is_replaced_and_one_of_another_kind_is_not(study: Path, tmp_path: Path) -> None:
-    (tmp_path / "manifest.toml").write_text("schema = 1\n")
+    (tmp_path / "manifest.toml").write_text("schema = 1\n", encoding="utf-8")
     assert main(["synth", "bend", "-o", str(tmp_path), "--insertions", "2", "--frames", "2", "--size", "64"]) == 2
 
 
 def test_the_first_insertion_is_the_study_of_one(study: Path, tmp_path: Path) -> None:
     words = ["--frames", str(FRAMES), "--size", "64", "--seed", "7"]
     assert main(["synth", "bend", "-o", str(tmp_path), *words]) == 0
-    assert (tmp_path / "truth.json").read_text() == (study / "1" / "truth.json").read_text()
+    assert (tmp_path / "truth.json").read_text(encoding="utf-8") == (study / "1" / "truth.json").read_text(
+        encoding="utf-8"
+    )
     names = sorted(path.name for path in (tmp_path / "frames").iterdir())
     for name in names:
         assert (tmp_path / "frames" / name).read_bytes() == (study / "1" / "frames" / name).read_bytes()

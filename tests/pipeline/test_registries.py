@@ -48,7 +48,7 @@ def test_a_metric_that_changed_is_another_input(as_before: None, tmp_path: Path)
     keys = set()
     for where, text in ((tmp_path / "own.py", "pair.error_mm.max()"), (tmp_path / "gone.py", "pair.error_mm.min()")):
         source = f"own = lambda pair: float({text})"
-        where.write_text(source)
+        where.write_text(source, encoding="utf-8")
         names: dict[str, Any] = {}
         exec(compile(source, where, "exec"), names)
         if where.stem == "gone":
@@ -81,7 +81,7 @@ def test_whatever_can_be_called_may_be_a_metric(as_before: None, tmp_path: Path,
 def job_key(folder: Path) -> str:
     """Key of a case without files."""
     manifest = folder / "manifest.toml"
-    manifest.write_text(MANIFEST)
+    manifest.write_text(MANIFEST, encoding="utf-8")
     return Job(read_manifest(manifest).cases[0], resolve([]), folder).key
 
 

@@ -162,7 +162,9 @@ def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) 
     if not folder.exists():
         shutil.copytree(study, folder)
         text = (folder / "manifest.toml").read_text(encoding="utf-8")
-        (folder / "manifest.toml").write_text(text.replace("[[case]]", '[[case]]\nlumen = "lumen.nrrd"'))
+        (folder / "manifest.toml").write_text(
+            text.replace("[[case]]", '[[case]]\nlumen = "lumen.nrrd"'), encoding="utf-8"
+        )
     image = sitk.GetImageFromArray(labels)
     image.CopyInformation(like)
     sitk.WriteImage(image, str(folder / "lumen.nrrd"))
@@ -194,9 +196,9 @@ def test_a_finished_case_gets_the_page_that_is_asked_for(study: Path, finished: 
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     page = out / "cases" / "bifurcation" / "report.html"
-    assert "data:image/png" not in page.read_text(encoding="utf-8")
+    assert 'src="figures/' in page.read_text(encoding="utf-8")
     assert run(study, out, "--embed") == 0
-    assert "data:image/png" in page.read_text(encoding="utf-8")
+    assert 'src="figures/' not in page.read_text(encoding="utf-8")
 
 
 def test_every_pooled_number_is_of_the_frames_that_are_ok(
@@ -210,7 +212,7 @@ def test_every_pooled_number_is_of_the_frames_that_are_ok(
         name, _, value = line.partition("=")
         depths = json.loads(value) if name.strip() == "insertion_mm" else []
         lines.append(f"insertion_mm = {[*depths[:2], depths[2] - 8.0, *depths[3:]]}" if depths else line)
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines), encoding="utf-8")
     out = tmp_path / "out"
     assert run(folder, out, "--set", "simulate.roll_offset_deg=60") == 1
     table = errors_of(out)
@@ -292,7 +294,7 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
         shutil.copytree(folder / "frames", folder / "broken")
         damaged = sorted((folder / "broken").iterdir())[1]
         damaged.write_bytes(damaged.read_bytes()[:-5000])
-    (folder / "manifest.toml").write_text(text + "\n" + second)
+    (folder / "manifest.toml").write_text(text + "\n" + second, encoding="utf-8")
     return folder
 
 
@@ -408,7 +410,7 @@ def test_a_damaged_result_hides_no_other(
     shutil.copytree(finished, out)
     (out / "cases" / "other").mkdir()
     damaged = out / "cases" / "other" / "result.json"
-    damaged.write_text("{")
+    damaged.write_text("{", encoding="utf-8")
     for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
         assert main(words) == 1
         said = capsys.readouterr()
@@ -437,7 +439,7 @@ COUNTS = {"case": "other", "status": "ok", "frames": 1, "frames_ok": 1}
 def test_a_result_with_other_contents_is_damaged(tmp_path: Path, content: str) -> None:
     path = tmp_path / "cases" / "other" / "result.json"
     path.parent.mkdir(parents=True)
-    path.write_text(content)
+    path.write_text(content, encoding="utf-8")
     (found,) = found_results(tmp_path)
     assert found.status == "damaged"
     assert str(path) in found.failures[0]["message"]
@@ -452,7 +454,7 @@ def test_points_cut_short_hide_no_other_case(
     shutil.copytree(finished, out)
     shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
     result = out / "cases" / "other" / "result.json"
-    result.write_text(result.read_text().replace('"bifurcation"', '"other"'))
+    result.write_text(result.read_text(encoding="utf-8").replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
     points.write_bytes(points.read_bytes()[:-200])
     (out / "cases" / "other" / "ledger.json").unlink()
@@ -493,7 +495,7 @@ def test_check_lists_problems_of_the_scans(study: Path, tmp_path: Path, capsys: 
     text = (
         (study / "manifest.toml").read_text(encoding="utf-8").replace("entry_mm = [", "entry_mm = [1000.0, 0.0, 0.0] #")
     )
-    (folder / "manifest.toml").write_text(text)
+    (folder / "manifest.toml").write_text(text, encoding="utf-8")
     shutil.copy(study / "reference.mha", folder / "reference.mha")
     assert main(["check", str(folder / "manifest.toml")]) == 2
     assert "lies outside the scan" in capsys.readouterr().err
@@ -504,7 +506,7 @@ def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) ->
     shutil.copytree(study, folder)
     lines = (folder / "manifest.toml").read_text(encoding="utf-8").splitlines()
     kept = [line for line in lines if not line.startswith(("frames", "truth"))]
-    (folder / "manifest.toml").write_text("\n".join(kept))
+    (folder / "manifest.toml").write_text("\n".join(kept), encoding="utf-8")
     assert run(folder, tmp_path / "out") == 0
     table = errors_of(tmp_path / "out")
     assert list(table["status"]) == ["simulated"] * FRAMES

@@ -21,10 +21,9 @@ from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
 from pipeline.simulate.others import begun, not_to_depth, oddity
 from reports.export import write_markups_curve, write_polyline_vtp
-from tests.pipeline.known_study import FRAMES, PEERS, QUICK, errors_of, peers, simulated, write_csv, write_study
+from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
-Known = tuple[Path, list[Array]]
 ADAPTERS = Path(__file__).parents[2] / "docs" / "adapters.md"
 
 
@@ -35,21 +34,19 @@ def synth(name: str, folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
-    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
-    manifest = write_study(tmp_path_factory.mktemp("known"))
-    out = manifest.parent / "out"
-    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
-    return manifest, simulated(out)
+    return run_known(tmp_path_factory.mktemp("known"))
 
 
 def run_with(known: Known, files: str, name: str) -> tuple[int, pd.DataFrame, dict[str, object]]:
     """A run of the study with ``simulated`` in its manifest."""
     manifest, out = known[0].with_name(f"{name}.toml"), known[0].parent / name
-    manifest.write_text(known[0].read_text().replace('id = "bend"', f'id = "bend"\nsimulated = {files}'))
+    manifest.write_text(
+        known[0].read_text(encoding="utf-8").replace('id = "bend"', f'id = "bend"\nsimulated = {files}')
+    )
     code = main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK])
     if code == 2:
         return code, pd.DataFrame(), {}
-    return code, errors_of(out), json.loads((out / "cases" / "bend" / "result.json").read_text())
+    return code, errors_of(out), json.loads((out / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
 
 
 def test_traces_without_scans_are_compared(known: Known) -> None:
@@ -65,10 +62,10 @@ def test_traces_without_scans_are_compared(known: Known) -> None:
 def test_a_trace_that_begins_at_its_tip_fails_by_name(known: Known) -> None:
     folder, traces = known[0].parent, peers("bend")
     write_csv(folder / "turned", [traces[0], traces[1][::-1], *traces[2:]])
-    (folder / "turned.toml").write_text(known[0].read_text().replace("traces/*.csv", "turned/*.csv"))
+    (folder / "turned.toml").write_text(known[0].read_text(encoding="utf-8").replace("traces/*.csv", "turned/*.csv"))
     assert main(["run", str(folder / "turned.toml"), "-o", str(folder / "out-turned"), *QUICK]) == 1
     assert list(errors_of(folder / "out-turned")["status"])[1] == "trace_failed"
-    assert "tip first" in (folder / "out-turned" / "failures.csv").read_text()
+    assert "tip first" in (folder / "out-turned" / "failures.csv").read_text(encoding="utf-8")
 
 
 SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
@@ -97,10 +94,10 @@ def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
     assert not where.loc[where["simulator"] == "straight-tip", "lead"].notna().any(), "nearest nowhere"
     for page in ("simulators.html", "index.html", "simulators/wireval/index.html", "simulators/PyElastica/index.html"):
         assert (out / page).exists()
-    assert "simulators.html" in (out / "index.html").read_text()
+    assert "simulators.html" in (out / "index.html").read_text(encoding="utf-8")
     (out / "simulators.html").unlink()
     assert main(["report", str(out)]) == 0
-    assert "straight-tip" in (out / "simulators.html").read_text()
+    assert "straight-tip" in (out / "simulators.html").read_text(encoding="utf-8")
 
 
 def test_a_third_party_in_a_bifurcation(tmp_path: Path) -> None:
@@ -178,7 +175,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     wires = known[1]
     folder = write_csv(tmp_path / "sim", [*wires[:3], wires[3][: len(wires[3]) // 2]])
     (folder / "wire_001.csv").unlink()
-    (folder / "wire_002.csv").write_text("")
+    (folder / "wire_002.csv").write_text("", encoding="utf-8")
     code, table, result = run_with(known, f'"{folder}/*.csv"', "spoilt")
     assert code == 1
     assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
@@ -250,7 +247,7 @@ def test_which_file_is_which_frame() -> None:
 def test_the_other_vtk_layouts(tmp_path: Path) -> None:
     text = "# vtk DataFile Version 5.1\nvtk output\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0\n1 2 0\n"
     text += "LINES 2 3\nOFFSETS vtktypeint64\n0 3\nCONNECTIVITY vtktypeint64\n2 1 0\n"
-    (tmp_path / "a.vtk").write_text(text)
+    (tmp_path / "a.vtk").write_text(text, encoding="utf-8")
     np.testing.assert_array_equal(read_vtk_points(tmp_path / "a.vtk"), [[1, 2, 0], [1, 0, 0], [0, 0, 0]])
 
 
@@ -270,7 +267,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
 
 
 def script(name: str) -> str:
-    found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(), re.DOTALL)
+    found = re.search(rf"```python {name}\n(.*?)```", ADAPTERS.read_text(encoding="utf-8"), re.DOTALL)
     assert found is not None
     return found[1]
 
@@ -281,7 +278,9 @@ def test_the_adapters_of_the_manual(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.chdir(tmp_path)
     nodes = [[0, 0, 0, 0, 0, 0, 1]] * 3 + [[*point, 0, 0, 0, 1] for point in wire.tolist()]
     numbers = " ".join(str(x) for node in nodes for x in node)
-    Path("wire.state").write_text("".join(f"T= {t}\n  X= {numbers} \n  V= {'0 ' * 36}\n" for t in (0.5, 1.0)))
+    Path("wire.state").write_text(
+        "".join(f"T= {t}\n  X= {numbers} \n  V= {'0 ' * 36}\n" for t in (0.5, 1.0)), encoding="utf-8"
+    )
     exec(script("sofa"), {})
     found = read_wires([Source(Path(f"wire_00{n}.csv")) for n in (0, 1)], 2)
     np.testing.assert_allclose(found[1].points_mm, wire)

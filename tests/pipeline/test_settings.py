@@ -21,7 +21,7 @@ from solver.grid import Grid
 
 def test_the_command_line_wins_over_a_file_and_says_so(tmp_path: Path) -> None:
     path = tmp_path / "cfg.toml"
-    path.write_text("[solver]\nsegment_mm = 0.5\nmax_iterations = 50\n")
+    path.write_text("[solver]\nsegment_mm = 0.5\nmax_iterations = 50\n", encoding="utf-8")
     resolved = resolve([*read_settings(path), parse_assignment("solver.segment_mm=0.25")])
     assert resolved.config.solver.segment_mm == 0.25
     assert resolved.config.solver.max_iterations == 50
@@ -34,7 +34,7 @@ def test_the_command_line_wins_over_a_file_and_says_so(tmp_path: Path) -> None:
 def test_resolved_settings_read_back(tmp_path: Path) -> None:
     resolved = resolve([parse_assignment("solver.segment_mm=0.25"), parse_assignment("solver.hull=samples:8")])
     path = tmp_path / "config.resolved.toml"
-    path.write_text(to_toml(resolved))
+    path.write_text(to_toml(resolved), encoding="utf-8")
     assert resolve(read_settings(path)).config == resolved.config
 
 
@@ -48,7 +48,7 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
         ("simulate.entry=foo", "'traced' or 'manifest'"),
         ("solver.segment_mm=-3", "greater than"),
         ("compare.sample_mm=0", "greater than"),
-        ("segment.outer_mm=nan", "greater than or equal to 0.1"),
+        ("segment.outer_mm=nan", "a finite number"),
         ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
 )
@@ -85,7 +85,7 @@ def test_what_has_no_known_content_is_refused_in_a_key() -> None:
 
 def test_the_voxels_behind_a_header_belong_to_its_content(tmp_path: Path) -> None:
     header, voxels = tmp_path / "scan.mhd", tmp_path / "scan.raw"
-    header.write_text("ObjectType = Image\nElementDataFile = scan.raw\n")
+    header.write_text("ObjectType = Image\nElementDataFile = scan.raw\n", encoding="utf-8")
     voxels.write_bytes(b"first")
     first = file_hash(header)
     voxels.write_bytes(b"other")

@@ -40,7 +40,7 @@ insertion_mm = [6.0, 12.0]
 @pytest.fixture
 def case(tmp_path: Path) -> Case:
     path = tmp_path / "manifest.toml"
-    path.write_text(MANIFEST)
+    path.write_text(MANIFEST, encoding="utf-8")
     return read_manifest(path).cases[0]
 
 
@@ -71,10 +71,10 @@ CATHETER = "catheter = {bending_stiffness_N_mm2 = 50.0, radius_mm = 0.9, inserti
 
 def test_a_catheter_is_a_key_of_the_case(tmp_path: Path) -> None:
     """From the manifest through check and run: it straightens the second frame and, drawn back, lets the third bend."""
-    (tmp_path / "tube.swc").write_text("1 0 0 0 -5 6 -1\n2 0 0 0 25 6 1\n")
+    (tmp_path / "tube.swc").write_text("1 0 0 0 -5 6 -1\n2 0 0 0 25 6 1\n", encoding="utf-8")
     path, tips = tmp_path / "manifest.toml", {}
     for name, text in (("bare", STUDY), ("over", STUDY + CATHETER)):
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         assert main(["check", str(path)]) == 0
         assert main(["run", str(path), "-o", str(tmp_path / name), "--set", "solver.segment_mm=0.5"]) == 0
         with h5py.File(next((tmp_path / name).rglob("frames.h5"))) as file:
@@ -83,16 +83,16 @@ def test_a_catheter_is_a_key_of_the_case(tmp_path: Path) -> None:
     assert np.hypot(*tips["over"][1][:2]) < 0.2 * np.hypot(*tips["bare"][1][:2])
     # 8 mm of hook are 10 mm beyond the catheter: only where it is clamped, nothing changes
     np.testing.assert_allclose(tips["over"][2], tips["bare"][2], atol=1e-3)
-    path.write_text(STUDY + CATHETER.replace("9.0", "10.5"))
+    path.write_text(STUDY + CATHETER.replace("9.0", "10.5"), encoding="utf-8")
     assert main(["check", str(path)]) == 2
 
 
 def test_a_weight_without_down_is_a_problem_of_the_manifest(tmp_path: Path) -> None:
     path, weighed = tmp_path / "manifest.toml", MANIFEST.replace("radius_mm", "weight_N_per_mm = 8e-6\nradius_mm")
-    path.write_text(weighed)
+    path.write_text(weighed, encoding="utf-8")
     with pytest.raises(ManifestError, match=r"case 'tube': down is missing: wire 'w' has a weight; \[0, 1, 0\]"):
         read_manifest(path)
-    path.write_text(weighed.replace("wire = ", "down = [0, 1, 0]\nwire = "))
+    path.write_text(weighed.replace("wire = ", "down = [0, 1, 0]\nwire = "), encoding="utf-8")
     assert read_manifest(path).cases[0].down == (0.0, 1.0, 0.0)
 
 

@@ -51,7 +51,7 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) ->
             "frames": said,
         }
         whole |= {"failures": [], "summary": summary | {"status": status}}
-        (folder / "result.json").write_text(json.dumps(whole))
+        (folder / "result.json").write_text(json.dumps(whole), encoding="utf-8")
     return out
 
 
@@ -115,9 +115,9 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
     none = write_tree(tmp_path / "none", even(0.2))
     for folder in (none / "cases").iterdir():
         (folder / POINTS.file).unlink()
-        result = json.loads((folder / "result.json").read_text())
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
         result["summary"] |= {"frames_ok": 0, "frames_failed": 4}
-        (folder / "result.json").write_text(json.dumps(result))
+        (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
     assert write_comparison(tmp_path, {"none": none, "wireval": ours}) == []
     table = pd.read_csv(tmp_path / "simulators.csv").set_index("simulator")
     assert (table.loc["none", "frames"], table.loc["none", "frames_ok"], table.loc["none", "within_1mm"]) == (

@@ -85,7 +85,7 @@ def test_an_absent_extra_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
     """A straight tube as SWC, radius 2 mm, 60 mm long."""
     rows = [f"{i + 1} 3 0 0 {i} 2.0 {i if i else -1}" for i in range(61)]
-    (tmp_path / "tube.swc").write_text("\n".join(rows))
+    (tmp_path / "tube.swc").write_text("\n".join(rows), encoding="utf-8")
     words = ["--anatomy", str(tmp_path / "tube.swc"), "-o", str(tmp_path / "study"), "--frames", "2", "--size", "64"]
     assert main(["synth", *words]) == 0
     assert main(["check", str(tmp_path / "study" / "manifest.toml")]) == 0

@@ -15,21 +15,16 @@ from pipeline.cli import main
 from pipeline.compare.views import screen_of, shift_of
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import CArm, read_views
-from tests.pipeline.known_study import QUICK, errors_of, peers, simulated, write_csv, write_study
+from tests.pipeline.known_study import QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
 Array = NDArray[np.float64]
-Known = tuple[Path, list[Array]]
 CENTRE = np.array([12.0, 0.0, 10.0])
 WITHIN_MM = 0.02
 
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
-    """The manifest of a quick study that was run into ``out`` beside it, and the wires of that run."""
-    manifest = write_study(tmp_path_factory.mktemp("known"))
-    out = manifest.parent / "out"
-    assert main(["run", str(manifest), "-o", str(out), "--until", "compare", *QUICK]) == 0
-    return manifest, simulated(out)
+    return run_known(tmp_path_factory.mktemp("known"))
 
 
 def c_arm(beam: tuple[float, float, float] = (0.3, -0.95, 0.1)) -> CArm:
@@ -97,16 +92,18 @@ def test_a_patient_who_moved_is_found_and_the_end_takes_no_part() -> None:
 
 def study(known: Known, folder: Path, translation: str = "none") -> Path:
     """The study that is known in space, its traces projected, at the depths of the run in space."""
-    text, arm = known[0].read_text(), c_arm()
+    text, arm = known[0].read_text(encoding="utf-8"), c_arm()
     traces = peers("bend")
     frames = [{"c_arm": arm.model_dump(), "points_px": seen(arm, trace).tolist()} for trace in traces]
     views = {"isocentre_mm": CENTRE.tolist(), "leaf_mm": traces[-1][-1].tolist(), "translation": translation}
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "projections.json").write_text(json.dumps(views | {"frames": frames}))
+    (folder / "projections.json").write_text(json.dumps(views | {"frames": frames}), encoding="utf-8")
     depths = errors_of(known[0].parent / "out")["insertion_mm"].tolist()
     text = re.sub(r"insertion_mm = .*", f"insertion_mm = {depths}", text)
     text = text.replace('traces = "traces/*.csv"', 'projections = "projections.json"')
-    (folder / "manifest.toml").write_text(text.replace("vessel.swc", str(known[0].parent / "vessel.swc")))
+    (folder / "manifest.toml").write_text(
+        text.replace("vessel.swc", str(known[0].parent / "vessel.swc")), encoding="utf-8"
+    )
     return folder / "manifest.toml"
 
 
@@ -150,18 +147,20 @@ def test_a_projected_study_gives_the_in_plane_part_of_the_answer(known: Known, t
     case = tmp_path / "out" / "cases" / "bend"
     assert (case / "figures" / "views.png").exists()
     assert not (case / "figures" / "projections.png").exists(), "there is no scan to show"
-    assert "no curve was fitted" not in (case / "report.html").read_text(), "the assumptions say what was"
+    assert "no curve was fitted" not in (case / "report.html").read_text(encoding="utf-8"), (
+        "the assumptions say what was"
+    )
 
 
 def test_no_skill_where_the_registration_is_worse_than_the_vessel_is_wide(known: Known, tmp_path: Path) -> None:
     manifest = study(known, tmp_path / "study")
     file = manifest.parent / "projections.json"
-    views = json.loads(file.read_text())
+    views = json.loads(file.read_text(encoding="utf-8"))
     for frame in views["frames"]:
         frame["points_px"] = np.add(frame["points_px"], [0.0, 20.0]).tolist()
-    file.write_text(json.dumps(views))
+    file.write_text(json.dumps(views), encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
-    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text())
+    result = json.loads((tmp_path / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
     said = r"registration-limited: centreline \d\.\d mm in a lumen of \d\.\d mm radius; no skill can be claimed"
     assert re.search(said, result["warnings"][0])
     assert "skill" not in {k for k, v in result["summary"].items() if v is not None}
@@ -172,12 +171,12 @@ def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path
     manifest = study(known, tmp_path / "study", "fitted")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"view_failed"}
-    assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text()
+    assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
 
 
 def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> None:
     file = study(known, tmp_path).with_name("projections.json")
-    good = json.loads(file.read_text())
+    good = json.loads(file.read_text(encoding="utf-8"))
     assert len(read_views(file, 4)) == 4
     arm = good["frames"][0]["c_arm"]
     for change, said in (
@@ -189,10 +188,10 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
         ({"frames": [{"matrix": np.eye(4)[[0, 1, 3]].tolist(), "points_px": [[0, 0], [1, 1]]}] * 4}, "source"),
         ({"translate": "none"}, "translate"),
     ):
-        file.write_text(json.dumps(good | change))
+        file.write_text(json.dumps(good | change), encoding="utf-8")
         with pytest.raises(LoadError, match=said):
             read_views(file, 4)
-    file.write_text("{")
+    file.write_text("{", encoding="utf-8")
     with pytest.raises(LoadError, match="cannot be read as projections"):
         read_views(file, 4)
 
@@ -200,17 +199,19 @@ def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> 
 def test_projections_stand_for_scans_alone(known: Known, tmp_path: Path) -> None:
     manifest = study(known, tmp_path)
     write_csv(tmp_path / "traces", known[1])
-    manifest.write_text(manifest.read_text().replace("projections =", 'traces = "traces/*.csv"\nprojections ='))
+    manifest.write_text(
+        manifest.read_text(encoding="utf-8").replace("projections =", 'traces = "traces/*.csv"\nprojections =')
+    )
     assert main(["check", str(manifest)]) == 2
 
 
 def test_other_simulators_are_scored_in_projections_too(known: Known, tmp_path: Path) -> None:
     """Own wires handed in as another simulator's: the same errors."""
     manifest = study(known, tmp_path / "study")
-    text = manifest.read_text()
+    text = manifest.read_text(encoding="utf-8")
     curves = write_csv(tmp_path / "sim", known[1])
-    manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='))
+    manifest.write_text(text.replace("projections =", f'simulated = "{curves}/*.csv"\nprojections ='), encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
-    manifest.write_text(text)
+    manifest.write_text(text, encoding="utf-8")
     assert main(["run", str(manifest), "-o", str(tmp_path / "own"), "--until", "compare", *QUICK]) == 0
     pd.testing.assert_series_equal(errors_of(tmp_path / "out")["rms_mm"], errors_of(tmp_path / "own")["rms_mm"])

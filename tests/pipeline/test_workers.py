@@ -79,7 +79,7 @@ if __name__ == "__main__":
 
 def deaf(path: Path) -> None:
     """Keeps the interpreter to itself, so that no thread and no handler of this process gets a turn."""
-    path.with_suffix(".tmp").write_text(str(os.getpid()))
+    path.with_suffix(".tmp").write_text(str(os.getpid()), encoding="utf-8")
     path.with_suffix(".tmp").rename(path)
     ctypes.PyDLL(None).sleep(LONG_S)
 
@@ -88,12 +88,12 @@ def deaf(path: Path) -> None:
 def test_no_worker_outlives_its_parent(tmp_path: Path, how: signal.Signals) -> None:
     """The parent may have no chance to say anything, the worker none to listen."""
     script = tmp_path / "parent.py"
-    script.write_text(PARENT)
+    script.write_text(PARENT, encoding="utf-8")
     with subprocess.Popen(
         [sys.executable, str(script), str(tmp_path)], stderr=subprocess.DEVNULL, env=with_root()
     ) as parent:
         wait_for(lambda: all((tmp_path / name).exists() for name in "ab"))
-        numbers = [int((tmp_path / name).read_text()) for name in "ab"]
+        numbers = [int((tmp_path / name).read_text(encoding="utf-8")) for name in "ab"]
         assert all(Path(f"/proc/{n}").exists() for n in numbers)
         parent.send_signal(how)
     wait_for(lambda: not any(running(n) for n in numbers))
@@ -105,7 +105,7 @@ def with_root() -> dict[str, str]:
 
 def running(process: int) -> bool:
     try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
 

@@ -67,7 +67,7 @@ def write_run(out: Path, cases: tuple[FakeCase, ...], sweep: bool = False) -> Pa
         tables.write(out / "sweep.csv", SWEEP, list(_sweep(cases)))
     tables.write(out / OVERALL_FILE, SUMMARY, [_overall(summaries)])
     run = {"cases": [c.name for c in cases], "config": _config(), "provenance": _provenance()}
-    (out / "run.json").write_text(json.dumps(run, indent=1))
+    (out / "run.json").write_text(json.dumps(run, indent=1), encoding="utf-8")
     return out
 
 
@@ -184,7 +184,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
     frames_file.write_frames(folder / "frames.h5", _scan(case), frames)
     if not case.simulated_only:
         tables.write(folder / "points.csv.gz", POINTS, _points(frames))
-    (folder / "log.txt").write_text("load: 30 frames\n")
+    (folder / "log.txt").write_text("load: 30 frames\n", encoding="utf-8")
     last = frames[-1].simulated_mm
     assert last is not None
     _write_view(folder / "view", last)
@@ -210,7 +210,7 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "config": _config(),
         "provenance": _provenance(),
     }
-    (folder / "result.json").write_text(json.dumps(result, indent=1))
+    (folder / "result.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 
 def _timings(case: FakeCase) -> Iterator[dict[str, Any]]:

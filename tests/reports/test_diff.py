@@ -111,7 +111,7 @@ def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
 )
 def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> None:
     path = tmp_path / "t.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=hint):
         diff.load_tolerance(path)
 

@@ -166,7 +166,9 @@ def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
 
 def test_what_was_simulated_stands_on_the_page(run: Path) -> None:
     """Also the catheter, where down is, and the length of the segments that nobody typed, with its reason."""
-    folder = next(p.parent for p in sorted(run.glob("cases/*/result.json")) if "catheter" in p.read_text())
+    folder = next(
+        p.parent for p in sorted(run.glob("cases/*/result.json")) if "catheter" in p.read_text(encoding="utf-8")
+    )
     page = (folder / "report.html").read_text(encoding="utf-8")
     for text in ("catheter.radius_mm", "catheter.insertion_mm", "<code>down</code>", "half as long ones lie within"):
         assert text in page, text
@@ -176,7 +178,7 @@ def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=3),))
     dead = out / "cases" / "dead"
     dead.mkdir()
-    (dead / "log.txt").write_text("load: 3 frames\n")
+    (dead / "log.txt").write_text("load: 3 frames\n", encoding="utf-8")
     render_case(dead)
     text = render_index(out).read_text(encoding="utf-8")
     assert "no result.json" in (dead / "report.html").read_text(encoding="utf-8")
@@ -191,7 +193,7 @@ def test_a_crash_counts_its_frames_on_the_pages_as_on_the_terminal(tmp_path: Pat
     crashed.mkdir()
     row = {"case": "crashed", "status": "crashed", "frames": 5, "frames_ok": 0, "frames_failed": 5}
     result = {"case": "crashed", "status": "crashed", "sentence": "its log has the traceback", "frames": []}
-    (crashed / "result.json").write_text(json.dumps(result | {"summary": row}))
+    (crashed / "result.json").write_text(json.dumps(result | {"summary": row}), encoding="utf-8")
     index = render_index(out).read_text(encoding="utf-8")
     assert "2 cases, 8 frames: 2 ok, 6 without a result." in index
     page = render_case(crashed).read_text(encoding="utf-8")
@@ -203,7 +205,9 @@ def test_counters_are_sums_and_levels(tmp_path: Path) -> None:
     folder.mkdir()
     cnr = {"min": 6.17, "median": 8.873, "max": 9.73}
     counters = {"trace": {"voxels_read": 63610.0, "cnr": cnr, "blur_mm": dict.fromkeys(cnr)}}
-    (folder / "result.json").write_text(json.dumps({"case": "c", "status": "ok", "counters": counters}))
+    (folder / "result.json").write_text(
+        json.dumps({"case": "c", "status": "ok", "counters": counters}), encoding="utf-8"
+    )
     text = render_case(folder).read_text(encoding="utf-8")
     work = text[text.index('<h2 id="work">') : text.index('<h2 id="settings">')]
     cells = re.findall(r"<td[^>]*>(.*?)</td>", work)
@@ -214,7 +218,7 @@ def test_a_case_that_failed_as_a_whole_says_why(tmp_path: Path) -> None:
     folder = tmp_path / "out" / "cases" / "c"
     folder.mkdir(parents=True)
     result = {"case": "c", "status": "segment_failed", "sentence": "no lumen", "message": "segment: seed 0 < 1"}
-    (folder / "result.json").write_text(json.dumps(result))
+    (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
     text = render_case(folder).read_text(encoding="utf-8")
     assert "segment: seed 0 &lt; 1" in text
     assert not list((folder / "figures").glob("*")) if (folder / "figures").exists() else True
@@ -248,7 +252,7 @@ def test_a_picture_whose_data_is_gone_is_removed(tmp_path: Path) -> None:
     figures = out / "cases" / "c" / "figures"
     figures.mkdir()
     for name in ("error_along_wire.png", "error_along_wire.csv"):
-        (figures / name).write_text("left from an earlier run")
+        (figures / name).write_text("left from an earlier run", encoding="utf-8")
     render_case(out / "cases" / "c")
     assert not list(figures.glob("error_along_wire*"))
     assert (figures / "contact_along_wire.png").exists()
@@ -266,7 +270,7 @@ def test_cases_come_worst_first_and_a_tall_map_leaves_the_first_screen(tmp_path:
         folder = many / "cases" / f"c{i:02d}"
         folder.mkdir(parents=True)
         tables.write(folder / "errors.csv", ERRORS, [{"frame": 0, "status": "ok", "rms_mm": 0.1, "p95_mm": 0.2}])
-        (folder / "result.json").write_text(json.dumps({"case": folder.name, "status": "ok"}))
+        (folder / "result.json").write_text(json.dumps({"case": folder.name, "status": "ok"}), encoding="utf-8")
     rows = [{"case": f"c{i:02d}", "status": "ok", "frames": 1, "frames_ok": 1, "rms_mm": 0.1} for i in range(45)]
     tables.write(many / "summary.csv", SUMMARY, rows)
     ids = re.findall(r'<h2 id="(\w+)"', render_index(many).read_text(encoding="utf-8"))

@@ -52,8 +52,8 @@ def test_a_metric_from_outside_is_one_registration(tmp_path: Path) -> None:
     ERRORS.add(area)
     assert (ERRORS.names[-1], SUMMARY.names[-1]) == ("area_mm", "area_median_mm")
     out = _run_with(tmp_path, area, 0.125)
-    assert "area_mm" in (out / "cases" / "c" / "errors.csv").read_text().splitlines()[0]
-    assert "area_median_mm" in (out / "summary.csv").read_text().splitlines()[0]
+    assert "area_mm" in (out / "cases" / "c" / "errors.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "area_median_mm" in (out / "summary.csv").read_text(encoding="utf-8").splitlines()[0]
     page = render_case(out / "cases" / "c").read_text(encoding="utf-8")
     assert 'title="area between the wires over their length [mm]">area_<wbr>mm</button></th>' in page
     assert page.count("<td>0.125</td>") == 4

@@ -23,7 +23,7 @@ def test_a_formula_in_a_table_is_a_text(tmp_path: Path) -> None:
 
 def test_numbers_below_zero_stay_numbers(tmp_path: Path) -> None:
     tables.write_csv(tmp_path / "a.csv", pd.DataFrame({"x": [-1.5], "y": ["-a"]}))
-    assert (tmp_path / "a.csv").read_text() == "x,y\n-1.5,'-a\n"
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "x,y\n-1.5,'-a\n"
 
 
 def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None:
@@ -36,7 +36,7 @@ def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None
     (out / "cases" / "run1").symlink_to(elsewhere)
     (out / "loop").symlink_to(out / "loop")
     (tmp_path / "f.mha").touch()
-    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "f.mha"))
+    (tmp_path / "m.toml").write_text(GOOD.replace("frames/*.mha", "f.mha"), encoding="utf-8")
     assert main(["run", str(tmp_path / "m.toml"), "-o", str(out), "--resume"]) == 2
     assert "links lead out of it" in capsys.readouterr().err  # type: ignore[attr-defined]
     assert list(elsewhere.iterdir()) == []

@@ -116,7 +116,7 @@ def test_a_text_that_looks_like_nothing_is_kept(tmp_path: Path) -> None:
 
 def test_a_wrong_field_names_its_file(tmp_path: Path) -> None:
     path = tmp_path / "errors.csv"
-    path.write_text("frame,rms_mm\n0,abc\n")
+    path.write_text("frame,rms_mm\n0,abc\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"errors\.csv"):
         tables.read(path, ERRORS)
 
@@ -149,7 +149,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
 
 def _fail_half_way(path: Path) -> None:
     with replacing(path) as temporary:
-        temporary.write_text("half")
+        temporary.write_text("half", encoding="utf-8")
         raise RuntimeError
 
 

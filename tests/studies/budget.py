@@ -131,7 +131,7 @@ lumen_bias_mm = {BIAS_VOXELS * VOXEL_MM}
 """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "manifest.toml"
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         return read_manifest(path).cases[0]
 
 
@@ -180,8 +180,8 @@ def found(folder: Path, seed: int, plant: str, members: int) -> list[dict[str, A
         compare, budget = replace(plain.compare, simulated_nulls=False), replace(plain.budget, members_alone=0)
         config = replace(plain, compare=compare, budget=replace(budget, members=members))
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(record(judged(seed, plant, config))))
-    frames: list[dict[str, Any]] = json.loads(path.read_text())
+        path.write_text(json.dumps(record(judged(seed, plant, config))), encoding="utf-8")
+    frames: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
     return frames
 
 

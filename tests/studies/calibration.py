@@ -23,7 +23,6 @@ from pipeline.cli import main as wireval
 from pipeline.compare import intervals, point_to_curve
 from pipeline.run.cache import Store, default_root
 from pipeline.run.calibrated import as_calibrated
-from pipeline.run.calibration import _with_own_curves
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.simulate import simulate_frames
@@ -49,7 +48,7 @@ BARS = {
 def squares(case: Case, config: Config) -> tuple[float, int]:
     """Sum of squares of the simulated wires' distances to the true ones, mm^2, and how many points they are of."""
     run = Context(case, config, Store(default_root()), Log(lambda *_: None))
-    known = simulate_frames(run, _with_own_curves(run, run_stages(run, "trace")))
+    known = simulate_frames(run, run_stages(run, "trace"))
     total, count = 0.0, 0
     for frame in known.frames:
         if frame.ok and frame.simulated is not None and frame.truth_mm is not None:

@@ -187,10 +187,10 @@ def write_study(seed: int, folder: Path, *, forces: bool = False, blind: bool = 
             header = "x_mm,y_mm,z_mm"
             np.savetxt(below / "traces" / f"{n:03d}.csv", points, delimiter=",", header=header, comments="", fmt="%.6f")
         record = [{"points_mm": f.points_mm.tolist(), "insertion_mm": f.depth_mm} for f in frames]
-        (below / "truth.json").write_text(json.dumps({"frames": record}))
+        (below / "truth.json").write_text(json.dumps({"frames": record}), encoding="utf-8")
         blocks.append(_case(way, physics, frames, rng, forces=forces and way.role == "calibration"))
     lines = ["schema = 1", "[wires.wire]", *(f"{k} = {json.dumps(v)}" for k, v in wire.items()), *blocks]
-    (folder / "manifest.toml").write_text("\n".join(lines) + "\n")
+    (folder / "manifest.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return physics
 
 

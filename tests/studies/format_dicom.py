@@ -138,7 +138,7 @@ def dicom_variants(enhanced: Callable, numbered: np.ndarray, spacing: np.ndarray
 
     def beside(folder: Path) -> Path:
         series()(folder)
-        (folder / "notes.txt").write_text("read me")
+        (folder / "notes.txt").write_text("read me", encoding="utf-8")
         report = Dataset()
         report.SOPClassUID, report.SOPInstanceUID = "1.2.840.10008.5.1.4.1.1.88.11", "1.2.9"
         report.file_meta = FileMetaDataset()

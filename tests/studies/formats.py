@@ -437,7 +437,7 @@ def other_variants() -> Iterator[Variant]:
 
 
 def _text(path: Path, text: str = "hello, this is no scan\n") -> Path:
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

@@ -47,7 +47,7 @@ insertion_mm = {depths}
 
 def numbers(path: Path, head: str, rows: int) -> Array:
     """The matrix below a comment line of an info file."""
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     start = next(i for i, line in enumerate(lines) if head in line) + 1
     return np.array([[float(x) for x in line.split()] for line in lines[start : start + rows]])
 
@@ -56,7 +56,7 @@ class Tree:
     """Nodes (n, 3) in mm, radii (n,) in mm, neighbours by node, and the parent of each node seen from the root."""
 
     def __init__(self, folder: Path) -> None:
-        lines = next(folder.glob("*vesselsStructCenterline.txt")).read_text().splitlines()
+        lines = next(folder.glob("*vesselsStructCenterline.txt")).read_text(encoding="utf-8").splitlines()
         rows = lines[2 : 2 + 2 * int(lines[0])]
         table = np.array([[float(x) for x in row.strip(" ;").split(";")[:7]] for row in rows[::2]])
         to_mm = numbers(next(folder.glob("*info.txt")), "PixelToMM", 4)
@@ -142,13 +142,13 @@ def prepared(data: Path, folder: Path) -> Path:
     arc, radii = arc_length(path), np.interp(arc_length(path), *along(tree, way, path))
     calm = [float(np.quantile(radii[np.abs(arc - here) <= SMOOTH_MM], 0.25)) for here in arc]
     rows = [[n + 1, 3, *path[n].round(4), round(calm[n], 4), n if n else -1] for n in range(len(path))]
-    (folder / "vessel.swc").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows))
+    (folder / "vessel.swc").write_text("".join(" ".join(map(str, row)) + "\n" for row in rows), encoding="utf-8")
     views: dict[str, Any] = {"isocentre_mm": centre.tolist(), "leaf_mm": tree.points[leaf].tolist()}
     views["frames"] = [{"matrix": matrix.tolist(), "points_px": curve.tolist()} for curve in curves]
-    (folder / "projections.json").write_text(json.dumps(views))
+    (folder / "projections.json").write_text(json.dumps(views), encoding="utf-8")
     direction = (start[1] - start[0]) / np.linalg.norm(start[1] - start[0])
     text = WIRE.format(entry=start[0].round(3).tolist(), direction=direction.round(5).tolist(), depths=depths)
-    (folder / "manifest.toml").write_text(text)
+    (folder / "manifest.toml").write_text(text, encoding="utf-8")
     return folder / "manifest.toml"
 
 
@@ -157,7 +157,7 @@ def main() -> int:
     manifest = prepared(Path(os.environ["WIREVAL_DATA"]) / "liver_xray_wire", folder)
     code = wireval(["run", str(manifest), "-o", str(folder / "out"), "--resume"])
     case = folder / "out" / "cases" / "liver"
-    result = json.loads((case / "result.json").read_text())
+    result = json.loads((case / "result.json").read_text(encoding="utf-8"))
     errors = pd.read_csv(case / "errors.csv")
     print(errors[["frame", "status", "insertion_mm", "rms_mm", "p95_mm", "distal10_rms_mm", "tip_mm"]].to_string())
     summary = result["summary"]

@@ -80,7 +80,7 @@ def main() -> None:
     args = parser.parse_args()
     (case,) = read_manifest(args.manifest).cases
     found = args.run / "cases" / case.id
-    clamp = json.loads((found / "result.json").read_text())["entry"]
+    clamp = json.loads((found / "result.json").read_text(encoding="utf-8"))["entry"]
     depths = pd.read_csv(found / "errors.csv")["insertion_mm"].tolist()
     entry, direction = np.array(clamp["used_mm"]), np.array(clamp["used_direction"])
     first = np.array(case.material_axis) - np.dot(case.material_axis, direction) * direction

@@ -32,7 +32,7 @@ def write_study(folder: Path, side: int, frames: int):
         wired = phantoms.add_wire(s.empty.copy(), part[::6], scenes.RADIUS, phantoms.WIRE, scenes.VOXEL, s.origin)
         _write(folder / f"frame_{n:02d}.mha", phantoms.scan(wired, scenes.PSF, scenes.PEAK / 8, n), s.origin)
     _write(folder / "reference.mha", phantoms.scan(s.empty, scenes.PSF, scenes.PEAK / 8, 999), s.origin)
-    (folder / "entry.json").write_text(json.dumps([s.entry.tolist(), s.direction.tolist()]))
+    (folder / "entry.json").write_text(json.dumps([s.entry.tolist(), s.direction.tolist()]), encoding="utf-8")
     return s
 
 

@@ -25,7 +25,7 @@ from pipeline.trace import trace
 
 def resident(name):
     """VmRSS or VmHWM (its peak) in MiB."""
-    return int(re.search(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
+    return int(re.search(rf"{name}:\s+(\d+)", Path("/proc/self/status").read_text(encoding="utf-8"))[1]) / 1024
 
 
 class Peak:
@@ -33,7 +33,7 @@ class Peak:
 
     def __init__(self):
         try:
-            Path("/proc/self/clear_refs").write_text("5")
+            Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
             self.base, self.how = resident("VmRSS"), "VmHWM, reset"
         except OSError:
             self.base, self.how = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "ru_maxrss"
@@ -53,7 +53,7 @@ def read_all(files, read):
 
 def work_all(folder, peak=None):
     """What a case does: the reference is segmented whole, then frames are read and traced on the lumen's box."""
-    entry, direction = (np.array(a) for a in json.loads((folder / "entry.json").read_text()))
+    entry, direction = (np.array(a) for a in json.loads((folder / "entry.json").read_text(encoding="utf-8")))
     seconds = dict.fromkeys(("load", "segment", "trace"), 0.0)
     peaks, found = {}, []
 
