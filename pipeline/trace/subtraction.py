@@ -20,6 +20,7 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
 from pipeline.trace._kernels.tube import active_voxels
+from pipeline.trace.gain import matched
 from pipeline.trace.region import HALO_VOXELS, SearchRegion, background_of, region_of, voxels_of, wall_blur
 from solver.grid import Grid
 
@@ -40,10 +41,6 @@ LEAST_SHARE = 0.02
 
 UNEVEN = 0.82
 """Share of the vessel's contrast that it has everywhere if it is filled evenly."""
-LEAST_LEVEL = 200
-"""Voxels from which the median of a level is taken."""
-SAME_GAIN = 0.02
-"""Difference of two scans' contrast, as a share of it, that is left alone: a wire in the lumen makes less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ class Subtraction:
     @cached_property
     def wall_greys(self) -> tuple[float, float]:
         """Median grey of the frame well inside the lumen and just outside it."""
-        at = voxels_of(self.region.runs[:: max(1, len(self.region.runs) // 2000)])
+        at = self.region.sample
         grey, distance = self.scan.values[tuple((at + self.region.corner).T)], self.region.box.values[tuple(at.T)]
         h = float(np.min(self.region.box.spacing_mm))
         deep, out = distance < -h, distance > 2 * h
@@ -147,35 +144,14 @@ class Subtraction:
         return np.asarray(box.values[tuple(index.T)])
 
 
-def matched(grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion) -> float:
-    """The contrast of the frame over that of the background, which is taken away from ``grey`` where it is not 1.
-
-    Contrast medium is never twice the same. What a wire adds to the lumen moves no median.
-    """
-    at = tuple(voxels_of(region.runs[:: max(1, len(region.runs) // 2000)]).T)
-    distance, voxel = region.box.values[at], float(np.min(region.box.spacing_mm))
-    deep, out = distance < -voxel, distance > 2 * voxel
-    if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
-        return 1.0
-    rest, empty = grey[at], background[at].astype(float)
-    contrast = float(np.median(empty[deep]) - np.median(empty[out]))
-    more = float(np.median(rest[deep]) - np.median(rest[out]))
-    if contrast < spread(rest[out]) or abs(more) < SAME_GAIN * contrast:
-        return 1.0
-    at, gain = tuple(voxels_of(region.runs).T), 1.0 + more / contrast
-    low = float(np.median(empty[out]))
-    grey[at] -= np.float32(np.median(rest[out])) + np.float32(gain - 1.0) * (background[at] - np.float32(low))
-    return gain
-
-
 def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
-    background = background_of(grid, reference, region, lumen, axes)
+    background, still = background_of(grid, reference, region, lumen, axes)
     grey = sparse_zeros(region.box.shape, np.float32)
     subtract(grid.values, background, region.corner, region.runs, grey)
-    gain = 1.0 if reference is None else matched(grey, background, region)
+    gain = 1.0 if still is None else matched(grey, background, region, grid, still)
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}

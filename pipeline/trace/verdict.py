@@ -97,7 +97,8 @@ def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: f
     share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
     gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
-    return share, 0.4 * gain / attempt.cnr(image) / float(np.sqrt(count))
+    cnr = attempt.cnr(image)
+    return share, 0.4 * gain / cnr / float(np.sqrt(count)) if cnr > 0.0 else float("inf")
 
 
 def _usual(grey: Array, steps: Steps) -> float:

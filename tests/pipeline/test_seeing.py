@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from pipeline.segment import segment
+from pipeline.trace import explain, trace
+from pipeline.trace.attempt import EntryPose
+from pipeline.trace.config import TraceConfig
+from pipeline.trace.subtraction import subtracted
+from pipeline.trace.verdict import judge
+from tests.studies.seeing.scenes import Draft
 from tests.studies.seeing.table import look
 
 
@@ -48,3 +58,31 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
 def test_the_wall_lies_half_way_to_the_local_level(case):
     row = look(case, 0)
     assert row.wall < 0.2, "voxel; 0.9 to 1.9 with one level for the whole vessel"
+
+
+def narrow(seed, gain):
+    """A wire through most of a vessel that is so narrow that the blurred wire reaches all of it, and its lumen."""
+    draft = Draft(np.random.default_rng(seed), radius=0.8, wire_radius=0.18, room=0.1)
+    draft.gain = gain
+    scene = draft.scan(8)
+    return scene, segment(scene.reference, scene.entry[None])
+
+
+@pytest.mark.parametrize("gain", [0.75, 1.0, 1.3])
+@pytest.mark.parametrize("seed", [4, 6])
+def test_the_wire_is_not_taken_for_contrast_medium(seed, gain):
+    """0.11 to 0.14 off by the median of a lumen of which the wire brightens more than half."""
+    scene, lumen = narrow(seed, gain)
+    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    assert abs(curve.levels["gain"] - gain) < 0.09
+    assert curve.status.name == "OK", curve.note
+
+
+def test_a_wire_of_no_brightness_is_refused_and_not_divided_by():
+    scene, lumen = narrow(4, 1.0)
+    image = subtracted(scene.frame, lumen, scene.reference)
+    entry = EntryPose(image.local(scene.entry[None])[0], image.turned(scene.direction))
+    best = explain.best_of(image, entry, None, TraceConfig())
+    dark = replace(best.attempt, tube=replace(best.attempt.tube, tint=0.0 * best.attempt.tube.tint))
+    verdict = judge(image, dark, best.points, np.zeros(len(best.points), bool), best.length_mm)
+    assert verdict.status.name == "TRACE_LOW_CONTRAST"
