@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipeline.arrays.grids import spread
 from pipeline.segment.levels import GreyLevels, Index, Region
 from solver.grid import Array, Grid, read_only
 
@@ -22,6 +23,8 @@ LEAST = 12
 """Voxels of core in a block from which its median is believed."""
 EVEN = 0.82
 """Share of the contrast that all blocks reach in a vessel that is filled evenly."""
+SURE = 3.0
+"""Standard deviations by which a block is below EVEN before the vessel is called unevenly filled."""
 LOWEST, HIGHEST = 0.25, 1.1
 """Shares of the contrast between which a level is believed: brighter is bone or metal, darker is tissue."""
 SMOOTH = 0.7
@@ -69,10 +72,12 @@ def filling(grid: Grid, region: Region) -> Filling:
     top, below = (ndimage.gaussian_filter(a.reshape(shape), SMOOTH, mode="constant") for a in (sums, weight))
     known = below > 1e-3 * float(weight.max())
     share = np.where(known, top / np.maximum(below, 1e-9), 1.0)
+    # how far blocks are off their neighbours is the noise of their levels, however it is correlated
+    least = level + SURE * spread(level - share.reshape(-1)[name[good]])
     away, at = ndimage.distance_transform_edt(~known, return_indices=True)
     carried = share[tuple(at)]
     share = np.where(away <= CARRIED_BLOCKS, carried, 1.0)
-    return Filling(np.asarray(share, float), low, float(level.min()))
+    return Filling(np.asarray(share, float), low, min(1.0, float(least.min())))
 
 
 def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:

@@ -157,10 +157,10 @@ def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:
 def _edges(share: Array, arc: Array, noise: float, blur: float, h: float) -> Array:
     """Arcs at which the brightness (n,) of a wire steps up or down."""
     every = 2
-    floor = max(LINEAR, 2.0 * noise)
+    floor = max(LINEAR, 6.0 * noise)
     bright = np.arcsinh(share[::every] / floor)
     # three samples of half a voxel are one of independent noise
-    cost = max(STEP_COST, 25.0 * 3.0 * (noise / floor) ** 2)
+    cost = max(STEP_COST, 16.0 * 3.0 * (noise / floor) ** 2)
     first = _segments(bright, cost)
     edges = arc[::every][first[1:]] - 0.25 * h if len(first) > 1 else np.zeros(0)
     return _sharpened(share, arc, edges, blur)

@@ -41,9 +41,6 @@ LEAST_SHARE = 0.02
 
 CORRELATED = 1.5
 """Noise of blurred grey over that of blurred white noise from which noise counts as correlated."""
-ADDED = 0.85
-"""Noise without the reference over that with it below which it is left out: smoothing takes the white noise of a
-reference away, correlated noise it leaves, and two scans have 1.4 times the noise of one."""
 UNEVEN = 0.82
 """Share of the vessel's contrast that it has everywhere if it is filled evenly."""
 
@@ -113,6 +110,12 @@ class Subtraction:
             self.noises[blur_voxels] = max(spread(sample), 1e-6)
         return self.noises[blur_voxels]
 
+    @property
+    def correlated(self) -> bool:
+        """Whether noise is, so that smoothing leaves it."""
+        white = float(np.sum(gaussian_taps(CREST_VOXELS) ** 2)) ** 1.5
+        return bool(self.noise_in(CREST_VOXELS) > CORRELATED * white * self.noise)
+
     def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""
         return np.ascontiguousarray(self.region.box.to_index(points_mm) * self.spacing)
@@ -150,20 +153,6 @@ class Subtraction:
 
 
 def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
-    """The frame less its reference; without that where it adds more noise than the lumen's model has errors."""
-    image = _less(frame, lumen, reference)
-    if reference is None:
-        return image
-    white = float(np.sum(gaussian_taps(CREST_VOXELS) ** 2)) ** 1.5
-    if image.noise_in(CREST_VOXELS) < CORRELATED * white * image.noise:
-        return image
-    alone = _less(frame, lumen, None)
-    if alone.noise_in(CREST_VOXELS) > ADDED * image.noise_in(CREST_VOXELS):
-        return image
-    return replace(alone, counters=alone.counters | {"reference_left_out": 1.0})
-
-
-def _less(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtraction:
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
