@@ -40,8 +40,8 @@ RAY_MM = 3.0
 """Length of a straight piece along which grey is averaged: a bend of 15 mm radius leaves it by a voxel."""
 RAY_STEP = 0.1
 """Angle (rad) from one to the next: a voxel at its end."""
-RAY_SURE = 5.0
-"""Standard deviations of its mean from which the brightest of a hundred is no noise."""
+RAY_SURE = 4.5
+"""Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
 OUTSIDE_CONE = 0.85
 """Least cosine between the wire's end and the way on which the lumen may have ended too early."""
 OUTSIDE_VOXELS = 1.5
@@ -114,14 +114,20 @@ def _cone(heading: Array) -> Array:
 
 
 def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
-    """The end (3,) of the straight piece of RAY_MM from a point along which grey stands out most; None for none."""
+    """The end (3,) of the straight piece from a point along which grey stands out most; None for none.
+
+    RAY_MM long, or half of that, as the wire may end within it.
+    """
     h = image.voxel
     s = np.arange(1.5 * h, RAY_MM, h)
     directions = _cone(heading)
-    grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1).mean(axis=0)
-    best = int(np.argmax(grey))
-    noise = image.noise_in(CREST_VOXELS) * np.sqrt(INDEPENDENT_VOXELS / len(s))
-    return start + s[-1] * directions[best] if grey[best] > max(least, RAY_SURE * noise) else None
+    grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
+    count = np.array([len(s) // 2, len(s)])
+    mean = np.cumsum(grey, axis=0)[count - 1] / count[:, None]
+    sure = mean * np.sqrt(count / INDEPENDENT_VOXELS)[:, None] / image.noise_in(CREST_VOXELS)
+    n, best = np.unravel_index(int(np.argmax(sure)), sure.shape)
+    seen = sure[n, best] > RAY_SURE and mean[n, best] > least
+    return np.asarray(start + s[count[n] - 1] * directions[best]) if seen else None
 
 
 def seen_outside(image: Subtraction, line: Array) -> bool:
