@@ -160,9 +160,12 @@ def prolonged(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt
 
     The same attempt, marked as going on, where something is seen that no fit reaches.
     """
-    path = beyond(image, attempt.tube, dense(attempt.tube, 0.5 * image.voxel))
+    line = dense(attempt.tube, 0.5 * image.voxel)
+    path = beyond(image, attempt.tube, line)
     if path is None:
-        return None
+        # a dim end is looked for straight ahead; once more from where it was found, as wires bend
+        found = again(image, attempt, direction) if len(attempt.tube.steps.edges) else attempt
+        return found if _length(found.tube) > _length(attempt.tube) + image.voxel else None
     tube = _fitted(image, path.points, attempt.cut, direction)
     if tube is None or _length(tube) < _length(attempt.tube) + 3.0 * image.voxel:
         return replace(attempt, goes_on=True)
