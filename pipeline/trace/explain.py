@@ -177,7 +177,7 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
     controls = best.attempt.tube.controls
     rough = np.diff(controls, n=4, axis=0) if len(controls) > 4 else np.zeros((1, 3))
     bends = BEND_SHARE * float(np.sqrt(np.mean(rough**2)))
-    if not image.modelled:
+    if not image.modelled or image.levels["gain"] != 1.0:
         return np.full(len(best.points), bends)
     depth = -image.depth_at(best.points) / image.voxel
     wall = WALL_ERROR * image.voxel * np.clip((WALL_REACH - depth) / 3.0, 0.0, 1.0)

@@ -346,12 +346,11 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
 
 
 def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_confirms_it_up_to_the_tip():
-    """Seed 15: the crest pauses before the tip at CNR 2, the curve ends 2.9 voxels short (5 before what lies beyond a
-    tip was looked for); seed 17: it does not pause."""
-    for seed, status in ((15, FrameStatus.TRACE_LOW_CONTRAST), (17, FrameStatus.OK)):
+    """Seed 11: not nearly everywhere. Seed 15: the crest pauses before the tip, found behind that. 17: it does not."""
+    for seed, status in ((11, FrameStatus.TRACE_LOW_CONTRAST), (15, FrameStatus.OK), (17, FrameStatus.OK)):
         wire = plain(seed)
         alone, _ = tangles.run(seed, 2.0, wire=wire)
         assert alone.status is FrameStatus.TRACE_LOW_CONTRAST
         curve, outcome = tangles.run(seed, 2.0, wire=wire, previous=earlier(seed, wire))
         assert curve.status is status
-        assert outcome.right if status is FrameStatus.OK else outcome.tip > 2.0
+        assert outcome.right
