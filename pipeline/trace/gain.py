@@ -26,17 +26,19 @@ SAME_NOISE = 0.5
 """The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
 
 
-def _difference(frame: Array, still: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_]) -> float:
-    """Contrast of a scan's voxels (n,) over that of another without wire, both as they were scanned; 1 for the same.
+def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_]) -> float:
+    """By how much the contrast differs, as a share of it; 0 for the same.
 
-    A smoothed scan would not do: it is lower in the middle of a narrow vessel.
+    rest : (n,) a scan less that without wire, both as they were scanned: a smoothed one is lower in the middle of a
+    narrow vessel.  full : (n,) the vessel above what is around, which is less near its wall.
     """
-    rest = frame - still
-    noise, contrast = spread(rest[out]), float(np.median(still[deep]) - np.median(still[out]))
-    medium = float(np.quantile(rest[deep], DARKEST)) - noise * float(ndtri(DARKEST))
-    more = medium - float(np.median(rest[out]))
-    same = contrast < noise or abs(more) < max(SAME_GAIN * contrast, SAME_NOISE * noise)
-    return 1.0 if same else 1.0 + more / contrast
+    noise, contrast = spread(rest[out]), float(np.median(full[deep]))
+    inner = deep & (full > 0.5 * contrast)
+    if contrast < noise or np.count_nonzero(inner) < LEAST_LEVEL:
+        return 0.0
+    more = (rest[inner] - np.median(rest[out])) / full[inner]
+    medium = float(np.quantile(more, DARKEST) - ndtri(DARKEST) * noise / contrast)
+    return medium if abs(medium) > max(SAME_GAIN, SAME_NOISE * noise / contrast) else 0.0
 
 
 def matched(
@@ -51,11 +53,11 @@ def matched(
     deep, out = distance < -voxel, distance > 2 * voxel
     if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
         return 1.0
+    low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
     seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
-    gain = _difference(seen, still.astype(float), deep, out)
-    if gain != 1.0:
-        low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
+    more = _difference(seen - still, background[at] - low, deep, out)
+    if more != 0.0:
         everywhere = tuple(voxels_of(region.runs).T)
-        more = np.float32(gain - 1.0) * (background[everywhere] - np.float32(low))
-        grey[everywhere] -= np.float32(offset) + more.astype(np.float32)
-    return gain
+        medium = np.float32(more) * (background[everywhere] - np.float32(low))
+        grey[everywhere] -= np.float32(offset) + medium.astype(np.float32)
+    return 1.0 + more
