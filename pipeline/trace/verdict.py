@@ -34,6 +34,8 @@ DOUBLE = 1.6
 """Share above which two strands lie on one crest."""
 LEFTOVER_MM = 2.5
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
+FAINT_LEFTOVER_MM = 4.0
+"""The same (and a tenth of the curve) below SURE_CNR: crests are looked for lower there, and noise makes some."""
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
 MOST_DOUBLE = 2.6
@@ -234,6 +236,7 @@ def _of_the_line(
     """What may be wrong along a curve (n, 3)."""
     (share, noise, outside), (faint_mm, double_mm, length_mm) = seen, lengths
     left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
+    most_mm = LEFTOVER_MM if cnr > SURE_CNR else max(FAINT_LEFTOVER_MM, 0.1 * length_mm)
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
     return (
@@ -243,8 +246,8 @@ def _of_the_line(
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
          f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
-        (left_mm > LEFTOVER_MM, FrameStatus.TRACE_AMBIGUOUS,
-         f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
+        (left_mm > most_mm, FrameStatus.TRACE_AMBIGUOUS,
+         f"{left_mm:.1f} mm of bright line off the curve", f"{most_mm:.1f} mm at most",
          "look for a second device or a wrong turn at a crossing"),
         (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
          f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
