@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale mutants clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -93,6 +93,10 @@ conebeam:
 	test -x $(OUT)/rtk/bin/python || $(PYTHON) -m venv $(OUT)/rtk
 	$(OUT)/rtk/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[conebeam]'
 	$(OUT)/rtk/bin/python -m tests.studies.conebeam $(OUT)/conebeam --seed $(SEED)
+
+# wires and vessels that it is tempting to get wrong, by a renderer of its own: right, refused, wrong and called ok
+seeing: setup
+	$(BIN)/python -m tests.studies.seeing.table --jobs 2
 
 # every way to write a scan: right, noted, refused, or wrong and silent (the last is 0)
 formats: setup

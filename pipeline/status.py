@@ -18,6 +18,11 @@ class FrameStatus(Enum):
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = "the wire's contrast over noise is too low to be traced alone; give a previous curve"
+    TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
+    TRACE_WRONG_WAY = (
+        "more of the wire lies behind the entry than beyond it; check that entry_direction points the way the wire is "
+        "pushed, or state insertion_mm"
+    )
     LENGTH_MISMATCH = (
         "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "
         "correct the manifest or look for a gap in the trace"

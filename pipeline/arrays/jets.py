@@ -103,6 +103,14 @@ def values_at(field: Blurred, points: NDArray[Any]) -> NDArray[Any]:
     return jets_at(field, np.ascontiguousarray(points))[:, 0].copy()
 
 
+def gaussian_taps(sigma_voxel: float) -> NDArray[np.float32]:
+    """A normalised Gaussian of ``sigma_voxel`` cut at two and a half sigmas."""
+    reach = max(1, int(np.ceil(2.5 * sigma_voxel - 0.5)))
+    x = np.arange(-reach, reach + 1)
+    g = np.exp(-0.5 * (x / sigma_voxel) ** 2)
+    return np.asarray(g / g.sum(), np.float32)
+
+
 @kernel
 def smoothed(volume: NDArray[Any], taps: NDArray[Any], i: int, j: int, k: int) -> float:
     """The separable kernel ``taps`` (2r+1) applied at one voxel; the border voxel is repeated outside."""

@@ -53,10 +53,12 @@ def parted(wires: Array) -> NDArray[np.bool_] | None:
     score = modes[:, -1] * np.sqrt(max(power[-1], 0.0))
     order = np.sort(score)
     gaps = np.diff(order)[fewest - 1 : count - fewest]
+    if gaps.max() <= GAP_MM:
+        return None
     place = int(np.argmax(gaps)) + fewest
     first = score < 0.5 * (order[place - 1] + order[place])
     inside = np.concatenate([score[first] - score[first].mean(), score[~first] - score[~first].mean()])
-    return first if gaps.max() > max(GAP_MM, GAP_SIGMAS * float(inside.std())) else None
+    return first if gaps.max() > GAP_SIGMAS * float(inside.std()) else None
 
 
 def shapes_of(wires: Array, nominal: Array, real: Array | None, arc_mm: Array) -> Shapes | None:

@@ -5,12 +5,14 @@ from numpy.typing import ArrayLike
 
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
+from pipeline.segment import uneven
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.levels import brighter, scanner_blur
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
+from pipeline.segment.uneven import evened
 from solver.grid import read_only
 
 __all__ = ["segment"]
@@ -30,6 +32,7 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     config = config or SegmentConfig()
     grid, axes = in_memory_order(volume)
     region = METHOD(grid, seeds_mm, config)
+    grid, region, least = evened(grid, region, lambda shown: METHOD(shown, seeds_mm, config))
     site = prepare(grid, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
@@ -39,8 +42,8 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
     distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
-        distance, wall.levels.half, warning(touching) + brighter(wall.levels),
+        distance, wall.levels.half, warning(touching) + brighter(wall.levels) + uneven.warning(least),
         {**region.counters, **wall.counters, "touching_places": float(len(touching))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
-         "scanner_blur_mm": blur},
+         "scanner_blur_mm": blur, "least_filling": least},
     )  # fmt: skip

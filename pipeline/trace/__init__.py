@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.status import FrameStatus
@@ -32,9 +33,10 @@ def trace(
 ) -> Curve:
     """The wire of one frame from the plane of entry to the tip.
 
-    frame, reference : scans of one geometry, with and without wire (without: the background is modelled from the
-    lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve of the frame before, if any; it is
-    consulted only where the frame alone leaves doubts.  expected_mm : insertion depth, which helps to decide.
+    frame, reference : scans of one geometry, with and without wire (without, or where correlated noise hides the wire:
+    the background is modelled from the lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve
+    of the frame before, if any; it is consulted only where the frame alone leaves doubts.  expected_mm : insertion
+    depth, which helps to decide.
     Returns a Curve; what went wrong is its status and note.
     """
     config = config or TraceConfig()
@@ -42,6 +44,10 @@ def trace(
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
     entry = EntryPose(image.local(np.asarray(entry_mm, float)[None])[0], image.turned(heading), expected_mm)
     curve = BACK_END(image, entry, previous, config)
+    if reference is not None and image.correlated and curve.status is FrameStatus.TRACE_LOW_CONTRAST:
+        # smoothing takes white noise off the reference; correlated noise it adds to the frame's, 1.4 times as much
+        alone = BACK_END(subtracted(frame, lumen, None), entry, previous, config)
+        curve = alone if alone.status is FrameStatus.OK and _same(alone, curve, image.voxel) else curve
     if len(curve.points_mm) == 0:
         return curve
     axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
@@ -49,6 +55,15 @@ def trace(
     in_plane_mm = float(in_plane.mean()) * curve.length_mm
     curve = replace(curve, in_plane=in_plane, counters={**curve.counters, "in_plane_mm": in_plane_mm})
     return of_length(curve, expected_mm, config)
+
+
+def _same(curve: Curve, other: Curve, voxel: float) -> bool:
+    """Whether two ways to see the wire found the same one: to a voxel along it and to two at its tip."""
+    if len(other.points_mm) == 0:
+        return False
+    near = cKDTree(other.points_mm).query(curve.points_mm)[0]
+    tips = float(np.linalg.norm(curve.points_mm[-1] - other.points_mm[-1]))
+    return bool(np.quantile(near, 0.95) < voxel and tips < 2.0 * voxel)
 
 
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:

@@ -9,7 +9,9 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
-from pipeline.trace.link import Path, cut_at_tip, link, resampled, with_doubles
+from pipeline.trace.link import Path, link, resampled, with_doubles
+from pipeline.trace.onward import beyond
+from pipeline.trace.profile import EVEN, Steps, ended
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube, fit_tube, predicted, spline_through, tint_nodes
 
@@ -47,19 +49,29 @@ class EntryPose:
 class Attempt:
     """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain.
 
-    cut : wire goes on before the path's first point.
+    pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
+    behind_mm : length of the line before the path's first point, beyond the entry.  goes_on : past its tip, faintly.
+    confirmed : by the length that the manifest states.
     """
 
     tube: Tube
     path: Path
     leftover_mm: float
-    pieces: int
+    pieces: list[Tracklet]
+    known: Array
     from_previous: bool = False
-    cut: bool = False
+    behind_mm: float = 0.0
+    goes_on: bool = False
+    confirmed: bool = False
+
+    @property
+    def cut(self) -> bool:
+        """Wire goes on before the path's first point."""
+        return self.behind_mm > 0.0
 
     def cnr(self, image: Subtraction) -> float:
         """Median peak above the background over the noise of one voxel."""
-        return float(np.median(self.tube.tint)) / image.noise
+        return self.tube.peak / image.noise
 
 
 def slice_pitch(image: Subtraction, line: Array) -> float:
@@ -74,7 +86,7 @@ def slice_pitch(image: Subtraction, line: Array) -> float:
     return float(arc_length(line)[-1]) / max(slices, 1.0)
 
 
-def first_tube(image: Subtraction, points: Array) -> Tube:
+def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN) -> Tube:
     """Where the fit starts: a spline along the path, with the amplitude seen there.
 
     Noise falls with the distance of the knots, a bend's bias rises (0.004 / 0.009 / 0.046 voxel at 8 / 10 / 14 voxels
@@ -86,7 +98,7 @@ def first_tube(image: Subtraction, points: Array) -> Tube:
     amplitude = max(float(np.median(image.along(line[::4]))) * gain, image.noise)
     knot = float(np.interp(amplitude / image.noise, [4.0, 8.0, 16.0], [12.0, 10.0, 8.0])) * h
     controls = spline_through(line, max(knot, KNOTS_PER_PITCH * slice_pitch(image, line)))
-    return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0)
+    return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0, steps=steps)
 
 
 def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find_tip: bool = True) -> Tube | None:
@@ -96,42 +108,73 @@ def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find
     """
     h = image.voxel
     try:
-        line = resampled(points, 0.5 * h)
+        line, steps = resampled(points, 0.5 * h), EVEN
         if find_tip:
-            line = cut_at_tip(image, line, FIRST_BLUR * h)
+            line, steps = ended(image, line, FIRST_BLUR * h)
         plane = (line[0] + 2.0 * h * direction, direction) if cut else None
-        return fit_tube(image, replace(first_tube(image, line), start_plane=plane))
+        return fit_tube(image, replace(first_tube(image, line, steps), start_plane=plane))
     except (np.linalg.LinAlgError, ValueError):
         return None
 
 
 def dense(tube: Tube, step: float) -> Array:
     """Points of the tube's curve about ``step`` mm apart."""
-    length = float(arc_length(tube.at(np.linspace(0, tube.intervals, 4 * tube.intervals + 1)))[-1])
-    return tube.at(np.linspace(0, tube.intervals, max(3, round(length / step) + 1)))
+    return tube.at(np.linspace(0, tube.intervals, max(3, round(_length(tube) / step) + 1)))
 
 
-def _attempt(
-    image: Subtraction, path: Path, direction: Array, pieces: list[Tracklet], known: Array, cut: bool = False
-) -> Attempt | None:
-    """The tube along a path, and how much of the pieces lies off it and off ``known`` points (n, 3).
+def _length(tube: Tube) -> float:
+    """Length of the tube's curve, mm."""
+    return float(arc_length(tube.at(np.linspace(0, tube.intervals, 4 * tube.intervals + 1)))[-1])
+
+
+def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> float:
+    """How much (mm) of the pieces lies off the tube and off ``known`` points (n, 3).
 
     Pieces that are off by less than 1.5 NEAR_VOXELS are noise, and pieces fainter than a share of the wire are its own
     streaks, not another device.
     """
-    tube = _fitted(image, path.points, cut, direction)
-    if tube is None:
-        return None
     near = NEAR_VOXELS * image.voxel
     tree = cKDTree(np.concatenate([known, dense(tube, image.voxel)]))
-    least = STREAK_SHARE * float(np.median(tube.tint))
+    least = STREAK_SHARE * tube.peak * min(1.0, 2.0 * float(tube.steps.levels.min()) + 0.1)
     left = 0.0
     for piece in pieces:
         if piece.grey >= least:
             far = tree.query(piece.points[::2], distance_upper_bound=near)[0]
             off = float(np.mean(~np.isfinite(far))) * piece.length
             left += off if off > 1.5 * near else 0.0
-    return Attempt(tube, path, left, len(pieces), cut=cut)
+    return left
+
+
+def _attempt(
+    image: Subtraction, path: Path, direction: Array, pieces: list[Tracklet], known: Array, behind_mm: float = 0.0
+) -> Attempt | None:
+    """The tube along a path, and what it leaves of the pieces; None where there is no such tube."""
+    tube = _fitted(image, path.points, behind_mm > 0.0, direction)
+    if tube is None:
+        return None
+    return Attempt(tube, path, _leftover(image, tube, pieces, known), pieces, known, behind_mm=behind_mm)
+
+
+def prolonged(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt | None:
+    """The attempt with what goes on beyond its tip; None where nothing does.
+
+    The same attempt, marked as going on, where something is seen that no fit reaches.
+    """
+    line = dense(attempt.tube, 0.5 * image.voxel)
+    path = beyond(image, attempt.tube, line)
+    if path is None:
+        # a dim end is looked for straight ahead; once more from where it was found, as wires bend
+        found = again(image, attempt, direction) if len(attempt.tube.steps.edges) else attempt
+        return found if _length(found.tube) > _length(attempt.tube) + image.voxel else None
+    tube = _fitted(image, path.points, attempt.cut, direction)
+    if tube is None or _length(tube) < _length(attempt.tube) + 3.0 * image.voxel:
+        return replace(attempt, goes_on=True)
+    gaps = attempt.path.points[attempt.path.bridged]
+    points = np.concatenate([gaps, path.points])
+    path = Path(points, np.concatenate([np.ones(len(gaps), bool), path.bridged]), attempt.path.bridges + path.bridges)
+    known = np.concatenate([attempt.known, path.points])
+    left_mm = _leftover(image, tube, attempt.pieces, known)
+    return replace(attempt, tube=tube, path=path, known=known, leftover_mm=left_mm)
 
 
 def _from_entry(path: Path, entry: EntryPose) -> Path:
@@ -158,8 +201,9 @@ def cold(
     path = _from_entry(whole, entry)
     if arc_length(path.points)[-1] < 3 * image.voxel:
         return None
-    cut = len(path.points) < len(whole.points)
-    return _attempt(image, path, entry.direction, pieces, whole.points, cut)
+    behind = len(whole.points) - len(path.points)
+    behind_mm = float(arc_length(whole.points[: behind + 1])[-1]) if behind else 0.0
+    return _attempt(image, path, entry.direction, pieces, whole.points, behind_mm)
 
 
 def again(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt:

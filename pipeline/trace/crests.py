@@ -5,10 +5,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
-from pipeline.arrays.jets import Blurred, smooth_voxels
+from pipeline.arrays.jets import Blurred, gaussian_taps, smooth_voxels
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.runs import above
@@ -52,14 +51,6 @@ class Tracklet:
     def reversed(self) -> "Tracklet":
         """The other way round."""
         return Tracklet(self.points[::-1], -self.tangents[::-1], self.values[::-1])
-
-
-def gaussian_taps(sigma_voxel: float) -> NDArray[np.float32]:
-    """A normalised Gaussian of ``sigma_voxel`` cut at two and a half sigmas."""
-    reach = max(1, int(np.ceil(2.5 * sigma_voxel - 0.5)))
-    x = np.arange(-reach, reach + 1)
-    g = np.exp(-0.5 * (x / sigma_voxel) ** 2)
-    return np.asarray(g / g.sum(), np.float32)
 
 
 def find_crests(

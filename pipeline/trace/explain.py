@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.grids import spread
-from pipeline.arrays.jets import smooth_voxels
+from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, warm
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, prolonged, warm
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND, gaussian_taps
+from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import Tube, point_sigmas
@@ -28,6 +28,14 @@ WIDE_VOXELS = 1.2
 """Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
 WIDE_SIGMAS = 4.0
 """and the height at which they start there: noise gives some, which are too short to matter."""
+MOST_PIECES = 4
+"""Times that wire is looked for beyond the tip."""
+BEND_SHARE = 0.0125
+"""Error per axis over the fourth differences of the control points (0.010 to 0.016 on tuning seeds)."""
+WALL_ERROR, WALL_REACH = 0.13, 5.0
+"""Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
+PLAIN_TIP, STEP_TIP = 0.08, 0.25
+"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one whose brightness has steps."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
 
@@ -79,6 +87,7 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * image.voxel)
     points = attempt.tube.at(u)
     length = float(arc_length(image.world(points))[-1])
+    attempt = replace(attempt, confirmed=entry.expected_mm is not None)
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 
@@ -127,7 +136,19 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
         found += _read_off(image, cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry)
         if previous is not None and len(previous.points_mm):
             found += _read_off(image, warm(image, entry, previous, config.ridge_voxels, gap), entry)
-    return _best(image, found, entry, config) if found else None
+    return _prolonged(image, _best(image, found, entry, config), entry) if found else None
+
+
+def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candidate:
+    """The candidate with all that goes on beyond its tip."""
+    for _ in range(MOST_PIECES):
+        more = _read_off(image, prolonged(image, best.attempt, entry.direction), entry)
+        if not more:
+            break
+        best = more[0]
+        if best.attempt.goes_on:
+            break
+    return best
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -151,14 +172,30 @@ def _no_wire(image: Subtraction) -> Curve:
     )  # fmt: skip
 
 
+def _model_error(image: Subtraction, best: Candidate) -> Array:
+    """What the fit's own shape adds to its noise (n,): bends shorter than its knots, a wall that is modelled."""
+    controls = best.attempt.tube.controls
+    rough = np.diff(controls, n=4, axis=0) if len(controls) > 4 else np.zeros((1, 3))
+    bends = BEND_SHARE * float(np.sqrt(np.mean(rough**2)))
+    if not image.modelled or image.levels["gain"] != 1.0:
+        return np.full(len(best.points), bends)
+    depth = -image.depth_at(best.points) / image.voxel
+    wall = WALL_ERROR * image.voxel * np.clip((WALL_REACH - depth) / 3.0, 0.0, 1.0)
+    return np.asarray(np.hypot(bends, wall))
+
+
 def _curve(image: Subtraction, best: Candidate) -> Curve:
     """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
     attempt, verdict, tube = best.attempt, best.verdict, best.attempt.tube
     across, along = inflation(image, best.points, tube)
-    sigma = across * best.sigma
+    bias = _model_error(image, best)
+    sigma = np.hypot(across * best.sigma, bias)
+    own_tip = (STEP_TIP if len(tube.steps.edges) else PLAIN_TIP) * image.voxel
+    tip_sigma = float(np.hypot(along[-1] * best.tip_sigma, own_tip))
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {
-        "pieces": float(attempt.pieces), "bridges": float(attempt.path.bridges), "leftover_mm": attempt.leftover_mm,
+        "pieces": float(len(attempt.pieces)), "bridges": float(attempt.path.bridges),
+        "leftover_mm": attempt.leftover_mm,
         "iterations": float(tube.iterations), "from_previous": float(attempt.from_previous),
         "faint_mm": verdict.faint_mm, "double_mm": verdict.double_mm,
     }  # fmt: skip
@@ -167,7 +204,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
         "inflation": float(np.median(across)), "inflation_tip": float(along[-1]),
     }  # fmt: skip
     return Curve(
-        image.world(best.points), sigma, float(along[-1]) * best.tip_sigma, verdict.flagged, verdict.status,
+        image.world(best.points), sigma, tip_sigma, verdict.flagged, verdict.status,
         verdict.note, counters, levels=levels,
     )  # fmt: skip
 
@@ -188,7 +225,8 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
 
     previous : consulted only where the frame alone leaves doubts.
     """
-    best = best_of(image, entry, previous, config)
+    seen = levelled(image, np.zeros((0, 3)), image.voxel) if image.uneven else image
+    best = best_of(seen, entry, previous, config)
     if best is None:
         return _no_wire(image)
     if image.modelled:

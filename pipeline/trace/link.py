@@ -1,19 +1,16 @@
 """Tracklets to one wire: ends are joined where one tangent leads to the other, from the entry to the tip.
 
 A shortest path takes every short cut between strands; ends joined by direction do not (they cross, run past each
-other and over gaps), because a tracklet ends where the image is ambiguous and its tangent there is still good. Where
-along its own line the wire ends is told by a step fitted to the profile of its crest.
+other and over gaps), because a tracklet ends where the image is ambiguous and its tangent there is still good.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from pipeline.model import Array, arc_length
 from pipeline.trace.crests import Tracklet
-from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 WIDEST_ANGLE = 1.2
 """Largest angle (rad) between an end's tangent and the chord of the bridge."""
@@ -25,10 +22,6 @@ END_SPAN = 6
 """Crest points over which an end's tangent is averaged."""
 BRIDGE_STEP_MM = 0.2
 """Distance of points put in over a gap."""
-BACK_VOXELS = 14.0
-"""How much of the wire before its apparent end enters the step fit."""
-AHEAD_VOXELS = 8.0
-"""How far ahead of the apparent end the wire is looked for along its tangent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,28 +163,3 @@ def resampled(points: Array, step: float) -> Array:
     keep = np.concatenate([[True], np.diff(arc) > 1e-9])
     s = np.linspace(0, arc[-1], max(2, round(arc[-1] / step) + 1))
     return np.stack([np.interp(s, arc[keep], points[keep, a]) for a in range(3)], axis=1)
-
-
-def step_position(profile: Array, arc: Array, sigma: float) -> float:
-    """Arc length at which a blurred step (height free, foot at 0) fits the profile best, least squares.
-
-    The step may lie beyond neither end of ``arc``; tried every tenth of a blur.
-    """
-    tries = np.arange(arc[0], arc[-1], 0.1 * sigma)
-    shape = ndtr((tries[:, None] - arc[None]) / sigma)
-    height = shape @ profile / np.sum(shape**2, axis=1)
-    cost = np.sum((profile - height[:, None] * shape) ** 2, axis=1)
-    cost[height <= 0] = np.inf
-    return float(tries[int(np.argmin(cost))])
-
-
-def cut_at_tip(image: Subtraction, points: Array, blur_mm: float) -> Array:
-    """The path ended (or continued) at the step of its crest profile. points : (n, 3).  blur_mm : of the wire."""
-    h = image.voxel
-    step = 0.25 * h
-    line = resampled(extended(points, AHEAD_VOXELS * h, step), step)
-    arc = arc_length(line)
-    tail = arc >= arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
-    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
-    end = step_position(image.along(line[tail]), arc[tail], blur)
-    return np.asarray(line[arc <= max(end, arc[0] + 2 * h)])

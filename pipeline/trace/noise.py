@@ -92,7 +92,7 @@ def inflation(image: Subtraction, curve: Array, tube: Tube) -> tuple[Array, Arra
     """
     h, white = image.voxel, (np.ones(len(curve)), np.ones(len(curve)))
     index = _places(image, curve)
-    if image.spacing.max() > 1.5 * h or len(index) < LEAST:
+    if image.thick_slices or len(index) < LEAST:
         return white
     patches, read = _patches(image, tube, index)
     known = read > 0.8

@@ -5,6 +5,7 @@ The grey is a reference scan's, or a model of the lumen's wall.
 
 import weakref
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,11 @@ class SearchRegion:
     runs: NDArray[np.int64]
     within: NDArray[np.int64]
     allowed: NDArray[np.uint8]
+
+    @cached_property
+    def sample(self) -> NDArray[np.int64]:
+        """Voxels (n, 3) of 2000 runs or so: enough for a median."""
+        return voxels_of(self.runs[:: max(1, len(self.runs) // 2000)])
 
 
 def voxels_of(runs: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -110,8 +116,7 @@ def wall_blur(lumen: Lumen, voxel: float) -> float:
 def _wall_model(scan: Grid, corner: NDArray[np.int64], region: SearchRegion, lumen: Lumen) -> WallModel:
     """Grey over signed distance: the medians well inside and 2 to 4 voxels outside, joined by a blurred step."""
     voxel = float(np.min(scan.spacing_mm))
-    # every hundredth run or so is enough for two medians
-    at = voxels_of(region.runs[:: max(1, len(region.runs) // 2000)])
+    at = region.sample
     grey, distance = scan.values[tuple((at + corner).T)], region.box.values[tuple(at.T)]
     deep, out = distance < -voxel, (distance > 2 * voxel) & (distance < HALO_VOXELS * voxel)
     inside = float(np.median(grey[deep if deep.any() else distance < 0]))
@@ -130,7 +135,11 @@ def _on_box(reference: Volume, region: SearchRegion, axes: tuple[int, int, int])
     return contiguous(sampled(grid, region.box, 0.0)), np.zeros(3, np.int64)
 
 
-def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]) -> NDArray[Any]:
+Background = tuple[NDArray[Any], NDArray[Any] | None]
+"""Grey on the region's box; and, where it is a smoothed scan's, the scan's own grey at ``region.sample``."""
+
+
+def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]) -> Background:
     scan, corner = _on_box(reference, region, axes)
     wall = _wall_model(scan, corner, region, lumen)
     kind = np.int16 if scan.values.dtype.kind in "iu" and scan.values.dtype.itemsize <= 2 else np.float32
@@ -141,16 +150,16 @@ def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple
     variance = spread(rough.reshape(-1)[region.within].astype(float)) ** 2
     taps = np.exp(-0.5 * (np.arange(-2, 3) / SMOOTH_VOXELS) ** 2)
     denoised(rough, wall, taps, HALO_VOXELS * float(np.min(scan.spacing_mm)), variance, out)
-    return out
+    return out, scan.values[tuple((region.sample + corner).T)]
 
 
-_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, NDArray[Any]]] = weakref.WeakKeyDictionary()
+_smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, Background]] = weakref.WeakKeyDictionary()
 """The last background of each reference, which frames share; it hangs on the reference and the lumen's region alone."""
 
 
 def background_of(
     frame: Grid, reference: Volume | None, region: SearchRegion, lumen: Lumen, axes: tuple[int, int, int]
-) -> NDArray[Any]:
+) -> Background:
     """The grey of the lumen without wire, on the region's box: the reference's there, its noise smoothed away.
 
     Without a reference: two grey levels of the frame itself, joined by the blurred wall.
@@ -158,7 +167,7 @@ def background_of(
     if reference is None:
         out = sparse_zeros(region.box.shape, np.float32)
         modelled(_wall_model(frame, region.corner, region, lumen), out)
-        return out
+        return out, None
     known = _smoothed_of.get(reference)
     if known is None or known[0] is not region:
         known = region, _smoothed(reference, region, lumen, axes)

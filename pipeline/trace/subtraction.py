@@ -15,12 +15,14 @@ from scipy import ndimage
 from scipy.special import ndtr
 
 from pipeline.arrays.grids import in_memory_order, spread
-from pipeline.arrays.jets import Blurred, values_at
+from pipeline.arrays.jets import Blurred, gaussian_taps, smooth_voxels, values_at
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Lumen, Volume
 from pipeline.trace._kernels.runs import subtract
 from pipeline.trace._kernels.tube import active_voxels
+from pipeline.trace.gain import matched
 from pipeline.trace.region import HALO_VOXELS, SearchRegion, background_of, region_of, voxels_of, wall_blur
+from solver.grid import Grid
 
 BLUR_VOXELS = 0.8
 """The scanner's blur over the smallest voxel, from which the shape of the blur in thick slices is taken."""
@@ -37,14 +39,20 @@ SMOOTH_BLOCKS = 1.25
 LEAST_SHARE = 0.02
 """Share of the voxels of a full block below which the smoothed blocks say nothing and the level is left alone."""
 
+CORRELATED = 1.5
+"""Noise of blurred grey over that of blurred white noise from which noise counts as correlated."""
+UNEVEN = 0.82
+"""Share of the vessel's contrast that it has everywhere if it is filled evenly."""
+
 
 @dataclass(frozen=True, eq=False)
 class Subtraction:
     """Grey above the background (float32, on the region's box, valid on ``region.runs``) and its noise.
 
-    noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract.
-    wall_blur_mm : the scanner's.  Points and directions are in kernel coordinates: index along the box's axes times
-    ``spacing``.
+    noise : robust standard deviation of one voxel.  modelled : True where no reference scan was there to subtract, or
+    one of another contrast.  wall_blur_mm : the scanner's.  scan : the frame, in the order of the box's axes.  uneven :
+    the lumen's contrast changes so much along it that no wire is found before that is taken away.
+    Points and directions are in kernel coordinates: index along the box's axes times ``spacing``.
     """
 
     region: SearchRegion
@@ -52,8 +60,11 @@ class Subtraction:
     noise: float
     modelled: bool
     wall_blur_mm: float
+    scan: Grid
+    uneven: bool = False
     counters: dict[str, float] = field(default_factory=dict)
     levels: dict[str, float] = field(default_factory=dict)
+    noises: dict[float, float] = field(default_factory=dict)
 
     @cached_property
     def spacing(self) -> Array:
@@ -70,6 +81,40 @@ class Subtraction:
     def voxel(self) -> float:
         """Smallest of ``spacing``, mm."""
         return float(self.spacing.min())
+
+    @property
+    def thick_slices(self) -> bool:
+        """Whether slices are so much thicker than pixels that a round wire does not look it."""
+        return bool(np.max(self.spacing) > 1.5 * self.voxel)
+
+    @cached_property
+    def wall_greys(self) -> tuple[float, float]:
+        """Median grey of the frame well inside the lumen and just outside it."""
+        at = self.region.sample
+        grey, distance = self.scan.values[tuple((at + self.region.corner).T)], self.region.box.values[tuple(at.T)]
+        h = float(np.min(self.region.box.spacing_mm))
+        deep, out = distance < -h, distance > 2 * h
+        inside = float(np.median(grey[deep if deep.any() else distance < h]))
+        return inside, float(np.median(grey[out])) if out.any() else inside
+
+    @property
+    def slices_apart(self) -> float:
+        """Largest over smallest voxel edge of the scan."""
+        size = self.region.box.spacing_mm
+        return float(np.max(size) / np.min(size))
+
+    def noise_in(self, blur_voxels: float) -> float:
+        """Standard deviation of the noise in grey blurred by so many voxels, as correlated as it is."""
+        if blur_voxels not in self.noises:
+            sample = smooth_voxels(self.grey, gaussian_taps(blur_voxels), self.region.within[::8])
+            self.noises[blur_voxels] = max(spread(sample), 1e-6)
+        return self.noises[blur_voxels]
+
+    @property
+    def correlated(self) -> bool:
+        """Whether noise is, so that smoothing leaves it."""
+        white = float(np.sum(gaussian_taps(CREST_VOXELS) ** 2)) ** 1.5
+        return bool(self.noise_in(CREST_VOXELS) > CORRELATED * white * self.noise)
 
     def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""
@@ -111,14 +156,17 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     """Subtract the background at the lumen's voxels; one pass over them, no copy of the frame."""
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
-    background = background_of(grid, reference, region, lumen, axes)
+    background, still = background_of(grid, reference, region, lumen, axes)
     grey = sparse_zeros(region.box.shape, np.float32)
     subtract(grid.values, background, region.corner, region.runs, grey)
+    gain = 1.0 if still is None else matched(grey, background, region, grid, still)
     noise = spread(grey.reshape(-1)[region.within])
     total, read = float(np.prod(grid.shape)), float(np.sum(region.runs[:, 3] - region.runs[:, 2]))
     counters = {"voxels_total": total, "voxels_read": read, "voxels_skipped": total - read}
     blur = wall_blur(lumen, float(np.min(region.box.spacing_mm)))
-    return Subtraction(region, grey, max(noise, 1e-6), reference is None, blur, counters, {"noise": noise})
+    modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
+    uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
+    return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
 
 
 def _smooth(sums: Array, counts: Array) -> Array:
@@ -154,4 +202,4 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     rest = grey - share * level
     out[at] = rest
     noise = spread(rest[clear]) if np.count_nonzero(clear) > 100 else image.noise
-    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise})
+    return replace(image, grey=out, noise=max(noise, 1e-6), levels=image.levels | {"noise": noise}, noises={})

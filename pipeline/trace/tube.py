@@ -10,6 +10,7 @@ from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
+from pipeline.trace.profile import EVEN, Steps
 from pipeline.trace.subtraction import Subtraction
 
 WINDOW = 3.0
@@ -37,6 +38,7 @@ class Tube:
 
     voxels, rest : those that were fitted (flat), and the grey that the fit leaves of them.
     start_plane : (point, direction) before which voxels are ignored, since wire goes on there that is not modelled.
+    steps : of its brightness, by which the amplitude is multiplied.
     """
 
     controls: Array
@@ -49,6 +51,13 @@ class Tube:
     voxels: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     rest: Array = field(default_factory=lambda: np.zeros(0))
     start_plane: tuple[Array, Array] | None = None
+    steps: Steps = EVEN
+
+    @property
+    def peak(self) -> float:
+        """Median grey above the background along the wire."""
+        u = np.linspace(0.0, 1.0, 20 * len(self.tint))
+        return float(np.median(np.interp(u, np.linspace(0, 1, len(self.tint)), self.tint) * self.steps.at(u)))
 
     @property
     def intervals(self) -> int:
@@ -102,7 +111,14 @@ def sampling(tube: Tube, voxel: float) -> Samples:
     last = len(tube.tint) - 1
     at = u / tube.intervals * last
     node = np.clip(np.floor(at).astype(np.int64), 0, last - 1)
-    return Samples(measure, *weights_at(u, tube.intervals), node, at - node)
+    opacity = spread_over(tube.steps, u / tube.intervals, 1.0 / n)
+    return Samples(measure, *weights_at(u, tube.intervals), node, at - node, opacity)
+
+
+def spread_over(steps: Steps, share: Array, width: float) -> Array:
+    """Brightness (n,) averaged over ``width`` about shares (n,) of the length."""
+    offset = width * (np.arange(8) / 8.0 - 0.4375)
+    return np.asarray(np.mean(steps.at(np.clip(share[:, None] + offset, 0.0, 1.0)), axis=1))
 
 
 def sampled(tube: Tube, s: Samples) -> Line:
@@ -110,7 +126,7 @@ def sampled(tube: Tube, s: Samples) -> Line:
     curve, velocity = (_combined(tube.controls, s.first, w) for w in (s.value, s.slope))
     speed = np.linalg.norm(velocity, axis=1) + 1e-30
     amplitude = tube.tint[s.tint_first] * (1.0 - s.tint_share) + tube.tint[s.tint_first + 1] * s.tint_share
-    return Line(curve, velocity, speed, amplitude, s)
+    return Line(curve, velocity, speed, amplitude * s.opacity, s)
 
 
 def spline_through(points: Array, knot: float) -> Array:

@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.link import extended, resampled
+from pipeline.trace.onward import seen_outside
+from pipeline.trace.profile import LEAST_LEVEL, Steps
+from pipeline.trace.section import fills_vessel, out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 
 LEAST_CNR = 2.5
@@ -28,12 +32,29 @@ FAINT = 0.35
 """Share of the usual crest grey below which there is no wire to be seen: a gap."""
 DOUBLE = 1.6
 """Share above which two strands lie on one crest."""
-LEFTOVER_MM = 4.0
+LEFTOVER_MM = 2.5
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
+FAINT_LEFTOVER_MM = 4.0
+"""The same (and a tenth of the curve) below SURE_CNR: crests are looked for lower there, and noise makes some."""
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
-MOST_DOUBLE_MM = 3.0
-"""Length of line too bright for one strand (a crossing is 1 mm) from which a frame alone does not decide."""
+MOST_DOUBLE = 2.6
+"""Share from which it is no two strands but a brighter wire."""
+IN_CONTACT = 0.035
+"""How far out of round (second harmonic over peak) two strands in contact are at the least; a round wire, with the wall
+beside it, is below 0.03."""
+OBLONG = 0.12
+"""and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
+EDGE_VOXELS = 2.0
+"""Distance from the scan's end within which a tip is none: wires that leave end 1.0 inside at the most (100 traces at
+5 to 90 degrees, CNR 4 to 30; nearly all lie outside), tips within the scan where they are, to 0.4."""
+BESIDE_VOXELS = 2.2
+"""Two strands of one curve nearer than this share their crest."""
+MOST_APART = 3.0
+"""Slice distance over pixel size from which a curve needs its length confirmed: of 12 wires in slices of 2 mm and
+pixels of 0.5 mm, 8 were more than a pixel off or short."""
+MOST_DOUBLE_MM = 2.0
+"""Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
 """Share of the curve that may lie over two voxels outside the lumen."""
 TIP_VOXELS = 4.0
@@ -69,16 +90,26 @@ def _averaged(values: Array, width: int) -> Array:
 
 
 def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, float]:
-    """Grey on the curve (n,) over its median along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
+    """Grey on the curve (n,) over its usual height along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
 
     The blur in which grey is read leaves 0.36 of the noise, the mean the rest.
     """
     grey = image.along(points)
-    usual = float(np.median(grey))
+    usual = _usual(grey, attempt.tube.steps)
     share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
     gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
-    return share, 0.4 * gain / attempt.cnr(image) / float(np.sqrt(count))
+    cnr = attempt.cnr(image)
+    return share, 0.4 * gain / cnr / float(np.sqrt(count)) if cnr > 0.0 else float("inf")
+
+
+def _usual(grey: Array, steps: Steps) -> float:
+    """The usual crest grey (n,): its median, over the longest piece where there are steps."""
+    if len(steps.levels) == 1:
+        return float(np.median(grey))
+    piece = np.searchsorted(steps.edges, np.linspace(0.0, 1.0, len(grey)))
+    length = np.bincount(piece, minlength=len(steps.levels)) * (steps.levels > LEAST_LEVEL * steps.levels.max())
+    return float(np.median(grey[piece == int(np.argmax(length))]))
 
 
 def _outside(image: Subtraction, points: Array) -> NDArray[np.bool_]:
@@ -101,37 +132,130 @@ def _ends_there(image: Subtraction, points: Array) -> bool:
     return behind > 0.5 * usual and ahead < TIP_AHEAD * usual
 
 
+def seen_steps(steps: Steps, share: Array) -> NDArray[np.bool_]:
+    """Points, at shares (n,) of the length, of a dimmer part of the wire that reaches one of its ends.
+
+    What is dim between two bright parts is a gap; what is dim up to an end is a shaft beside a coil, or a plastic tip.
+    """
+    piece = np.searchsorted(steps.edges, share)
+    levels = steps.levels / max(float(np.max(steps.levels)), 1e-9)
+    dim = (levels > 0.6 * LEAST_LEVEL) & (levels < 2.0 * FAINT)
+    last = len(dim) - 1
+    from_start, to_end = np.logical_and.accumulate(dim), np.logical_and.accumulate(dim[::-1])[::-1]
+    return np.asarray((from_start | to_end)[piece] & (last > 0))
+
+
 def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float) -> Verdict:
     """The verdict on a curve, points (n, 3) local."""
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
-    faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM)
-    double = share > max(DOUBLE, 1.0 + 4.0 * noise)
+    known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
+    faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
+    oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
+    double = _beside_itself(points, step, image.voxel)
+    if not image.thick_slices:
+        double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
-    faint_mm, double_mm = float(faint.sum()) * step, float(double.sum()) * step
+    faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
+    objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
+    objections += _of_the_ends(image, attempt, points, length_mm)
+    first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
+    return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
+
+
+def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
+    """Points (n,) where two strands may lie on one crest: not round, or too bright where nobody can tell.
+
+    The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
+    bright is no two strands but a coil of platinum.
+    """
+    own = noise / np.maximum(share, 1.0)
+    least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
+    hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
+    return np.asarray(hidden | (oblong > least + 3.0 * own))
+
+
+def _beside_itself(points: Array, step: float, voxel: float) -> NDArray[np.bool_]:
+    """Points (n,) within BESIDE_VOXELS of a stretch of the curve that is further along it than that can be."""
+    apart = round(3.0 * BESIDE_VOXELS * voxel / max(step, 1e-9))
+    pairs = cKDTree(points).query_pairs(BESIDE_VOXELS * voxel, output_type="ndarray")
+    out = np.zeros(len(points), bool)
+    out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
+    return out
+
+
+def _named(image: Subtraction, point: Array) -> str:
+    """A place in LPS mm, for a message."""
+    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
+
+
+def _at_edge(image: Subtraction, point: Array) -> bool:
+    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
+    index = point / image.spacing + image.region.corner
+    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
+
+
+Objection = tuple[bool, FrameStatus, str, str, str]
+"""Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
+
+
+def _of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
+    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
+    return (
+        (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
+         "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
+         "look whether the wire's end is fainter than the rest"),
+        (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
+         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
+         "a lumen that holds the tip",
+         "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
+        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
+         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
+         "turn entry_direction round, or state insertion_mm if this is right"),
+        (image.slices_apart >= MOST_APART and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
+         f"slices {image.slices_apart:.1f} times as far apart as pixels",
+         f"less than {MOST_APART} times, or insertion_mm",
+         "state insertion_mm: in such slices a wire's ends are lost by more than its uncertainty says"),
+        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
+         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
+         "leave this frame out, or scan a larger field"),
+        (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
+         "a line as thick as its vessel", "a wire, which is thinner",
+         "check that the frame shows a wire, and that the reference has the frame's contrast"),
+    )  # fmt: skip
+
+
+def _of_the_line(
+    image: Subtraction,
+    attempt: Attempt,
+    points: Array,
+    seen: tuple[Array, float, NDArray[np.bool_]],
+    lengths: tuple[float, float, float],
+) -> tuple[Objection, ...]:
+    """What may be wrong along a curve (n, 3)."""
+    (share, noise, outside), (faint_mm, double_mm, length_mm) = seen, lengths
     left_mm, cnr, prior = attempt.leftover_mm, attempt.cnr(image), attempt.from_previous
+    most_mm = LEFTOVER_MM if cnr > SURE_CNR else max(FAINT_LEFTOVER_MM, 0.1 * length_mm)
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
-    objections = (
+    return (
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
          f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
          "scan with more dose or give the frame before"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
          f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
-        (left_mm > max(LEFTOVER_MM, 0.1 * length_mm), FrameStatus.TRACE_AMBIGUOUS,
-         f"{left_mm:.1f} mm of bright line off the curve", f"{LEFTOVER_MM} mm at most",
+        (left_mm > most_mm, FrameStatus.TRACE_AMBIGUOUS,
+         f"{left_mm:.1f} mm of bright line off the curve", f"{most_mm:.1f} mm at most",
          "look for a second device or a wrong turn at a crossing"),
         (faint_mm > MOST_FAINT_MM and faint_mm > 0.25 * length_mm, FrameStatus.TRACE_FAILED,
          f"{faint_mm:.1f} mm of {length_mm:.1f} mm of curve without a bright line", "a quarter at most",
          "look at the picture"),
         (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
-         f"{double_mm:.1f} mm of line too bright for one strand", f"{MOST_DOUBLE_MM} mm at most",
-         "give the curve of the frame before, which tells strands in contact apart"),
+         f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
+         "give the curve of the frame before, which tells strands in contact apart, or look for a second wire"),
     )  # fmt: skip
-    first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
-    return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
 def near_rotation_plane(points_mm: Array, axis: ArrayLike, limit_deg: float) -> NDArray[np.bool_]:

@@ -139,6 +139,12 @@ def test_one_shape_is_one_shape(kind: str) -> None:
     assert sum(parted(straight(0.3 * named(rng))) is not None for _ in range(200)) <= 4
 
 
+def test_wires_that_are_the_same_have_one_shape() -> None:
+    """Half way between two numbers that are neighbours or the same: all members were on one side of it."""
+    for offset in (0.0, 0.3, 1.0):
+        assert parted(straight(np.full(24, offset))) is None
+
+
 def test_two_shapes_have_their_probabilities_and_the_real_wire_has_one() -> None:
     rng = np.random.default_rng(1)
     offset = np.where(np.arange(100) < 20, 2.0, 0.0) + 0.1 * rng.normal(size=100)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from data_synthetic.anatomy import shapes
 from pipeline.model import Volume
-from pipeline.segment import segment
+from pipeline.segment import contact, segment
+from pipeline.segment.contact import parts
 from pipeline.status import FrameStatus, StageError
+from solver.grid import Grid
 from tests.pipeline import phantoms
 
 NOISE = 100.0  # a ninth of the contrast
@@ -70,3 +73,15 @@ def test_a_vessel_thinner_than_its_blur_alone_is_refused_by_name():
     with pytest.raises(StageError, match="thinner than its blur") as error:
         segment(Volume(grey, [0.5] * 3, [-8.0] * 3), [[0.0, 0.0, 0.0]])
     assert error.value.status is FrameStatus.SEGMENT_FAILED
+
+
+def test_a_head_taken_for_a_vessel_is_not_looked_at_face_by_face(monkeypatch):
+    """All faces at which its cores meet used to be held against each other, minutes long."""
+    rng = np.random.default_rng(0)
+    field = ndimage.gaussian_filter(rng.normal(size=(64, 64, 64)), 2.5)
+    inside = field > -0.3 * field.std()
+    depth = ndimage.distance_transform_edt(inside) - ndimage.distance_transform_edt(~inside)
+    seen = []
+    monkeypatch.setattr(contact, "parts", lambda points, apart: seen.append(len(points)) or parts(points, apart))
+    contact.contacts(Grid(np.where(inside, 0.5, -0.5) - depth, [1.0] * 3, [0.0] * 3))
+    assert 0 < seen[0] <= contact.MOST_FACES

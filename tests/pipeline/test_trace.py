@@ -55,8 +55,9 @@ def scans(cnr, seed=0):
 def test_what_is_measured_is_never_summed():
     frame, reference, lumen = scans(8)
     curve = trace(frame, lumen, *vessel()[4:], reference=reference)
-    assert {"cnr", "blur_mm", "noise", "residual_rms", "inflation", "inflation_tip", "knot_mm"} == set(curve.levels)
-    assert {"noise", "blur_mm", "scanner_blur_mm", "wall_noise_mm"} == set(lumen.levels)
+    keys = {"cnr", "blur_mm", "gain", "noise", "residual_rms", "inflation", "inflation_tip", "knot_mm"}
+    assert keys == set(curve.levels)
+    assert {"noise", "blur_mm", "scanner_blur_mm", "least_filling", "wall_noise_mm"} == set(lumen.levels)
     log = Log(lambda *_: None)
     for _ in range(3):
         log.count("trace", curve.counters, curve.levels)
@@ -345,11 +346,11 @@ def test_a_curve_that_leaves_the_lumen_is_a_named_status():
 
 
 def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_confirms_it_up_to_the_tip():
-    """Seed 15: the crest pauses 5 voxels before the tip at CNR 2; seed 17: it does not."""
-    for seed, status in ((15, FrameStatus.TRACE_LOW_CONTRAST), (17, FrameStatus.OK)):
+    """Seed 11: not nearly everywhere. Seed 15: the crest pauses before the tip, found behind that. 17: it does not."""
+    for seed, status in ((11, FrameStatus.TRACE_LOW_CONTRAST), (15, FrameStatus.OK), (17, FrameStatus.OK)):
         wire = plain(seed)
         alone, _ = tangles.run(seed, 2.0, wire=wire)
         assert alone.status is FrameStatus.TRACE_LOW_CONTRAST
         curve, outcome = tangles.run(seed, 2.0, wire=wire, previous=earlier(seed, wire))
         assert curve.status is status
-        assert outcome.right == (status is FrameStatus.OK)
+        assert outcome.right

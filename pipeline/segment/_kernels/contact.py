@@ -170,4 +170,6 @@ def runs_on(voxels: Inner, cores: Cores, voxel: int, window: int, least: int) ->
                 if m >= 0 and part[m] == part[voxel]:
                     before = before or steps[m] <= steps[voxel] - least
                     after = after or steps[m] >= steps[voxel] + least
-    return bool(before and after)
+                    if before and after:
+                        return True
+    return False

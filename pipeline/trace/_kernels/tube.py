@@ -23,7 +23,7 @@ class Samples(NamedTuple):
     """Fixed sampling of a uniform cubic B-spline, n samples.
 
     measure : quadrature weight in u.  first : of the four control points; value, slope : (n, 4) their weights and d/du.
-    tint_first, tint_share : linear interpolation of the amplitude nodes.
+    tint_first, tint_share : linear interpolation of the amplitude nodes.  opacity : factor of the amplitude.
     """
 
     measure: NDArray[Any]
@@ -32,6 +32,7 @@ class Samples(NamedTuple):
     slope: NDArray[Any]
     tint_first: NDArray[Any]
     tint_share: NDArray[Any]
+    opacity: NDArray[Any]
 
 
 class Line(NamedTuple):
@@ -161,7 +162,7 @@ def _add_tints(
 def _add_line(rows: _Rows, line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob) -> None:
     """Add what every sample m of the wire gives the voxels s around it."""
     model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
-    curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share) = line
+    curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share, opacity) = line
     (sigma, radius, _), (hx, hy, hz) = blob, (spacing[0], spacing[1], spacing[2])
     norm, inverse = 1.0 / (np.sqrt(2.0 * np.pi) * sigma), 1.0 / (sigma * sigma)
     for m in range(curve.shape[0]):
@@ -196,7 +197,7 @@ def _add_line(rows: _Rows, line: Line, slot: NDArray[Any], spacing: NDArray[Any]
                         by_control[s, place, 0] += b * dx + d * vx
                         by_control[s, place, 1] += b * dy + d * vy
                         by_control[s, place, 2] += b * dz + d * vz
-                    _add_tints(tint_ids, tint_used, by_tint, s, tint_first[m], tint_share[m], shade)
+                    _add_tints(tint_ids, tint_used, by_tint, s, tint_first[m], tint_share[m], opacity[m] * shade)
 
 
 @kernel

@@ -1,0 +1,127 @@
+"""Contrast that is not the same everywhere: medium that settles, mixes, decays along the vessel.
+
+The lumen's own level is taken from its core, block by block, carried on by a few millimetres, and the grey divided by
+it; what hangs together with the seeds is looked for anew, until it no longer grows.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pipeline.arrays.grids import spread
+from pipeline.segment.levels import GreyLevels, Index, Region
+from solver.grid import Array, Grid, read_only
+
+BLOCK = 5
+"""Edge of a block, voxels."""
+CORE = 2
+"""Voxels that a core lies inside the region: deeper than the wall's blur."""
+LEAST = 12
+"""Voxels of core in a block from which its median is believed."""
+EVEN = 0.82
+"""Share of the contrast that all blocks reach in a vessel that is filled evenly."""
+SURE = 3.0
+"""Standard deviations by which a block is below EVEN before the vessel is called unevenly filled."""
+LOWEST, HIGHEST = 0.25, 1.1
+"""Shares of the contrast between which a level is believed: brighter is bone or metal, darker is tissue."""
+SMOOTH = 0.7
+"""Gaussian over blocks."""
+CARRIED_BLOCKS = 2
+"""How far beyond the last block with a core a level is carried."""
+GROWN = 1.01
+"""Growth of the region from one round to the next below which it is whole."""
+ROUNDS = 8
+"""Rounds at most; each takes the lumen on by CARRIED_BLOCKS."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """Share of the contrast in blocks of the box that begins at ``corner``; least : of any block with a core."""
+
+    share: Array
+    corner: Index
+    least: float
+
+
+def filling(grid: Grid, region: Region) -> Filling:
+    """How full the vessel is where it was found."""
+    index = np.stack(np.unravel_index(region.voxels, grid.shape), axis=1)
+    margin = CARRIED_BLOCKS * BLOCK + CORE
+    low = np.maximum(index.min(axis=0) - margin, 0)
+    high = np.minimum(index.max(axis=0) + margin + 1, grid.shape)
+    inside = np.zeros(tuple(high - low), bool)
+    inside[tuple((index - low).T)] = True
+    core = np.argwhere(ndimage.binary_erosion(inside, iterations=CORE))
+    shape = tuple(-(-inside.shape[a] // BLOCK) for a in range(3))
+    if len(core) == 0:
+        return Filling(np.ones(shape), low, 1.0)
+    grey = (grid.values[tuple((core + low).T)].astype(float) - region.levels.outside) / region.levels.contrast
+    block: Index = np.asarray(np.ravel_multi_index(tuple((core // BLOCK).T), shape), np.int64)
+    order = np.lexsort((grey, block))
+    block, grey = block[order], grey[order]
+    name, first, count = (np.asarray(a) for a in np.unique(block, return_index=True, return_counts=True))
+    good = count >= LEAST
+    level = np.clip(grey[first + count // 2], LOWEST, HIGHEST)[good]
+    if not good.any():
+        return Filling(np.ones(shape), low, 1.0)
+    sums, weight = np.zeros(int(np.prod(shape))), np.zeros(int(np.prod(shape)))
+    sums[name[good]], weight[name[good]] = level * count[good], count[good]
+    top, below = (ndimage.gaussian_filter(a.reshape(shape), SMOOTH, mode="constant") for a in (sums, weight))
+    known = below > 1e-3 * float(weight.max())
+    share = np.where(known, top / np.maximum(below, 1e-9), 1.0)
+    # how far blocks are off their neighbours is the noise of their levels, however it is correlated
+    least = level + SURE * spread(level - share.reshape(-1)[name[good]])
+    away, at = ndimage.distance_transform_edt(~known, return_indices=True)
+    carried = share[tuple(at)]
+    share = np.where(away <= CARRIED_BLOCKS, carried, 1.0)
+    return Filling(np.asarray(share, float), low, min(1.0, float(least.min())))
+
+
+def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
+    """The grid as if the vessel were full everywhere."""
+    shape = np.minimum(np.array(found.share.shape) * BLOCK, np.array(grid.shape) - found.corner)
+    axes = [(np.arange(int(n)) + 0.5) / BLOCK - 0.5 for n in shape]
+    share: NDArray[np.float64] = found.share
+    for axis, at in enumerate(axes):
+        low = np.clip(np.floor(at).astype(int), 0, share.shape[axis] - 1)
+        high = np.minimum(low + 1, share.shape[axis] - 1)
+        part = np.clip(at - low, 0.0, 1.0).reshape([-1 if a == axis else 1 for a in range(3)])
+        share = np.take(share, low, axis) * (1.0 - part) + np.take(share, high, axis) * part
+    values = np.array(grid.values, np.float32)
+    box = tuple(slice(int(c), int(c) + int(n)) for c, n in zip(found.corner, shape, strict=True))
+    out = np.float32(levels.outside)
+    values[box] = out + (values[box] - out) / np.minimum(share, 1.0).astype(np.float32)
+    return grid.with_values(read_only(values))
+
+
+def evened(grid: Grid, region: Region, again: Callable[[Grid], Region]) -> tuple[Grid, Region, float]:
+    """Grid and region of a vessel that is filled evenly, or as if it were; and the least share of contrast in it.
+
+    again : segments another grid from the same seeds.
+    """
+    found = filling(grid, region)
+    if found.least >= EVEN:
+        return grid, region, found.least
+    shown = grid
+    for _ in range(ROUNDS):
+        shown = filled(grid, region.levels, found)
+        grown = again(shown)
+        growth = len(grown.voxels) / len(region.voxels)
+        region = replace(grown, levels=region.levels)
+        if growth < GROWN:
+            break
+        found = filling(grid, region)
+    return shown, region, found.least
+
+
+def warning(least: float) -> tuple[str, ...]:
+    """One sentence for the report, or none."""
+    if least >= EVEN:
+        return ()
+    return (
+        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its wall "
+        "was taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
+    )

@@ -1,0 +1,63 @@
+"""Contrast medium is never twice the same: the contrast of a frame over its reference's, taken before the subtraction.
+
+A wire, blurred, reaches every voxel of a narrow vessel and makes it brighter, never darker: the medium is read off the
+darkest tenth of the lumen.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from pipeline.arrays.grids import spread
+from pipeline.model import Array
+from pipeline.trace.region import SearchRegion, voxels_of
+from solver.grid import Grid
+
+LEAST_LEVEL = 200
+"""Voxels from which a level is taken."""
+DARKEST = 0.1
+"""Share of the lumen's voxels that shows the medium alone: a wire in all but three tenths moves it by a third of the
+noise of a voxel, and a median by any amount."""
+SAME_GAIN = 0.02
+"""Difference of two scans' contrast, as a share of it, that is left alone."""
+SAME_NOISE = 0.5
+"""The same in noises of a voxel, as an estimate from the darkest tenth may be off by that."""
+
+
+def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_]) -> float:
+    """By how much the contrast differs, as a share of it; 0 for the same.
+
+    rest : (n,) a scan less that without wire, both as they were scanned: a smoothed one is lower in the middle of a
+    narrow vessel.  full : (n,) the vessel above what is around, which is less near its wall.
+    """
+    noise, contrast = spread(rest[out]), float(np.median(full[deep]))
+    inner = deep & (full > 0.5 * contrast)
+    if contrast < noise or np.count_nonzero(inner) < LEAST_LEVEL:
+        return 0.0
+    more = (rest[inner] - np.median(rest[out])) / full[inner]
+    medium = float(np.quantile(more, DARKEST) - ndtri(DARKEST) * noise / contrast)
+    return medium if abs(medium) > max(SAME_GAIN, SAME_NOISE * noise / contrast) else 0.0
+
+
+def matched(
+    grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion, frame: Grid, still: NDArray[Any]
+) -> float:
+    """The frame's contrast over the reference's; what is not 1 is taken away from ``grey``, the frame less background.
+
+    still : the reference's own grey at ``region.sample``.
+    """
+    at = tuple(region.sample.T)
+    distance, voxel = region.box.values[at], float(np.min(region.box.spacing_mm))
+    deep, out = distance < -voxel, distance > 2 * voxel
+    if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_LEVEL:
+        return 1.0
+    low, offset = float(np.median(background[at][out])), float(np.median(grey[at][out]))
+    seen = frame.values[tuple((region.sample + region.corner).T)].astype(float)
+    more = _difference(seen - still, background[at] - low, deep, out)
+    if more != 0.0:
+        everywhere = tuple(voxels_of(region.runs).T)
+        medium = np.float32(more) * (background[everywhere] - np.float32(low))
+        grey[everywhere] -= np.float32(offset) + medium.astype(np.float32)
+    return 1.0 + more

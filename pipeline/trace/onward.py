@@ -1,0 +1,210 @@
+"""What lies beyond the end of a fitted wire: fainter wire, wire behind a gap, or the edge of the scan.
+
+Looked for in what the fit leaves, in a box around the tip alone, at a lower height than crests of the whole lumen are.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.arrays.jets import Blurred, values_at
+from pipeline.arrays.polyline import tip_tangent
+from pipeline.model import Array
+from pipeline.trace.crests import Tracklet, find_crests
+from pipeline.trace.link import Path, hermite
+from pipeline.trace.profile import INDEPENDENT_VOXELS
+from pipeline.trace.region import SearchRegion
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.tube import Tube
+
+REACH_MM = 9.0
+"""How far beyond the tip more wire is looked for: a gap of 8 mm and a millimetre."""
+WIDE_VOXELS = 1.2
+"""Blur in which it is looked for."""
+SIGMAS = 3.7
+"""Height at which it starts, in standard deviations of the smoothed noise."""
+SURE_APART = 9.0
+"""The same for a piece behind a gap, which any noise within the reach might be."""
+APART_TIMES = 4.0
+"""How much brighter than the faintest a piece behind a gap must be: a quarter of the wire at least."""
+SHORTEST_VOXELS = 5.0
+"""Shorter pieces are noise."""
+SURE = 5.0
+"""Significance of a piece's mean grey from which it is no noise: it was chosen among a hundred."""
+CONE = 0.6
+"""Least cosine between the wire's end and the way to what goes on from it (53 degrees)."""
+FAINTEST = 0.06
+"""Share of the wire's peak below which its own streaks lie; blur leaves two thirds of a plastic tip's 0.15."""
+RAY_MM = 3.0
+"""Length of a straight piece along which grey is averaged: a bend of 15 mm radius leaves it by a voxel."""
+RAY_STEP = 0.1
+"""Angle (rad) from one to the next: a voxel at its end."""
+RAY_SURE = 4.5
+"""Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
+OUTSIDE_CONE = 0.85
+"""Least cosine between the wire's end and the way on which the lumen may have ended too early."""
+OUTSIDE_VOXELS = 1.5
+"""Distance from the wall from which its blur is none."""
+BRIGHT = 0.5
+"""Share of the vessel's contrast from which something outside the lumen is no tissue."""
+MOST_RAYS = 12
+"""Pieces followed at most."""
+BESIDE_VOXELS = 2.0
+"""A piece nearer to the wire than this is what the fit left of it."""
+LEADS_ON = 0.3
+"""Least cosine between that way and the direction of the piece where it begins."""
+TOUCHING_MM = 1.0
+"""Distance from the tip at which a piece needs no way to it."""
+TANGENT_MM = 1.5
+"""Length over which the wire's last direction is taken."""
+
+
+def _near(region: SearchRegion, corner: Array, high: Array) -> SearchRegion:
+    """The region's rows within a box (indices), its ends shortened to it."""
+    runs = region.runs
+    keep = np.all((runs[:, :2] >= corner[:2]) & (runs[:, :2] <= high[:2]), axis=1)
+    rows = runs[keep].copy()
+    rows[:, 2] = np.maximum(rows[:, 2], corner[2])
+    rows[:, 3] = np.minimum(rows[:, 3], high[2] + 1)
+    return replace(region, runs=np.ascontiguousarray(rows[rows[:, 3] > rows[:, 2]]))
+
+
+def _stands_out(piece: Tracklet, noise: float, voxel: float) -> bool:
+    """Whether a piece is long and bright enough not to be noise."""
+    return piece.length > SHORTEST_VOXELS * voxel and _height(piece, noise, voxel) > SURE
+
+
+def _height(piece: Tracklet, noise: float, voxel: float) -> float:
+    """A piece's mean grey in standard deviations of that mean."""
+    return float(np.mean(piece.values)) / noise * float(np.sqrt(piece.length / (2.0 * WIDE_VOXELS * voxel)))
+
+
+def _apart(run: Tracklet, tip: Array) -> bool:
+    """Whether a gap lies before a piece."""
+    return float(np.linalg.norm(run.points[0] - tip)) > TOUCHING_MM
+
+
+def _onward(piece: Tracklet, tip: Array, heading: Array) -> Tracklet | None:
+    """The part of a piece that lies ahead of the tip, from its nearer end; None where it does not lead on."""
+    away = np.linalg.norm(piece.points - tip, axis=1)
+    run = piece if away[0] <= away[-1] else piece.reversed()
+    ahead = np.flatnonzero((run.points - tip) @ heading > 0.0)
+    if len(ahead) < 3:
+        return None
+    run = Tracklet(run.points[ahead[0] :], run.tangents[ahead[0] :], run.values[ahead[0] :])
+    chord = run.points[0] - tip
+    size = float(np.linalg.norm(chord))
+    touching = size < TOUCHING_MM
+    straight = chord @ heading > CONE * size and run.tangents[0] @ chord > LEADS_ON * size
+    return run if size < REACH_MM and (touching or straight) else None
+
+
+def _cone(heading: Array) -> Array:
+    """Directions (n, 3) up to CONE off a heading, a tenth of a radian apart."""
+    side = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
+    side /= np.linalg.norm(side)
+    other = np.cross(heading, side)
+    widest = float(np.arccos(CONE))
+    rings = [heading[None]]
+    for angle in np.arange(RAY_STEP, widest, RAY_STEP):
+        phi = np.arange(0.0, 2 * np.pi, RAY_STEP / np.sin(angle))[:, None]
+        rings.append(np.cos(angle) * heading + np.sin(angle) * (np.cos(phi) * side + np.sin(phi) * other))
+    return np.concatenate(rings)
+
+
+def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
+    """The end (3,) of the straight piece from a point along which grey stands out most; None for none.
+
+    RAY_MM long, or half of that, as the wire may end within it.
+    """
+    h = image.voxel
+    s = np.arange(1.5 * h, RAY_MM, h)
+    directions = _cone(heading)
+    grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
+    count = np.array([len(s) // 2, len(s)])
+    mean = np.cumsum(grey, axis=0)[count - 1] / count[:, None]
+    sure = mean * np.sqrt(count / INDEPENDENT_VOXELS)[:, None] / image.noise_in(CREST_VOXELS)
+    n, best = np.unravel_index(int(np.argmax(sure)), sure.shape)
+    seen = sure[n, best] > RAY_SURE and mean[n, best] > least
+    return np.asarray(start + s[count[n] - 1] * directions[best]) if seen else None
+
+
+def seen_outside(image: Subtraction, line: Array) -> bool:
+    """Whether the scan shows something as bright as the vessel, or brighter, just beyond the tip and outside the lumen.
+
+    Then it is the lumen that ends there, not the wire. Read in the scan itself, as nothing else is known out there.
+    """
+    h, tip = image.voxel, line[-1]
+    heading = tip_tangent(line, TANGENT_MM)
+    s = np.arange(1.0, RAY_MM, h)
+    directions = _cone(heading)
+    directions = directions[directions @ heading > OUTSIDE_CONE]
+    points = (tip + s[:, None, None] * directions).reshape(-1, 3)
+    depth = image.depth_at(points).reshape(len(s), -1)
+    out = np.mean(depth > OUTSIDE_VOXELS * h, axis=0) > 0.5
+    if not out.any():
+        return False
+    index = points / image.spacing + image.region.corner
+    field = Blurred(
+        image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min())
+    )
+    grey = values_at(field, index * image.scan.spacing_mm).reshape(len(s), -1)
+    inside, outside = image.wall_greys
+    far = np.where(depth > OUTSIDE_VOXELS * h, grey, np.inf).min(axis=0)
+    return bool(np.any(far[out] > outside + BRIGHT * (inside - outside)))
+
+
+def _walked(image: Subtraction, line: Array, least: float) -> Array:
+    """Points (n, 3) beyond the tip, from one straight piece to the next, as long as they stand out."""
+    found = [line[-1]]
+    heading = tip_tangent(line, TANGENT_MM)
+    while len(found) < MOST_RAYS:
+        end = _ray(image, found[-1], heading, least)
+        if end is None:
+            break
+        heading = (end - found[-1]) / np.linalg.norm(end - found[-1])
+        found.append(end)
+    return np.array(found[1:]).reshape(-1, 3)
+
+
+def _from_crests(image: Subtraction, line: Array, faintest: float) -> Tracklet | None:
+    """The nearest piece of crest in the box around the tip that leads on from it."""
+    tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
+    reach, at = np.ceil(REACH_MM / image.spacing), np.rint(tip / image.spacing)
+    near = _near(image.region, at - reach, at + reach)
+    if len(near.runs) == 0:
+        return None
+    noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(line)
+    pieces = find_crests(replace(image, region=near), WIDE_VOXELS, SIGMAS)
+    found = ((p, _onward(p, tip, heading)) for p in pieces if _stands_out(p, noise, image.voxel))
+    runs = [
+        r
+        for p, r in found
+        if r is not None
+        and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * image.voxel) > 0.5
+        and p.grey > 0.5 * faintest * (APART_TIMES if _apart(r, tip) else 1.0)
+        and (_height(p, noise, image.voxel) > SURE_APART or not _apart(r, tip))
+    ]
+    return min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip))) if runs else None
+
+
+def beyond(image: Subtraction, tube: Tube, line: Array) -> Path | None:
+    """The wire's line (n, 3) continued along what goes on from its tip; None where nothing does."""
+    h = image.voxel
+    tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
+    faintest = FAINTEST * tube.peak * float(tube.steps.levels[-1])
+    with image.showing(tube.voxels, tube.rest):
+        run = _from_crests(image, line, faintest)
+        if run is None:
+            walked = _walked(image, line, faintest)
+    if run is not None:
+        gap = hermite(tip, heading, run.points[0], run.tangents[0], 0.5 * h)
+        more, empty = np.concatenate([gap, run.points]), len(gap) if len(gap) * h > 2.0 * TOUCHING_MM else 0
+    elif len(walked):
+        more, empty = walked, 0
+    else:
+        return None
+    bridged = np.zeros(len(line) + len(more), bool)
+    bridged[len(line) : len(line) + empty] = True
+    return Path(np.concatenate([line, more]), bridged, int(empty > 0))
