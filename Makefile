@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale mutants clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale mutants cluster clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -106,6 +106,11 @@ formats: setup
 COUNT ?= 2000
 fuzz: setup
 	$(BIN)/python -W ignore -m tests.fuzz --count $(COUNT) --seed $(SEED)
+
+# a dask scheduler with two workers on loopback, one of them killed (needs the network once)
+cluster: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --target $(OUT)/cluster 'distributed>=2024.5'
+	PYTHONPATH=$(OUT)/cluster $(BIN)/python -m pytest -q tests/pipeline/test_cluster.py
 
 # known weaknesses of the locked packages (needs the network)
 audit:

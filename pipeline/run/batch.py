@@ -76,4 +76,5 @@ def _cluster(address: str) -> Iterator[Executor]:
     with client:
         if not client.scheduler_info()["workers"]:
             sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")
-        yield client.get_executor()
+        # else the same job again would be answered with the error that it has ended with before
+        yield client.get_executor(pure=False)

@@ -23,9 +23,11 @@ pytest.importorskip("distributed", reason="the extra [cluster] is not installed"
 pytestmark = pytest.mark.filterwarnings("default")
 
 CLUSTER = """
-import sys, time
+import dask, sys, time
 from distributed import LocalCluster
 if __name__ == "__main__":
+    # a job whose worker dies is given back at once: that it is tried again is not dask's doing
+    dask.config.set({"distributed.scheduler.allowed-failures": 0})
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         print(cluster.scheduler_address, flush=True)
         sys.stdin.read()

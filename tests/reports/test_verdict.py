@@ -44,10 +44,19 @@ def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo()
     typed = ["wireval", "run", "m.toml", "-o", "out", "--only", "x", "--fresh", "-j", "2"]
     assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c"
     assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c"
-    assert "--only" not in next_command(map(str, range(20)))
+    assert next_command("abcde").count("--only") == 5
+    assert "--only" not in next_command("abcdef")
 
 
 def test_the_command_of_a_folder_is_read_from_its_provenance(tmp_path: Path) -> None:
     assert typed(tmp_path) == ()
     (tmp_path / "provenance.json").write_text('{"argv": ["wireval", "run", "m.toml", "-o", "out"]}', encoding="utf-8")
     assert next_command(["c"], typed(tmp_path)) == "wireval run m.toml -o out --only c"
+
+
+def test_frames_as_bad_as_each_other_stand_by_case() -> None:
+    table = pd.DataFrame({"frame": [0], "status": ["ok"], "p95_mm": [0.5]})
+    assert [row["case"] for row in worst_frames({"b": table.assign(frame=1), "a": table.assign(frame=2)}, {})] == [
+        "a",
+        "b",
+    ]
