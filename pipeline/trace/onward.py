@@ -48,6 +48,10 @@ OUTSIDE_VOXELS = 1.5
 """Distance from the wall from which its blur is none."""
 BRIGHT = 0.5
 """Share of the vessel's contrast from which something outside the lumen is no tissue."""
+BONE = 1.25
+"""The same from which it is bone, or metal: ``segment.levels.BRIGHTER``."""
+THREAD = 0.1
+"""Share of the ways up to which what is so bright is a wire, and not bone that touches the vessel."""
 MOST_RAYS = 12
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
@@ -131,7 +135,7 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
 
 
 def seen_outside(image: Subtraction, line: Array) -> bool:
-    """Whether the scan shows something as bright as the vessel, or brighter, just beyond the tip and outside the lumen.
+    """Whether the scan shows something as bright as the vessel, or a wire, just beyond the tip and outside the lumen.
 
     Then it is the lumen that ends there, not the wire. Read in the scan itself, as nothing else is known out there.
     """
@@ -151,8 +155,11 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
     )
     grey = values_at(field, index * image.scan.spacing_mm).reshape(len(s), -1)
     inside, outside = image.wall_greys
-    far = np.where(depth > OUTSIDE_VOXELS * h, grey, np.inf).min(axis=0)
-    return bool(np.any(far[out] > outside + BRIGHT * (inside - outside)))
+    if not inside > outside:
+        return False
+    beyond = np.ma.masked_array((grey - outside) / (inside - outside), depth <= OUTSIDE_VOXELS * h)[:, out]
+    bright, bone = beyond.min(axis=0) > BRIGHT, beyond.max(axis=0) > BONE
+    return bool(np.any(bright & ~bone) or 0.0 < np.mean(bright & bone) < THREAD)
 
 
 def _walked(image: Subtraction, line: Array, least: float) -> Array:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pipeline.model import Volume
 from pipeline.segment import segment
 from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
+from pipeline.trace.onward import seen_outside
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import judge
 from tests.studies.seeing.scenes import Draft
@@ -100,3 +103,23 @@ def test_a_wire_of_no_brightness_is_refused_and_not_divided_by():
     dark = replace(best.attempt, tube=replace(best.attempt.tube, tint=0.0 * best.attempt.tube.tint))
     verdict = judge(image, dark, best.points, np.zeros(len(best.points), bool), best.length_mm)
     assert verdict.status.name == "TRACE_LOW_CONTRAST"
+
+
+@pytest.mark.parametrize(
+    ("beyond", "thread", "seen"),
+    [(1000.0, 0.0, True), (1350.0, 0.0, False), (100.0, 0.0, False), (100.0, 4000.0, True), (1000.0, 4000.0, True)],
+    ids=["vessel", "bone", "tissue", "wire in tissue", "wire in vessel"],
+)
+def test_a_lumen_ends_too_early_before_a_vessel_or_a_wire_but_not_before_bone(beyond, thread, seen):
+    """Bone 1.35 times as bright as the vessel, behind the wall that a tip points at, was taken for more vessel."""
+    h, wall = 0.3, 6.0
+    x, y, z = (np.arange(48) * h - c for c in (7.0, 7.0, 0.0))
+    grey = np.broadcast_to(np.where(z > wall, beyond, 1000.0), (48, 48, 48)).copy()
+    grey[np.hypot(*np.meshgrid(x, y, indexing="ij")) < 0.25] += thread
+    scan = Volume(grey.astype(np.float32), [h] * 3, [0.0] * 3)
+    image = SimpleNamespace(
+        voxel=h, spacing=np.full(3, h), region=SimpleNamespace(corner=np.zeros(3)), scan=scan,
+        wall_greys=(1000.0, 100.0), depth_at=lambda points: points[:, 2] - wall,
+    )  # fmt: skip
+    line = np.stack([np.full(20, 7.0), np.full(20, 7.0), np.linspace(0.0, 5.5, 20)], axis=1)
+    assert seen_outside(image, line) is seen
