@@ -222,7 +222,7 @@ def failure_lines(plan: Plan) -> list[str]:
 
 
 def last_line(totals: Totals, index: Path) -> str:
-    """Counts, median error, solver time and where the report lies."""
+    """Counts, median error, time of the simulate stage and where the report lies."""
     parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
@@ -231,8 +231,8 @@ def last_line(totals: Totals, index: Path) -> str:
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         parts.append(_with_interval(totals.pooled))
-    if totals.frames:
-        parts.append(f"solver {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
+    if totals.frames and totals.solver_s:
+        parts.append(f"simulate {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
     return ".  ".join(parts) + f".  report: {index}"
 
 
