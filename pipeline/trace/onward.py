@@ -50,8 +50,10 @@ BRIGHT = 0.5
 """Share of the vessel's contrast from which something outside the lumen is no tissue."""
 BONE = 1.25
 """The same from which it is bone, or metal: ``segment.levels.BRIGHTER``."""
-THREAD = 0.1
-"""Share of the ways up to which what is so bright is a wire, and not bone that touches the vessel."""
+FEW = 0.1
+"""Share of the ways below which what is bright on them is no vessel but the edge of bone, or a wire straight ahead."""
+AHEAD_RAD = 0.15
+"""Angle to the wire's end up to which a way is straight ahead: the nearest of ``_cone``."""
 MOST_RAYS = 12
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
@@ -159,7 +161,8 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
         return False
     beyond = np.ma.masked_array((grey - outside) / (inside - outside), depth <= OUTSIDE_VOXELS * h)[:, out]
     bright, bone = beyond.min(axis=0) > BRIGHT, beyond.max(axis=0) > BONE
-    return bool(np.any(bright & ~bone) or 0.0 < np.mean(bright & bone) < THREAD)
+    ahead = directions[out] @ heading > np.cos(AHEAD_RAD)
+    return bool(np.mean(bright & ~bone) > FEW or (np.any(bright & ahead) and np.mean(bright) < FEW))
 
 
 def _walked(image: Subtraction, line: Array, least: float) -> Array:
