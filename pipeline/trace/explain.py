@@ -36,6 +36,8 @@ WALL_ERROR, WALL_REACH = 0.13, 5.0
 """Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
 PLAIN_TIP, STEP_TIP = 0.08, 0.25
 """Error (voxel) of the tip that is none of the noise: of a plain wire, of one whose brightness has steps."""
+TIPS_MM = 1.5
+"""Most that two fits of one wire, before and after its background is told from it, may end apart."""
 BRIDGE_SIGMA_VOXELS = 0.5
 """Standard deviation across the wire that a point on a bridged gap gets at least."""
 
@@ -209,6 +211,17 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     )  # fmt: skip
 
 
+def _agreed(first: Candidate, second: Candidate) -> Candidate:
+    """The second fit of a wire; refused where it ends elsewhere than the first: in noise it was once cut by 7.5 mm."""
+    apart = abs(first.length_mm - second.length_mm)
+    if apart < TIPS_MM or second.verdict.status is not FrameStatus.OK:
+        return second
+    note = note_of(
+        f"tips {apart:.1f} mm apart in two fits", f"{TIPS_MM} mm at most", "give a reference scan without wire"
+    )
+    return replace(second, verdict=replace(second.verdict, status=FrameStatus.TRACE_AMBIGUOUS, note=note))
+
+
 def _faint_for_its_noise(curve: Curve) -> Curve:
     """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
     seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
@@ -232,5 +245,5 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     if image.modelled:
         # the lumen's own grey under the wire is taken from beside it, and the fit done again
         image = levelled(image, dense(best.attempt.tube, image.voxel), best.attempt.tube.sigma)
-        best = _read_off(image, again(image, best.attempt, entry.direction), entry)[0]
+        best = _agreed(best, _read_off(image, again(image, best.attempt, entry.direction), entry)[0])
     return _faint_for_its_noise(_curve(image, best))

@@ -53,6 +53,7 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
         ("stenosis", 1, "TRACE_LEFT_LUMEN"),
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
+        ("plain, no reference", 347, "TRACE_AMBIGUOUS"),  # once cut by 7.5 mm and ok
     ],
 )
 def test_what_cannot_be_told_is_refused(case, seed, status):
