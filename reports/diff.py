@@ -46,7 +46,7 @@ class Difference:
         table = {
             "pairs": columns.size(),
             "median_change": columns["change"].median(),
-            "worst": columns["worse"].max(),
+            "worst": columns["worse"].max() * columns.size().index.map(_sign) + 0.0,
             "regressions": columns["verdict"].agg(lambda verdicts: int((verdicts == "regression").sum())),
         }
         return pd.DataFrame(table).reset_index()

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, complain, resolved_settings, say
+from pipeline.commands.given import file_of
 
 if TYPE_CHECKING:
     from pipeline.run.cache import Store
@@ -33,7 +34,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.study.manifest import read_manifest
 
     try:
-        manifest, settings = read_manifest(args.manifest), resolved_settings(args)
+        manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
         cases, store = chosen(manifest.cases), Store(None if args.no_cache else default_root())
         problems = [] if args.design else check(cases, settings.config)
         if problems:

@@ -15,6 +15,11 @@ Inferred = tuple[str, tuple[str, ...]]
 """The text of a manifest, and sentences that say where each guess comes from."""
 
 
+def file_of(path: Path) -> Path:
+    """The manifest in a folder that holds one; else the path itself."""
+    return path / NAME if (path / NAME).exists() else path
+
+
 def add_manifest(parser: argparse.ArgumentParser) -> None:
     """MANIFEST, and what may be said where it is a folder of scans."""
     parser.add_argument(
@@ -50,8 +55,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "tuple[Manifest
         raise InputError(
             [f"{path}: a scan is no manifest; give its folder, {folder}, or write one: wireval init {folder}"]
         )
-    if path.is_dir() and (path / NAME).exists():
-        path = path / NAME
+    path = file_of(path)
     if not path.is_dir():
         return read_manifest(path), ()
     text, assumptions = inferred(args)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, complain, resolved_settings, say
+from pipeline.commands.given import file_of
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -31,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
+    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
+    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
     add("--fresh", action="store_true", help="compute every case again")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
 
@@ -54,7 +57,7 @@ def main(args: argparse.Namespace) -> int:
     done = {}
     for name, plan in plans.items():
         done[name] = launch(plan)
-        for line in failure_lines(plan):
+        for line in failure_lines(plan, "do what the message says, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")
     for line in write_comparison(args.out, {name: plan.out for name, plan in plans.items()}):
@@ -73,12 +76,12 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.study.manifest import read_manifest
     from pipeline.study.others import Others, found_for, named
 
-    manifest, settings = read_manifest(args.manifest), resolved_settings(args)
+    manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
-    calibrated, notes = as_calibrated(manifest.cases, None, own=False)
+    calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
     plans: dict[str, Plan] = {}
     alone = len(manifest.cases) == 1
     stated = {"space": args.space, "unit": args.unit}

@@ -22,6 +22,8 @@ LEAST_FIT_MM = 20.0
 FREE_MM = 100.0
 """Prior of the shift, as if one point were known so well: along a straight stretch it would else be anything."""
 ROUNDS, STILL_MM = 50, 1e-6
+MOST_SCALED = 1.3
+"""Most that errors may be scaled by an isocentre before or behind the wire: 200 mm off in a C-arm of 750 mm."""
 IN_PLANE = (
     *("rms_mm", "mean_mm", "p95_mm", "max_mm", "distal10_rms_mm", "distal20_rms_mm", "back_rms_mm", "hausdorff_mm"),
     *("tip_mm", "tip_angle_deg"),
@@ -48,6 +50,11 @@ class Screen:
         share = ((self.isocentre_mm - self.source_mm) @ self.normal) / (rays @ self.normal)
         if not np.all(share > 0):
             raise ValueError("the wire lies behind the source: check the matrix and its sign, and isocentre_mm")
+        if not MOST_SCALED > np.median(share) > 1.0 / MOST_SCALED:
+            got = (
+                f"the wire is {np.median(share):.2g} times as large in the plane through isocentre_mm as where it lies"
+            )
+            raise ValueError(f"{got}; allowed: 1 / {MOST_SCALED} to {MOST_SCALED}: is isocentre_mm near the wire?")
         return np.asarray(self.source_mm + share[:, None] * rays)
 
 
@@ -103,13 +110,22 @@ def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: Way
     """The wire and the polyline on the plane; arc lengths are those of the wire in space."""
     shift, arc = shift_of(screen, wire_mm, fitted), counted(wire_mm, fitted, config)
     whole, points = screen.flat(wire_mm) + shift, screen.flat(at_arc(wire_mm, arc)) + shift
+    if _apart(whole, screen.curve_mm) > 2.0 * _apart(whole, screen.curve_mm[::-1]) + FIT_FROM_MM / 8:
+        raise ValueError("the polyline lies on the wire the other way round: give it from the base to the tip")
     error, foot = point_to_curve(points, screen.curve_mm)
     curve = resample(screen.curve_mm, config.sample_mm)
     length, along = float(arc_length(screen.curve_mm)[-1]), arc_length(curve)
     seen = curve[along >= length - float(arc_length(points)[-1]) - 1e-9]
+    if len(points) < 2 or len(seen) < 2:
+        raise ValueError("nothing of the wire or of the polyline is left to be compared: check points_px and the depth")
     back = point_to_curve(seen, whole)[0]
     none = np.zeros(0)
     return Pair(whole, screen.curve_mm, length, points, arc, error, foot, back, none, lumen, way)
+
+
+def _apart(wire_mm: Array, curve_mm: Array) -> float:
+    """How far the ends of two curves lie from each other, together."""
+    return float(np.linalg.norm(wire_mm[0] - curve_mm[0]) + np.linalg.norm(wire_mm[-1] - curve_mm[-1]))
 
 
 def values_in(pair: Pair) -> dict[str, float | bool]:

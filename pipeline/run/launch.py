@@ -205,8 +205,11 @@ def intention(plan: Plan) -> list[str]:
     return [*lines, "dry run: nothing was computed"]
 
 
-def failure_lines(plan: Plan) -> list[str]:
-    """What went wrong, a line each (frames, cases, crashed points of a sweep), and the command that comes next."""
+def failure_lines(plan: Plan, then: str = "") -> list[str]:
+    """What went wrong, a line each (frames, cases, crashed points of a sweep), and what comes next.
+
+    then : that, where it is not the run's own command for these cases.
+    """
     lines, cases = [], []
     for result in found_results(plan.out):
         for row in result.failures:
@@ -217,8 +220,8 @@ def failure_lines(plan: Plan) -> list[str]:
         f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
-    command = f"next: do what the message says, then {next_command(cases, typed(plan.out))}"
-    return [*lines, command] if cases else lines
+    then = then or f"do what the message says, then {next_command(cases, typed(plan.out))}"
+    return [*lines, f"next: {then}"] if cases else lines
 
 
 def last_line(totals: Totals, index: Path) -> str:

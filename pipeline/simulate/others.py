@@ -17,6 +17,8 @@ wire of 0.4 mm is used in blindly."""
 LARGEST_TURN_DEG = 60.0
 """Of a wire's first 2 mm from the entry's direction."""
 OVER_MM = 2.0
+STEP_BACK_MM, BACK = 0.05, -0.5
+"""A step so long that makes an angle with this cosine with the one before: no wire turns by 120 degrees at a point."""
 ROUNDING_MM = 1e-3
 UNITS = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 SAME = 0.15
@@ -42,11 +44,23 @@ def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
 
 def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
     """Why a wire cannot be the one that was pushed in at this entry, with what would make it so; empty where it can."""
+    back = _turned_back(points_mm)
+    if back:
+        return f"it turns straight back at point {back}: are its points in order?"
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
     found = next((name for name, other in _readings(points_mm) if not _misplaced(other, entry_mm, direction)), "")
     return wrong + (f": it would if it were {found}" if found else "; check its coordinates")
+
+
+def _turned_back(points_mm: Array) -> int:
+    """The first inner point (from 1) at which a curve goes back, by more than rounding; 0 for none."""
+    steps = np.diff(points_mm, axis=0)
+    steps = steps[(length := np.linalg.norm(steps, axis=1)) > STEP_BACK_MM]
+    units = steps / np.linalg.norm(steps, axis=1)[:, None]
+    found = np.flatnonzero(np.sum(units[1:] * units[:-1], axis=1) < BACK)
+    return int(np.flatnonzero(length > STEP_BACK_MM)[found[0]]) + 1 if len(found) else 0
 
 
 def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:

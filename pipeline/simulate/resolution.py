@@ -75,7 +75,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
             reason = "with shorter ones fewer depths are reached"
             continue
         # a wire that is about to snap goes one way or the other by a trifle, with segments of any length
-        away = ~(moved <= AGREED_MM) & [not wire.uncertain for wire in finer]
+        away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
         segment, wires, num = shorter, finer, moved
         if not away.any():
             reason = f"halving them moved no wire by more than {AGREED_MM} mm, near snaps apart"

@@ -119,6 +119,7 @@ def infer_manifest(
         notes.append("entry_mm and entry_direction: the end of the wire nearest to the edge of the first frame")
     radius = radius_mm or DEFAULT_RADIUS_MM
     notes.append(f"wire: radius {radius} mm, stiffness and tip curve of a common 0.014 inch wire")
+    notes.append('roll_deg: 0, that is, a curved tip bends towards material_axis; roll_deg = "fit" where it is unknown')
     notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")
     text = MANIFEST.format(
         radius=radius,

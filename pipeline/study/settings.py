@@ -125,6 +125,10 @@ def _applied(config: Config, setting: Setting) -> Config:
     return replace(config, **{table: replace(current, **{key: value})})
 
 
+def _said(value: Any) -> str:
+    return "as the manifest says" if value is None else str(value)
+
+
 def differing(path: Path, settings: Resolved) -> str:
     """Which settings a run before had otherwise, by its config.resolved.toml; empty where none, or without the file."""
     try:
@@ -133,7 +137,9 @@ def differing(path: Path, settings: Resolved) -> str:
         return str(error)
     old, new = asdict(before), asdict(settings.config)
     names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
-    return ", ".join(f"{table}.{key} {old[table][key]} before, {new[table][key]} now" for table, key in names)
+    return ", ".join(
+        f"{table}.{key} {_said(old[table][key])} before, {_said(new[table][key])} now" for table, key in names
+    )
 
 
 def to_toml(resolved: Resolved) -> str:

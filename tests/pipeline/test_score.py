@@ -149,6 +149,7 @@ def nan(wire: Array) -> Array:
         (lambda wire: wire @ np.diag([1.0, 1.0, -1.0]) + [0.0, 0.0, 14.0], "degrees away"),
         (lambda wire: ENTRY + 1e-3 * (wire - ENTRY), "is it in m?"),
         (lambda wire: wire[:50], "mm long"),
+        (lambda wire: wire[[*range(40), 43, 41, 42, 40, *range(44, len(wire))]], "turns straight back at point"),
         (lambda wire: ENTRY + 1.2 * (wire - ENTRY), "mm long"),
     ],
 )

@@ -14,7 +14,7 @@ from pipeline.model import Clamp, Lumen
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.load import each_frame
 from pipeline.run.stages.simulate import _pressed_deep, judged
-from pipeline.simulate import altered, guide_wire, insertion_of, simulate
+from pipeline.simulate import altered, guide_wire, insertion_of, resolution, simulate
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.study.manifest import Case, ManifestError, read_manifest
 from solver import GuideWire, Insertion, Solution, VesselWall
@@ -198,3 +198,9 @@ def test_a_wire_that_lies_in_itself_says_so_and_fails_its_frame() -> None:
     assert wire.self_overlap_mm == pytest.approx(0.36, abs=0.01)
     assert judged(Frame(0, simulated=wire), wire, 0.18).status == "self_contact"
     assert next(Insertion(turned, None, [0, 0, 0], [0, 0, 1]).to_depths([6.0])).self_overlap_mm == 0.0
+
+
+def test_nothing_to_simulate_is_no_error() -> None:
+    """No frame was traced and no depth is stated: the case crashed, and what its frames said was lost."""
+    nothing = resolution.resolve(lambda segment_mm, refined: [], [1.0, 0.5])
+    assert len(nothing.wires) == len(nothing.num_mm) == 0

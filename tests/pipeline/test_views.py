@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -172,6 +174,33 @@ def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path
     assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
     assert set(errors_of(tmp_path / "out")["status"]) == {"view_failed"}
     assert "a shift takes 60 mm or more" in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
+
+
+NEAR_SOURCE = (CENTRE - 400.0 * np.array([0.3, -0.95, 0.1])).tolist()
+
+
+def read_backwards(frame: dict[str, Any]) -> dict[str, Any]:
+    return frame | {"points_px": frame["points_px"][::-1]}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda views: views | {"isocentre_mm": NEAR_SOURCE}, "times as large"),
+        (lambda views: views | {"frames": [*map(read_backwards, views["frames"])]}, "other way"),
+    ],
+    ids=["isocentre half way to the source", "tip first"],
+)
+def test_a_view_that_cannot_be_right_fails_by_name(
+    known: Known, tmp_path: Path, spoil: Callable[[dict[str, Any]], dict[str, Any]], said: str
+) -> None:
+    """Both were ok: with half the error in mm, and with the tip's error alone to tell."""
+    manifest = study(known, tmp_path / "study")
+    file = manifest.with_name("projections.json")
+    file.write_text(json.dumps(spoil(json.loads(file.read_text(encoding="utf-8")))), encoding="utf-8")
+    assert main(["run", str(manifest.parent), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 1
+    assert "view_failed" in set(errors_of(tmp_path / "out")["status"])
+    assert said in (tmp_path / "out" / "failures.csv").read_text(encoding="utf-8")
 
 
 def test_projections_that_are_none_are_refused(known: Known, tmp_path: Path) -> None:

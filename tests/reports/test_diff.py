@@ -96,6 +96,10 @@ def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> 
     assert "case d frame 2, tip_mm" in found.sentence
     tip = found.by_column.set_index("column").loc["tip_mm"]
     assert tip["worst"] == pytest.approx(1.0)
+    errors.loc[2, "back_rms_mm"], errors.loc[1, "coverage"] = 0.0, errors.loc[1, "coverage"] - 0.3
+    tables.write(path, ERRORS, errors)
+    coverage = diff.diff_folders(out, worse, tolerance).by_column.set_index("column").loc["coverage"]
+    assert coverage["worst"] == pytest.approx(-0.3), "of what is better when larger, the largest loss"
     assert tip["regressions"] == 1
     (path).unlink()
     assert len(diff.diff_folders(out, worse, tolerance).regressions) == 3, "every frame of the case is missing"
