@@ -65,6 +65,8 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> None:
         f"depth_offset_mm = {_text(by_name[DEPTH]['used'])}",
         f"absolute_stiffness = {json.dumps(scaled)}",
     ]
+    lines += ["", "[stated]", f"bending_stiffness_N_mm2 = {_text(first.wire.bending_stiffness_N_mm2)}"]
+    lines.append(f"rest_curvature_per_mm = {_text(first.wire.rest_curvature_per_mm)}")
     for stated in walls:
         lines += ["", "[[wall]]", f"stated_N_mm2 = {_text(stated)}"]
         lines.append(f"stiffness_N_mm2 = {_text(stated * wall_factor(stated, values))}")

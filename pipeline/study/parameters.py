@@ -9,12 +9,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
 from pipeline.status import InputError, did_you_mean
 
 if TYPE_CHECKING:
+    from pipeline.model import Wire
     from pipeline.study.manifest import Case
 
 
@@ -43,6 +45,19 @@ class Found(Table):
     why: str = ""
 
 
+class Stated(Table):
+    """The wire as the manifest stated it when it was calibrated."""
+
+    bending_stiffness_N_mm2: PositiveProfile
+    rest_curvature_per_mm: FiniteProfile
+
+    def is_of(self, wire: "Wire") -> bool:
+        """Whether a manifest still states it so, but for digits that the file leaves out."""
+        pairs = ((getattr(self, name), getattr(wire, name)) for name in type(self).model_fields)
+        arrays = ((np.asarray(a, float), np.asarray(b, float)) for a, b in pairs)
+        return all(a.shape == b.shape and np.allclose(a, b, rtol=1e-4, atol=1e-9) for a, b in arrays)
+
+
 class Used(Table):
     """A case that was calibrated with. data : SHA-256 of each of its frames and traces."""
 
@@ -63,6 +78,7 @@ class Parameters(Table):
     depth_offset_mm: Finite
     absolute_stiffness: bool
     wall: tuple[WallFound, ...]
+    stated: Stated | None = None
     estimate: tuple[Found, ...] = ()
     used: tuple[Used, ...] = ()
 
@@ -109,6 +125,9 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Ca
     if case.wire.name != found.wire:
         what = f"case {case.id!r}: its wire is {case.wire.name!r}, the parameters are those of {found.wire!r}"
         raise ParametersError([f"{what}; calibrate this wire, or take the parameters off this case"])
+    if found.stated is not None and not found.stated.is_of(case.wire):
+        what = f"case {case.id!r}: wire {found.wire!r} is stated otherwise than when it was calibrated (table stated)"
+        raise ParametersError([f"{what}; state it as then, give it another name, or calibrate it again"])
     from dataclasses import replace
 
     profiles = {name: getattr(found, name) for name in ("bending_stiffness_N_mm2", "rest_curvature_per_mm")}

@@ -263,6 +263,10 @@ def test_one_frame_in_common_is_enough(study):
         (("friction = 0.03", "friction = -1"), "friction"),
         (('wire = "w"', 'wire = "other"'), "its wire is 'w', the parameters are those of 'other'"),
         (("schema = 1", "schema = 1\nroll = 3"), "unknown key"),
+        (
+            ("[[wall]]", "[stated]\nbending_stiffness_N_mm2 = 2.0\nrest_curvature_per_mm = 0.0\n[[wall]]"),
+            "stated otherwise",
+        ),
         (("schema = 1", "schema = "), "cannot be read as TOML"),
     ],
 )
