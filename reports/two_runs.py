@@ -65,8 +65,14 @@ class Verdict:
             "What differs between the runs": pd.DataFrame(self.differs),
             "Over all frames": pd.DataFrame(self.pooled),
             "Frame by frame": self.frames.by_column,
-            "What became worse": self.frames.regressions.head(SHOWN).drop(columns="verdict"),
+            self._worse: self.frames.regressions.head(SHOWN).drop(columns="verdict"),
         }
+
+    @property
+    def _worse(self) -> str:
+        """The head of the last table, which says where it is cut."""
+        count = len(self.frames.regressions)
+        return "What became worse" + f" (the first {SHOWN} of {count}; --json has all)" * (count > SHOWN)
 
     def lines(self) -> list[str]:
         """For a terminal."""
