@@ -31,6 +31,13 @@ def add_manifest(parser: argparse.ArgumentParser) -> None:
     add_what_is_seen(parser)
 
 
+def add_calibrated(parser: argparse.ArgumentParser) -> None:
+    """What is taken from a calibration, beside what the manifest names."""
+    add = parser.add_argument
+    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
+    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
+
+
 def add_what_is_seen(parser: argparse.ArgumentParser) -> None:
     """What a folder of scans need not be searched for."""
     folder = parser.add_argument_group("of a folder of scans").add_argument

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, add_verbosity, resolved_settings, say, settings_of
-from pipeline.commands.given import add_manifest, given
+from pipeline.commands.given import add_calibrated, add_manifest, given
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -37,8 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame")
-    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
-    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
+    add_calibrated(parser)
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, complain, resolved_settings, say
-from pipeline.commands.given import file_of
+from pipeline.commands.given import add_calibrated, file_of
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -32,8 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_settings(parser)
     add("-j", "--jobs", type=int, default=1, metavar="N", help="cases at once (default 1)")
-    add("--parameters", type=Path, metavar="FILE", help="what wireval calibrate found, for all cases")
-    add("--score-used", action="store_true", help="also score cases that were calibrated with, marked")
+    add_calibrated(parser)
     add("--fresh", action="store_true", help="compute every case again")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
 

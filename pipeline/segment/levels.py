@@ -59,7 +59,7 @@ class GreyLevels:
         return 0.5 * (self.inside + self.outside)
 
 
-def boxgrey_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
+def box_around(grid: Grid, index: NDArray[Any], half_mm: float, least: int) -> tuple[slice, slice, slice]:
     """The voxels within ``half_mm`` (at least ``least`` voxels) of a voxel, clipped to the grid."""
     half = np.maximum(np.ceil(half_mm / grid.spacing_mm).astype(int), least)
     a, b, c = (
@@ -107,14 +107,14 @@ def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.i
 
     Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
     """
-    box = boxgrey_around(grid, index, BOX_MM, LEAST_BOX)
+    box = box_around(grid, index, BOX_MM, LEAST_BOX)
     raw = np.asarray(grid.values[box], np.float32)
     grey = raw
     for axis in range(3):
         grey = ndimage.convolve1d(grey, [0.25, 0.5, 0.25], axis=axis, mode="nearest")
     start = np.array([s.start for s in box])
     # a seed may be half a voxel off, and a wire may lie on it: the median of 3^3 voxels is the lumen's still
-    near = boxgrey_around(grid, index, 0.0, 1)
+    near = box_around(grid, index, 0.0, 1)
     inner = tuple(slice(s.start - o, s.stop - o) for s, o in zip(near, start, strict=True))
     around = grey[inner]
     seed = float(np.median(around))
@@ -184,7 +184,7 @@ def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float
     """The grey up to which the vessel is believed: that at the seed, its blur taken off, and BRIGHTER of it."""
     if levels.seed is None:
         return float("inf")
-    depth = -float(distance.values[boxgrey_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
+    depth = -float(distance.values[box_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
     # grey at the seed was smoothed by 1-2-1, of variance 1/2
     share = 1.0 - np.exp(-0.5 * depth**2 / (blur_mm**2 + 0.5 * float(np.mean(distance.spacing_mm)) ** 2))
     return levels.outside + BRIGHTER * (levels.at_seed - levels.outside) / max(float(share), 0.4)

@@ -57,10 +57,11 @@ def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
 def _turned_back(points_mm: Array) -> int:
     """The first inner point (from 1) at which a curve goes back, by more than rounding; 0 for none."""
     steps = np.diff(points_mm, axis=0)
-    steps = steps[(length := np.linalg.norm(steps, axis=1)) > STEP_BACK_MM]
-    units = steps / np.linalg.norm(steps, axis=1)[:, None]
+    length = np.linalg.norm(steps, axis=1)
+    long = np.flatnonzero(length > STEP_BACK_MM)
+    units = steps[long] / length[long, None]
     found = np.flatnonzero(np.sum(units[1:] * units[:-1], axis=1) < BACK)
-    return int(np.flatnonzero(length > STEP_BACK_MM)[found[0]]) + 1 if len(found) else 0
+    return int(long[found[0]]) + 1 if len(found) else 0
 
 
 def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
