@@ -318,3 +318,9 @@ def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
         with_fitted_roll(run, nothing)
     untouched = replace(run, case=other)
     assert with_fitted_roll(untouched, known) is known
+
+
+def test_other_simulators_are_scored_with_parameters_too(study, capsys):
+    words = ["score", str(study), "--curves", str(study), "--space", "LPS", "-o", str(study / "scored"), "--parameters"]
+    assert main([*words, str(study / "none.toml")]) == 2
+    assert "none.toml: no such file" in capsys.readouterr().err
