@@ -31,6 +31,15 @@ OURS = re.compile(r"[0-9a-f]{64}\.(result|npz)|\.tmp-.*\.result")
 """Names of files of the store; .npz is how it wrote them before they had a hash."""
 NOT_A_RESULT = (ValueError, KeyError, TypeError, EOFError, BadZipFile)
 
+_lumen: dict[Path, Lumen] = {}
+"""The one that this process read last: the next point of a sweep asks for it again, and for its wall, whose splines
+and hash belong to this very object. With 256^3 voxels that is two seconds a point."""
+
+
+def forget_lumen() -> None:
+    """Read lumens anew: a run does not trust what an earlier one in the same process has read."""
+    _lumen.clear()
+
 
 def default_root() -> Path:
     """``$WIREVAL_CACHE``, else the user's cache folder."""
@@ -51,6 +60,8 @@ class Store:
         if self.root is None:
             return None
         path = self._path(self.root, stage, key)
+        if path in _lumen:
+            return _lumen[path]
         try:
             result = decoded(stage, key, path.read_bytes())
         except FileNotFoundError:
@@ -63,6 +74,9 @@ class Store:
             _remove(path)
             return None
         _touch(path)
+        if isinstance(result, Lumen):
+            forget_lumen()
+            _lumen[path] = result
         return result
 
     def put(self, stage: str, key: str, result: Lumen | Curve) -> None:

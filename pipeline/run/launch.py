@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
-from pipeline.run.cache import Store
+from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, finished, run_case
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
@@ -75,11 +75,14 @@ class Plan:
 
     @property
     def sweep_jobs(self) -> list[Job]:
-        """The same at every point of the sweep; they come last, when the store knows lumen and traces."""
+        """The same at every point of the sweep; they come last, when the store knows lumen and traces.
+
+        All points of a case follow each other: a worker then reads its lumen and prepares its wall once.
+        """
         return [
             replace(job, settings=point.cheap, out=self.out / point.folder, pictures=False, quiet=True)
-            for point in self.points
             for job in self.jobs
+            for point in self.points
         ]
 
 
@@ -165,6 +168,7 @@ def cores_each(plan: Plan, jobs: int) -> int:
 
 def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
     """Run jobs; a case that could not be finished gets a result that says so. Raises WriteError, which ends the run."""
+    forget_lumen()
     watch = Watch(jobs, silent=plan.template.quiet, lines=plan.template.verbose)
     cores = cores_each(plan, len(jobs))
     quiet = [replace(job, quiet=job.quiet or watch.bar, cores=cores) for job in jobs]

@@ -15,12 +15,15 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Curve
+from pipeline.run import cache
 from pipeline.run.aggregate import aggregate
+from pipeline.run.cache import decoded
 from pipeline.run.case import Job, run_case
 from pipeline.run.results import found_results
 from pipeline.run.stages import simulate
 from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
+from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from reports import tables
 from reports.html import render_index
@@ -155,6 +158,18 @@ def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -
     assert table["rms_mm"].nunique() == 3
     assert reused_traces(out / "sweep" / "simulate.roll_offset_deg=60") == FRAMES
     assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+
+def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And prepares its wall once: its points follow each other. The two cases here have one scan, and so one lumen."""
+    both, out, read = two_cases(study, tmp_path / "study"), tmp_path / "out", []
+    monkeypatch.setattr(cache, "decoded", lambda *args: read.append(args[0]) or decoded(*args))
+    wall_of.cache_clear()
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3") == 0
+    assert read.count("segment") == 1
+    assert wall_of.cache_info().misses == 2, "of the lumen as it was segmented, and as it was read"
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume") == 0
+    assert read.count("segment") == 2, "another run reads it anew"
 
 
 def with_lumen(study: Path, folder: Path, labels: np.ndarray, like: sitk.Image) -> Path:
