@@ -2,7 +2,10 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,13 +15,18 @@ if TYPE_CHECKING:
     from pipeline.run.results import Result
 
 HELP = "rebuild tables, figures and pages from result files"
+MANY = 10
+"""Cases from which on each page that was drawn is a line: one takes seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
-    parser.add_argument("out", type=Path, metavar="OUT", help="a folder that `wireval run` wrote")
-    parser.add_argument("--embed", action="store_true", help="put the pictures into the pages: one file a page")
-    parser.add_argument("--pdf", action="store_true", help="also write summary.pdf, four pages on paper")
+    add = parser.add_argument
+    add("out", type=Path, metavar="OUT", help="a folder that `wireval run` wrote")
+    add("-j", "--jobs", type=int, default=1, metavar="N", help="pages of cases drawn at once (default 1)")
+    add("--overview", action="store_true", help="the tables and the page over all cases alone, in seconds")
+    add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
+    add("--pdf", action="store_true", help="also write summary.pdf, four pages on paper")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -38,36 +46,50 @@ def main(args: argparse.Namespace) -> int:
     heads = found_heads(args.out)
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))
-    drawn = [_drawn(args, result) for result in found]
+    drawn = args.overview or _all_drawn(args, found)
     page = _pages(args.out, embed=args.embed)
     if args.pdf:
         from reports.pdf import write_pdf
 
         say(f"summary: {write_pdf(args.out)}")
     say(last_line(totals, page))
-    return 0 if totals.all_ok and all(drawn) else 1
+    return 0 if totals.all_ok and drawn else 1
 
 
-def _drawn(args: argparse.Namespace, result: "Result") -> bool:
-    """Draw the page of a case that has frames; False, and a line, where that cannot be."""
+def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
+    """Draw the pages of all cases, a line for each where there are many; whether that could be."""
+    from pipeline.run.batch import run_all
+    from reports.atomic import WriteError
+
+    wrong, work = [], partial(_drawn, args.out, args.embed)
+    with closing(run_all(found, work, args.jobs)) as outcomes:
+        for count, outcome in enumerate(outcomes, 1):
+            problem = outcome.error or outcome.result
+            if outcome.status == "unwritable":
+                raise WriteError(outcome.error)
+            wrong += [problem] if problem else []
+            if problem or len(found) >= MANY:
+                sys.stderr.write(f"{count}/{len(found)} {outcome.job.case}: {problem or 'drawn'}\n")
+    return not wrong
+
+
+def _drawn(out: Path, embed: bool, result: "Result") -> str:
+    """Draw the page of a case that has frames; why that cannot be, or nothing."""
     from pipeline.run.case import draw
     from pipeline.run.log import CaseProgress
     from pipeline.run.occupied import held
     from reports.atomic import WriteError
 
-    folder = args.out / "cases" / result.case
+    folder = out / "cases" / result.case
     try:
         if result.frames:
             with held(folder, CaseProgress(result.case, folder / "log.txt").warn):
-                draw(folder, "embedded" if args.embed else "linked")
-        elif result.status == "damaged":
-            sys.stderr.write(f"{result.case}: {result.failures[0]['message']}\n")
+                draw(folder, "embedded" if embed else "linked")
     except WriteError:
         raise
     except (OSError, EOFError, ValueError, KeyError) as error:
-        sys.stderr.write(f"{result.case}: its page cannot be drawn: {error}; run the case again with --fresh\n")
-        return False
-    return True
+        return f"its page cannot be drawn: {error}; run the case again with --fresh"
+    return str(result.failures[0]["message"]) if result.status == "damaged" else ""
 
 
 def _pages(out: Path, *, embed: bool) -> Path:

@@ -320,7 +320,10 @@ def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path,
     for shard in ("1/2", "2/2"):
         assert run(both, tmp_path / shard[0], "--shard", shard, *sweep) == 0
         shutil.copytree(tmp_path / shard[0], tmp_path / "shards", dirs_exist_ok=True)
-    assert main(["report", str(tmp_path / "shards")]) == 0
+    (tmp_path / "shards" / "cases" / "second" / "report.html").unlink()
+    assert main(["report", str(tmp_path / "shards"), "--overview"]) == 0
+    assert not (tmp_path / "shards" / "cases" / "second" / "report.html").exists()
+    assert main(["report", str(tmp_path / "shards"), "-j", "2"]) == 0
     assert differences(tmp_path / "pool" / "cases", tmp_path / "shards" / "cases") == []
     for name in ("summary.csv", "overall.csv", "sweep.csv"):
         assert (tmp_path / "shards" / name).read_bytes() == (tmp_path / "pool" / name).read_bytes(), name
@@ -422,6 +425,20 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
     said = capsys.readouterr()
     assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
     assert "1 crashed in the sweep" in said.out
+
+
+def test_pages_of_many_cases_are_drawn_with_a_line_each(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that cannot be drawn is named, and the exit code tells."""
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    monkeypatch.setattr("pipeline.commands.report.MANY", 1)
+    assert main(["report", str(out)]) == 0
+    assert capsys.readouterr().err == "1/1 bifurcation: drawn\n"
+    (out / "cases" / "bifurcation" / "frames.h5").write_bytes(b"")
+    assert main(["report", str(out)]) == 1
+    assert "1/1 bifurcation: its page cannot be drawn: " in capsys.readouterr().err
 
 
 def test_a_damaged_result_hides_no_other(
