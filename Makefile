@@ -21,6 +21,9 @@ planted: setup
 	$(BIN)/wireval run $(OUT)/study/manifest.toml -o $(OUT)/planted --resume -j 2 --until compare \
 	  --sweep simulate.roll_offset_deg=-60,60 --sweep simulate.rest_curvature_scale=0 \
 	  --sweep simulate.taper_scale=2 --sweep simulate.friction=0.2
+	$(BIN)/wireval synth circle-of-willis -o $(OUT)/rough --friction 0.2 --insertions 6 --frames 10 --size 256 --seed $(SEED) -j 2
+	$(BIN)/wireval run $(OUT)/rough/manifest.toml -o $(OUT)/planted-rough --resume -j 2 --until compare \
+	  --sweep simulate.friction=0
 
 # parameters found by `wireval calibrate` against the truth, and six blind insertions judged with them
 calibrated: setup

@@ -1,7 +1,7 @@
 """A named situation, and what it is made of before anything is computed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -78,6 +78,11 @@ ScannerFactory = Callable[[Setup, ScanGrid], Scanner]
 Plan = Callable[[np.random.Generator, int], Setup]
 
 
+def _as_planned(setup: Setup) -> Setup:
+    """Nothing is left open."""
+    return setup
+
+
 @dataclass(frozen=True)
 class NamedScene:
     """A name, one line of why, natural sizes, and how to plan it from a seeded generator and a number of frames.
@@ -106,6 +111,10 @@ class NamedScene:
         """The scene with everything chosen that has to be known before the truth is computed."""
         planned = self.plan(rng, frames)
         return planned if self.steer is None else self.steer(planned)
+
+    def with_friction(self, coefficient: float) -> "NamedScene":
+        """The scene with Coulomb's friction between true wire and wall, which its manifest states."""
+        return replace(self, steer=lambda planned: replace((self.steer or _as_planned)(planned), friction=coefficient))
 
     def expected_statuses(self, frames: int) -> tuple[str, ...]:
         """One identifier per frame."""

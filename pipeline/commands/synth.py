@@ -10,6 +10,7 @@ from pipeline.commands import complain, say
 from pipeline.status import did_you_mean
 
 HELP = "write a synthetic study with truth, as real files"
+MOST_FRICTION = 1.0
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -33,6 +34,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("--size", type=int, metavar="N", help="voxels along each axis")
     add("--voxel-mm", type=float, metavar="V", help="size of a voxel")
     add("--seed", type=int, default=0, metavar="S", help="of what is drawn at random (default 0)")
+    add("--friction", type=float, metavar="F", help="Coulomb's coefficient of the true wire and the wall")
     add(
         "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
     )
@@ -63,6 +65,8 @@ def _problems(args: Namespace) -> list[str]:
         return [f"--insertions {args.insertions} -j {args.jobs}: expected 1 or more"]
     if args.name is None and args.scanner != "psf":
         return [f"--scanner {args.scanner}: only the catalogue's scenes can be scanned so; leave it out"]
+    if args.friction is not None and not 0.0 <= args.friction <= MOST_FRICTION:
+        return [f"--friction {args.friction:g}: expected 0 to {MOST_FRICTION:g}; hydrophilic wires have 0.01 to 0.1"]
     for path in (args.anatomy, args.background):
         if path is not None and not path.exists():
             return [f"{path}: no such file"]
@@ -74,8 +78,10 @@ def _scene(args: Namespace) -> "NamedScene":
     from data_synthetic import catalogue
 
     if args.background is not None:
-        return catalogue.background_scene(args.background, args.voxel_mm)
-    return catalogue.from_anatomy(args.anatomy) if args.name is None else catalogue.describe(args.name)
+        scene = catalogue.background_scene(args.background, args.voxel_mm)
+    else:
+        scene = catalogue.from_anatomy(args.anatomy) if args.name is None else catalogue.describe(args.name)
+    return scene if args.friction is None else scene.with_friction(args.friction)
 
 
 def main(args: Namespace) -> int:

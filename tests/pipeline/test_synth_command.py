@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.cli import main
@@ -18,6 +21,8 @@ from pipeline.cli import main
         (["bend", "--anatomy", "x.swc"], "give one of NAME"),
         (["--anatomy", "nothing.swc"], "nothing.swc: no such file"),
         (["--anatomy", "nothing.swc", "--scanner", "conebeam"], "only the catalogue's scenes"),
+        (["bend", "--friction", "-0.1"], "--friction -0.1: expected 0 to 1"),
+        (["bend", "--friction", "nan"], "--friction nan: expected 0 to 1"),
     ],
 )
 def test_wrong_words(tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], expected: str) -> None:
@@ -97,3 +102,16 @@ def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str) -> No
     words = ["synth", "oblique", "-o", str(tmp_path / "study"), "--frames", "2", "--size", "64", "--format", kind]
     assert main(words) == 0
     assert main(["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"]) == 0
+
+
+def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Path) -> None:
+    """Of every insertion: the planted error that a simulator without friction makes begins here."""
+    few, ends = ["--size", "48", "--frames", "2", "--seed", "3"], {}
+    for words in ([], ["--friction", "0.3"]):
+        out = tmp_path / (words or ["none"])[-1]
+        assert main(["synth", "bend", *few, *words, "--insertions", "2", "-o", str(out)]) == 0
+        cases = tomllib.loads((out / "manifest.toml").read_text(encoding="utf-8"))["case"]
+        assert [case["wall"]["friction"] for case in cases] == [0.3 if words else 0.0] * 2
+        truth = [json.loads((out / case["truth"]).read_text(encoding="utf-8")) for case in cases]
+        ends[out.name] = np.array([one["frames"][-1]["points_mm"][-1] for one in truth])
+    assert np.all(np.linalg.norm(ends["0.3"] - ends["none"], axis=1) > 0.01)
