@@ -24,7 +24,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
 from reports.html import render_index
-from reports.schema import ERRORS, POINTS, SUMMARY
+from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
 from tests.studies.trees import differences
 
@@ -147,9 +147,15 @@ def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.Ca
     assert not (tmp_path / "out").exists()
 
 
-def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", str(tmp_path / "junit.xml")) == 0
+def test_a_sweep_moves_the_result_and_traces_once(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, junit = tmp_path / "out", str(tmp_path / "junit.xml")
+    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", junit, "-q") == 0
+    assert f"sweep: {out / 'sweep.csv'}.  report: {out / 'index.html'}" in capsys.readouterr().out
+    point = tables.read(next(out.glob("sweep/*/cases/*/timings.csv")), TIMINGS).iloc[0]
+    assert point["clamp_s"] > 0, "most of a point's time"
+    assert point[list(point.index[2:-2])].sum() > 0.8 * point["total_s"]
     table = pd.read_csv(out / "sweep.csv")
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
@@ -264,6 +270,21 @@ def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> Non
     pd.testing.assert_frame_equal(pd.read_csv(out / "summary.csv"), pd.read_csv(finished / "summary.csv"))
     assert any((out / "cases" / "bifurcation" / "figures").glob("*.png"))
     assert main(["report", str(tmp_path / "nothing")]) == 2
+
+
+def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    path = out / "cases" / "bifurcation" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result |= {"role": "calibration", "summary": result["summary"] | {"role": "calibration"}}
+    path.write_text(json.dumps(result), encoding="utf-8")
+    (path.parent / "ledger.json").unlink()
+    assert main(["report", str(out)]) == 0
+    assert 'Nothing is scored: every case has role = "calibration"' in capsys.readouterr().out
+    assert "Nothing is scored: every case has role" in (out / "index.html").read_text(encoding="utf-8")
 
 
 def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:

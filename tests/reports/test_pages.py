@@ -70,7 +70,7 @@ def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     assert written == {s["figure"] for page in PAGES for s in declared(page)}
     for page in PAGES:
         for section in declared(page):
-            assert section["read"].endswith(".")
+            assert section["read"].rstrip("}").endswith(".")
             assert section["bad"].startswith(("Bad:", "Look"))
 
 
