@@ -75,10 +75,11 @@ class Difference:
             return f"{n_cases} cases compared: no regression{moved}"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
-        shown = [f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after", "allowed"]]]
+        was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
+        allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
         return (
             f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
-            f"{shown[0]} -> {shown[1]} (allowed {shown[2]}){moved}"
+            f"{was} -> {now}{allowed}{moved}"
         )
 
 
