@@ -174,6 +174,9 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
 
 def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
     """What went wrong: frame by frame as result.json says, what errors.csv says beyond that, or the whole case."""
+    whole = [dict(row) for row in case.result.get("failures", ()) if row.get("frame") is None]
+    if whole:  # a lumen that is not found fails every frame alike: said once, as in failures.csv
+        return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in whole]
     rows = [dict(f) for f in case.result.get("frames", ()) if f.get("status") not in GOOD]
     known = [row.get("frame") for row in rows]
     others = case.errors[~case.errors["status"].isin(GOOD) & ~case.errors["frame"].isin(known)]

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from pipeline.study.manifest import Case, Manifest
 
 NAME = "manifest.toml"
-Inferred = tuple[str, tuple[str, ...]]
-"""The text of a manifest, and sentences that say where each guess comes from."""
+Inferred = tuple[str, tuple[str, ...], tuple[str, ...]]
+"""The text of a manifest, sentences that say what was seen, and what is assumed."""
 
 
 def file_of(path: Path) -> Path:
@@ -67,8 +67,8 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     path = file_of(path)
     if not path.is_dir():
         return read_manifest(path)
-    text, _ = inferred(args)
-    say(text)
+    text, seen, _ = inferred(args)
+    say("\n".join([text, *seen]))
     with tempfile.TemporaryDirectory() as passing:
         written = Path(keep or passing) / "manifest.inferred.toml"
         write_text(written, text)

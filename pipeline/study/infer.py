@@ -106,8 +106,8 @@ def infer_manifest(
     radius_mm: float | None,
     config: LoadConfig,
     base: Path | None = None,
-) -> tuple[str, tuple[str, ...]]:
-    """The text of a manifest for one case from a folder of scans, and sentences: what was seen, then what is assumed.
+) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """The text of a manifest for one case from a folder of scans; in sentences what was seen, and what is assumed.
 
     base : folder from which scans are named; None names them in full. Raises LoadError where there is nothing to go by.
     """
@@ -136,7 +136,7 @@ def infer_manifest(
         direction=[round(float(x), 5) for x in direction],
         axis=np.eye(3)[np.argmin(np.abs(direction))].tolist(),
     )
-    return text, (*seen, *notes)
+    return text, seen, tuple(notes)
 
 
 def _assumed(radius_mm: float | None, where: str) -> list[str]:

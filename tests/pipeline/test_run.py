@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import SimpleITK as sitk
+from matplotlib.colors import rgb_to_hsv
+from PIL import Image
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Curve
@@ -23,6 +26,7 @@ from pipeline.run.stages.compare import _trusted_before
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from reports import tables
+from reports.colours import TRACED, TRUE, rgb
 from reports.html import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
@@ -272,6 +276,33 @@ def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> Non
     assert main(["report", str(tmp_path / "nothing")]) == 2
 
 
+PVBATCH, DISPLAY = shutil.which("pvbatch"), shutil.which("xvfb-run")
+
+
+@pytest.mark.skipif(
+    not (PVBATCH and DISPLAY), reason="ParaView is not installed: `apt-get install paraview xvfb xauth` brings pvbatch"
+)
+def test_paraview_opens_a_real_case(finished: Path, tmp_path: Path) -> None:
+    """The lumen of both files, wires over frames with their arrays, and a picture in which each wire has its colour."""
+    folder, picture = finished / "cases" / "bifurcation" / "view", tmp_path / "paraview.png"
+    script = Path(__file__).parents[1] / "reports" / "look_in_paraview.py"
+    words = [str(DISPLAY), "-a", str(PVBATCH), str(script), str(folder), str(picture)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
+    said = json.loads(done.stdout.splitlines()[-1])
+    assert said["lumen.vtp"]["cells"] == said["lumen.stl"]["cells"] > 1000
+    assert {name for name in said if name.endswith(".pvd")} == {
+        f"wire_{k}.pvd" for k in ("simulated", "traced", "true")
+    }
+    assert said["wire_simulated.pvd"]["times"] == list(range(FRAMES))
+    points = pd.read_csv(finished / "cases" / "bifurcation" / "points.csv.gz")
+    most = points[points["frame"] == FRAMES - 1]["error_mm"].max()
+    assert said["wire_simulated.pvd"]["arrays"]["error_mm"][1] == pytest.approx(most, rel=0.1)
+    hue, saturation, _ = np.moveaxis(rgb_to_hsv(np.asarray(Image.open(picture).convert("RGB")) / 255.0), -1, 0)
+    for name, colour in (("traced", TRACED), ("true", TRUE)):  # seen through the glass of the lumen
+        near = np.abs(hue - rgb_to_hsv(rgb(colour))[0]) < 0.04
+        assert (near & (saturation > 0.4)).sum() > 50, f"no {name} wire to be seen"
+
+
 def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
     finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -397,7 +428,8 @@ def test_a_folder_of_scans_is_enough(
     words = [f"--entry={','.join(map(str, entry))}", f"--direction={','.join(map(str, direction))}"]
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), *words]) == 0
     printed = capsys.readouterr().out
-    assert "assumed: frames: 4 scans in natural order" in printed
+    assert "frames: 4 scans in natural order" in printed
+    assert printed.count("roll_deg: 0, that is") == 2, "in the manifest, and among what is assumed"
     assert "[wires.assumed]" in printed
     assert list(errors_of(tmp_path / "out")["trace_sigma_mm"].notna()) == [True] * FRAMES
 
