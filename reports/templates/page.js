@@ -96,6 +96,11 @@
     show();
     hint(box.querySelector(".scroll"), box.querySelector(".beyond"), table);
   }
+  for (const pane of all(".pan")) { // a figure that is panned on a phone
+    const look = () => pane.classList.toggle("cut", pane.scrollLeft + pane.clientWidth < pane.scrollWidth - 2);
+    pane.addEventListener("scroll", look);
+    new ResizeObserver(look).observe(pane);
+  }
   all("button[data-text]").forEach((button) => button.addEventListener("click", () => copy(button.dataset.text, button)));
 
   const open = () => {
