@@ -11,10 +11,10 @@ class FrameStatus(Enum):
     OK = "traced, simulated to its depth, converged and compared"
     SIMULATED = "simulated only: the case has no frames to compare with"
     ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
-    LOAD_FAILED = "the scan could not be read; see failures.csv for the file and the reason"
-    SEGMENT_FAILED = "no lumen could be segmented; see failures.csv for the reason"
+    LOAD_FAILED = "the scan could not be read; the message names the file and the reason"
+    SEGMENT_FAILED = "no lumen could be segmented; the message has the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
-    TRACE_FAILED = "the wire could not be followed as one curve from the entry; see failures.csv"
+    TRACE_FAILED = "the wire could not be followed as one curve from the entry; the message has the reason"
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = "the wire's contrast over noise is too low to be traced alone; give a previous curve"
@@ -36,13 +36,13 @@ class FrameStatus(Enum):
         "shape and force are not to be trusted from here on"
     )
     CURVE_MISSING = "the other simulator has no wire for this frame, which counts as one that it failed in"
-    CURVE_UNUSABLE = "the other simulator's wire cannot be used; see failures.csv for the file and the reason"
+    CURVE_UNUSABLE = "the other simulator's wire cannot be used; the message names the file and the reason"
     NOT_TO_DEPTH = (
         "the other simulator's wire is longer or shorter than the frame is deep by more than "
         "trace.length_tolerance_mm; push it to the depth in errors.csv of a run of this manifest"
     )
-    VIEW_FAILED = "the wire cannot be held against its projection; see failures.csv for the reason"
-    SIMULATE_FAILED = "the simulation stopped before this depth; see failures.csv"
+    VIEW_FAILED = "the wire cannot be held against its projection; the message has the reason"
+    SIMULATE_FAILED = "the simulation stopped before this depth; the message has the reason"
 
     @property
     def identifier(self) -> str:

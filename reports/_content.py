@@ -1,6 +1,7 @@
 """What a page says, as text: values with three significant digits, trees, cards, tables."""
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -28,6 +29,20 @@ def number(value: Any, digits: int = 3) -> str:
     if not -4 <= exponent < 6:
         return f"{value:.{digits}g}"
     return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+
+
+_IF = re.compile(r"\{([^|{}]+)\|([^{}]*)\}")
+
+
+def caption(text: str, table: pd.DataFrame) -> str:
+    """A caption, each ``{name|words}`` of it kept where the figure shows ``name``.
+
+    table : the figure's numbers: it shows the columns that have a value, and the words that stand in columns of texts.
+    """
+    shown = {str(name) for name in table if table[name].notna().any()}
+    for name in table.select_dtypes(include=["object", "string"]):
+        shown |= {value for value in table[name].unique() if isinstance(value, str)}
+    return " ".join(_IF.sub(lambda found: found[2] if found[1] in shown else "", text).split())
 
 
 def interval(low: Any, high: Any) -> str:

@@ -1,4 +1,4 @@
-"""The page of a calibration: parameters with what is seen of them, profiles, correlations, errors before and after."""
+"""The pages of a calibration and of a planned one: parameters with what is seen of them, profiles, errors."""
 
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,14 @@ COLUMNS = (
     Column("meaning", "-", "what it is", "text"),
 )
 
+PLANNED = (
+    COLUMNS[0],
+    Column("sd", "-", "one standard deviation as the planned study would find it; of a factor in percent", "text"),
+    Column("enough", "-", "a standard deviation up to which the parameter counts as seen", "text"),
+    COLUMNS[4],
+    COLUMNS[-1],
+)
+
 
 def render_calibration(out: Path, embed: bool = False) -> Path:
     """Draw the figures and write calibration.html into a folder that holds calibration.json; returns its path."""
@@ -36,10 +44,35 @@ def render_calibration(out: Path, embed: bool = False) -> Path:
         "starts": [(number(roll), number(value)) for roll, value in record["starts"]],
         "estimates": grid(table, COLUMNS, bad=[not row["seen"] for row in rows], nothing=NOTHING),
         "sections": draw_sections("calibration", record, out, embed),
+        "warnings": record.get("warnings", ()),
         "notes": record["notes"],
         "provenance": list(flatten(record["provenance"])),
     }
     return write_page("calibration.html.j2", page, out / "calibration.html")
+
+
+def render_design(out: Path) -> Path:
+    """Write design.html into a folder that holds design.json: what a planned study would tell; returns its path."""
+    record = read_json(out / "design.json")
+    rows = record["predicted"]
+    table = pd.DataFrame([_planned(row) for row in rows])
+    page = {
+        "title": "wireval: a planned calibration",
+        "unseen": [row for row in rows if not row["seen"]],
+        "predicted": grid(table, PLANNED, bad=[not row["seen"] for row in rows], nothing=NOTHING),
+        "notes": record["notes"],
+        "provenance": list(flatten(record["provenance"])),
+    }
+    return write_page("design.html.j2", page, out / "design.html")
+
+
+def _planned(row: dict[str, Any]) -> dict[str, Any]:
+    spread, enough = (
+        f"{number(100 * row[key], 2)} %" if row["logarithmic"] else number(float(row[key]), 2)
+        for key in ("sd", "enough")
+    )
+    seen = "yes" if row["seen"] else "NO"
+    return {"parameter": row["name"], "sd": spread, "enough": enough, "seen": seen, "meaning": row["what"]}
 
 
 def _row(row: dict[str, Any]) -> dict[str, Any]:

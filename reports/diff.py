@@ -27,27 +27,40 @@ Row = tuple[Any, ...]
 class Difference:
     """rows: case, frame, column, before, after, change, allowed, verdict.
 
-    verdict : same, within, better, regression, or new (only the second run has it).
+    verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed), or new
+    (only the second run has it).
     """
 
     rows: pd.DataFrame
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows for which a gate must close."""
+        """The rows that became worse."""
         return self.rows[self.rows["verdict"] == "regression"]
 
     @property
+    def moved(self) -> pd.DataFrame:
+        """The rows that are neither worse nor better, but another thing than before."""
+        return self.rows[self.rows["verdict"] == "moved"]
+
+    @property
+    def closing(self) -> pd.DataFrame:
+        """The rows for which a gate must close, in their order."""
+        return self.rows[self.rows["verdict"].isin(["regression", "moved"])]
+
+    @property
     def by_column(self) -> pd.DataFrame:
-        """Per column: pairs, median change, worst change (in the bad direction), regressions."""
+        """Per column: pairs, median change, worst change (in the bad direction, or either), regressions, moved."""
         paired = self.rows[self.rows["change"].notna()]
         worse = paired["change"] * paired["column"].map(_sign)
-        columns = paired.assign(worse=worse).groupby("column", sort=False)
+        marks = {name: paired["verdict"] == verdict for name, verdict in (("bad", "regression"), ("moved", "moved"))}
+        columns = paired.assign(worse=worse, **marks).groupby("column", sort=False)
         table = {
             "pairs": columns.size(),
             "median_change": columns["change"].median(),
             "worst": columns["worse"].max() * columns.size().index.map(_sign) + 0.0,
-            "regressions": columns["verdict"].agg(lambda verdicts: int((verdicts == "regression").sum())),
+            "regressions": columns["bad"].sum(),
+            "moved": columns["moved"].sum(),
         }
         return pd.DataFrame(table).reset_index()
 
@@ -56,14 +69,17 @@ class Difference:
         """One line for the end of the command."""
         n_cases = self.rows["case"].nunique()
         n_bad = len(self.regressions)
+        names = ", ".join(self.moved["column"].unique())
+        moved = f"; {len(self.moved)} values have moved: {names}" if names else ""
         if not n_bad:
-            return f"{n_cases} cases compared: no regression"
+            return f"{n_cases} cases compared: no regression{moved}"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
-        shown = [f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after", "allowed"]]]
+        was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
+        allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
         return (
             f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
-            f"{shown[0]} -> {shown[1]} (allowed {shown[2]})"
+            f"{was} -> {now}{allowed}{moved}"
         )
 
 
@@ -133,9 +149,11 @@ def _verdict(name: str, old: float, new: float, allowed: float) -> str:
         return "same" if old == new or math.isnan(new) else "new"
     directed = bool(ERRORS[name].better)
     worse = (new - old) * _sign(name) if directed else abs(new - old)
-    # a change of exactly the allowed size is allowed, whatever its last bit
-    if math.isnan(new) or worse > allowed * (1 + 1e-9):
+    if math.isnan(new):
         return "regression"
+    # a change of exactly the allowed size is allowed, whatever its last bit
+    if worse > allowed * (1 + 1e-9):
+        return "regression" if directed else "moved"
     return "better" if directed and worse < 0 else "within"
 
 

@@ -17,7 +17,7 @@ from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, verdict, worst_frames
+from reports.verdict import badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
 
 R = TypeVar("R")
@@ -58,7 +58,7 @@ def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed
     source = _link(path, folder, "image/png", embed)
     numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
     shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-    return {**entry, **shown, "graded": drawing.graded}
+    return {**entry, **shown, "read": _content.caption(entry["read"], drawing.table), "graded": drawing.graded}
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
@@ -100,8 +100,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     page = {
         "title": f"{case.name} - wireval",
         "name": case.name,
-        "status": result.get("status", "no result.json"),
-        "good": result.get("status") in GOOD,
+        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, case.statistics),
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
@@ -153,8 +152,8 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
     calibration = set(summary["case"][summary["role"] == "calibration"])
     page = {
         "title": "wireval",
-        **_headline(cases, bool(failures)),
-        "verdict": verdict(row),
+        **_headline(cases, bool(failures), row),
+        "verdict": verdict(row) or unscored(zip(summary["role"], summary["status"], strict=True)),
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
@@ -175,6 +174,9 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
 
 def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
     """What went wrong: frame by frame as result.json says, what errors.csv says beyond that, or the whole case."""
+    whole = [dict(row) for row in case.result.get("failures", ()) if row.get("frame") is None]
+    if whole:  # a lumen that is not found fails every frame alike: said once, as in failures.csv
+        return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in whole]
     rows = [dict(f) for f in case.result.get("frames", ()) if f.get("status") not in GOOD]
     known = [row.get("frame") for row in rows]
     others = case.errors[~case.errors["status"].isin(GOOD) & ~case.errors["frame"].isin(known)]
@@ -222,14 +224,14 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     return cases, broken
 
 
-def _headline(cases: list[CaseFiles], failed: bool) -> dict[str, Any]:
+def _headline(cases: list[CaseFiles], failed: bool, row: Mapping[str, Any]) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too."""
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     sentence = f"{len(cases)} case{'s' * (len(cases) != 1)}, {n_frames} frames: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
     good = bool(cases) and not failed
-    return {"sentence": sentence, "status": "ok" if good else "failures", "good": good}
+    return {"sentence": sentence, "badge": badge("ok" if good else "failures", good, row)}
 
 
 def _files(case_dir: Path) -> list[dict[str, str]]:

@@ -17,7 +17,7 @@ from reports.figures import declared
 from reports.html import draw_sections
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, verdict, worst_frames
+from reports.verdict import next_command, typed, unscored, verdict, worst_frames
 
 _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
@@ -103,14 +103,14 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
     page = _Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    said = verdict(row) or unscored(zip(summary["role"], summary["status"], strict=True))
     page.text(
-        f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {verdict(row)}",
-        size=11,
+        f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {said}", size=11
     )
     if len(failures):
         page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
-        said = failures[["case", "frame", "status", "message"]].head(_MOST_FAILURES)
-        for case, frame, status, text in said.to_numpy():
+        rows = failures[["case", "frame", "status", "message"]].head(_MOST_FAILURES)
+        for case, frame, status, text in rows.to_numpy():
             place = f"{case}" if pd.isna(frame) else f"{case}, frame {frame}"
             page.text(f"{place}: {status}. {textwrap.shorten(str(text), 300, placeholder='…')}")
         if len(failures) > _MOST_FAILURES:
@@ -132,7 +132,8 @@ def _draw(page: _Page, folder: Path, names: Sequence[str]) -> _Page:
     for name in names:
         path = folder / "figures" / f"{name}.png"
         if path.exists():
-            page.picture(path, entries[name], most=0.38)
+            read = _content.caption(entries[name]["read"], pd.read_csv(path.with_suffix(".csv")))
+            page.picture(path, {**entries[name], "read": read}, most=0.38)
     return page
 
 

@@ -1,17 +1,22 @@
 """The page of several simulators side by side, from simulators.csv and where.csv."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import pandas as pd
 
 from reports import _content
+from reports.case_files import find_cases, read_json
 from reports.figures.simulators import OURS, SimulatorFiles
 from reports.html import draw_sections, write_page
-from reports.schema import SIMULATORS, WHERE, Column
+from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
+from reports.verdict import badge, verdict
 
 PAGE = "simulators.html"
+_MOST_WARNINGS = 5
 
 
 def render_simulators(out_dir: Path, embed: bool = False) -> Path:
@@ -19,12 +24,15 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
     table, columns = _one_table(files.simulators)
     grid = _content.grid(table, columns, bad=table["frames_ok"] < table["frames"], nothing=_content.NOTHING)
+    folders = {name: _folder_of(out_dir, name) for name in table["simulator"]}
+    links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
-        folder = out_dir / "simulators" / name
-        row["cells"][0]["link"] = f"simulators/{quote(name)}/index.html" if folder.is_dir() else "index.html"
+        row["cells"][0]["link"] = links[name]
+    ours = _warnings(folders[OURS]) if OURS in folders else {}
     page = {
         "title": "Simulators side by side - wireval",
-        "names": list(table["simulator"]),
+        "names": list(folders),
+        "said": [{"name": name, "link": links[name]} | _said(folder, ours) for name, folder in folders.items()],
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
@@ -32,6 +40,30 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "where": _where(files.where),
     }
     return write_page("simulators.html.j2", page, out_dir / PAGE)
+
+
+def _folder_of(out_dir: Path, name: str) -> Path:
+    """Where a simulator's own pages lie: the first one's beside this page."""
+    folder = out_dir / "simulators" / name
+    return folder if folder.is_dir() else out_dir
+
+
+def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
+    """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires."""
+    whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
+    row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
+    lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
+    rest = len(lines) - _MOST_WARNINGS
+    return {
+        "badge": badge("ok" if row.get("frames_failed") == 0 else "frames failed", row.get("frames_failed") == 0, row),
+        "verdict": verdict(row) or "No frame of it has a result.",
+        "warnings": [*lines[:_MOST_WARNINGS], *[f"{rest} more warnings stand on the pages of its cases"] * (rest > 0)],
+    }
+
+
+def _warnings(folder: Path) -> dict[str, list[str]]:
+    """Of each case below an output folder."""
+    return {case.name: read_json(case / "result.json").get("warnings", []) for case in find_cases(folder)}
 
 
 def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:

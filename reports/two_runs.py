@@ -2,22 +2,24 @@
 
 import html
 import json
+import os
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+from urllib.parse import quote
 
 import pandas as pd
 
-from reports._content import grid
+from reports._content import Grid, grid
 from reports.atomic import write_bytes, write_text
 from reports.diff import Difference
 from reports.html import write_page
 from reports.schema import ERRORS, SUMMARY, Column
 
-SHOWN = 30
-"""Regressions that a text names; JSON and JUnit have all."""
+SHOWN, ON_PAGE = 30, 1000
+"""Regressions that a text and a page name; JSON and JUnit have all."""
 
 _HEADS = {
     "what": "a setting, an input, the code",
@@ -28,56 +30,72 @@ _HEADS = {
     "median_change": "second run less first run, median over the pairs",
     "worst": "the largest change for the worse",
     "regressions": "frames that became worse by more than is allowed",
+    "moved": "frames in which a value that has no better side changed by more than is allowed",
     "allowed": "by the tolerance",
     "meaning": "what the column holds",
 }
+
+
+Judged = Literal["worse", "holds", "withheld"]
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """What became of a second run against a first one.
 
-    differs : rows (what, before, after) of where they come from; pooled : rows (column, before, after) of overall.csv.
-    paired : the sentence on the ratio of their errors with its interval; pooled_worse : whether it closes the gate.
+    runs : the two folders.     differs : rows (what, before, after) of where they come from; pooled : rows (column,
+    before, after) of overall.csv.     paired : the sentence on the ratio of their errors with its interval.
+    judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
     """
 
+    runs: tuple[Path, Path]
     differs: Sequence[Mapping[str, str]]
     pooled: Sequence[Mapping[str, Any]]
     paired: str
-    pooled_worse: bool
+    judged: Judged
     frames: Difference
 
     @property
     def closed(self) -> bool:
         """Whether a gate must close."""
-        return self.pooled_worse or len(self.frames.regressions) > 0
+        return self.word != "not worse"
+
+    @property
+    def word(self) -> str:
+        """worse, moved or not worse."""
+        if self.judged == "worse" or len(self.frames.regressions):
+            return "worse"
+        return "moved" if len(self.frames.moved) else "not worse"
 
     @property
     def sentence(self) -> str:
         """The verdict in a line."""
-        pooled = "; over all frames it is worse" * self.pooled_worse
-        return f"{'WORSE' if self.closed else 'not worse'}: {self.frames.sentence}{pooled}"
+        pooled = "; over all frames it is worse" * (self.judged == "worse")
+        return f"{self.word.upper() if self.closed else self.word}: {self.frames.sentence}{pooled}"
 
-    @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """What a reader is shown, by heading: first what differs, then pooled, then frame by frame."""
-        return {
+    def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:
+        """What a reader is shown, by heading: first what differs, then pooled, then frame by frame.
+
+        most : rows of the last ones, whose headings say where they are cut.
+        """
+        lists = {
+            "What became worse": self.frames.regressions,
+            "What moved, neither worse nor better": self.frames.moved,
+        }
+        shown = {
             "What differs between the runs": pd.DataFrame(self.differs),
             "Over all frames": pd.DataFrame(self.pooled),
             "Frame by frame": self.frames.by_column,
-            self._worse: self.frames.regressions.head(SHOWN).drop(columns="verdict"),
         }
-
-    @property
-    def _worse(self) -> str:
-        """The head of the last table, which says where it is cut."""
-        count = len(self.frames.regressions)
-        return "What became worse" + f" (the first {SHOWN} of {count}; --json has all)" * (count > SHOWN)
+        for head, rows in lists.items():
+            cut = f" (the first {most} of {len(rows)}; --json has all)" * (len(rows) > most)
+            shown[head + cut] = rows.head(most).drop(columns="verdict")
+        return shown
 
     def lines(self) -> list[str]:
         """For a terminal."""
         said = []
-        for head, table in self.tables.items():
+        for head, table in self.tables().items():
             if len(table):
                 said += [f"{head}:", table.to_string(index=False, na_rep="", float_format="{:.4g}".format), ""]
         return [*said, *([self.paired] if self.paired else []), self.sentence]
@@ -88,37 +106,58 @@ class Verdict:
             "json": lambda path: write_text(path, json.dumps(self._plain(), indent=1, ensure_ascii=False) + "\n"),
             "markdown": lambda path: write_text(path, self._markdown()),
             "junit": lambda path: write_bytes(path, ET.tostring(self._junit(), encoding="utf-8", xml_declaration=True)),
-            "html": lambda path: write_page("diff.html.j2", {**self._page(), "verdict": self}, path),
+            "html": lambda path: write_page("diff.html.j2", {**self._page(path), "verdict": self}, path),
         }
         for kind, path in places.items():
             if path is not None:
                 writers[kind](path)
 
-    def _page(self) -> dict[str, Any]:
-        """Title and tables; a row of a column of errors.csv or overall.csv says what that is."""
+    def _page(self, path: Path) -> dict[str, Any]:
+        """Title, runs and tables; a row of a column of errors.csv or overall.csv says what that is.
+
+        Cases and frames are links to the pages of the second run, from where the page lies.
+        """
         known = {c.name: c.meaning for table in (SUMMARY, ERRORS) for c in table}
         grids = []
-        for head, table in self.tables.items():
+        for head, table in self.tables(ON_PAGE).items():
             if not len(table):
                 continue
             shown = table.assign(meaning=table["column"].map(known)) if "column" in table else table
             texts = {str(n): shown[n].map(lambda v: isinstance(v, str)).any() for n in shown}
             columns = [Column(n, "-", _HEADS.get(n, ""), "text" if text else "float") for n, text in texts.items()]
-            grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": grid(shown, columns)})
-        return {"title": "Two runs beside each other - wireval", "grids": grids}
+            made = grid(shown, columns)
+            if {"case", "frame"} <= set(shown):
+                self._link(made, path.parent)
+            grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": made})
+        runs = [{"name": str(run), "link": _there(run / "index.html", path.parent)} for run in self.runs]
+        return {"title": "Two runs beside each other - wireval", "grids": grids, "runs": runs}
+
+    def _link(self, made: Grid, place: Path) -> None:
+        """Link the first two cells of each row, case and frame, to the page of the second run, where it has one."""
+        for row in made["rows"]:
+            case, frame = row["cells"][0], row["cells"][1]
+            case["link"] = _there(self.runs[1] / "cases" / case["value"] / "report.html", place)
+            frame["link"] = f"{case['link']}#viewer={frame['value']}" if case["link"] and frame["value"] else ""
 
     def _plain(self) -> dict[str, Any]:
         # pandas writes what does not apply as null
-        pooled, worse = (
+        pooled, worse, moved = (
             json.loads(rows.to_json(orient="records", double_precision=12))
-            for rows in (pd.DataFrame(self.pooled), self.frames.regressions)
+            for rows in (pd.DataFrame(self.pooled), self.frames.regressions, self.frames.moved)
         )
+        first, second = map(str, self.runs)
         head = {"schema": 1, "closed": self.closed, "sentence": self.sentence, "paired": self.paired}
-        return head | {"differs": [*self.differs], "pooled": pooled, "regressions": worse}
+        head |= {"first": first, "second": second}
+        return head | {"differs": [*self.differs], "pooled": pooled, "regressions": worse, "moved": moved}
 
     def _markdown(self) -> str:
-        parts = [f"**{_cell(self.sentence)}**\n", f"{_cell(self.paired)}\n" * bool(self.paired)]
-        for head, table in self.tables.items():
+        first, second = (f"`{run}`" for run in self.runs)
+        parts = [
+            f"**{_cell(self.sentence)}**\n",
+            f"first: {first}, second: {second}\n",
+            f"{_cell(self.paired)}\n" * bool(self.paired),
+        ]
+        for head, table in self.tables().items():
             if len(table):
                 rows = [[*table.columns], ["---"] * len(table.columns), *table.to_numpy().tolist()]
                 lines = [f"| {' | '.join(map(_cell, row))} |" for row in rows]
@@ -128,21 +167,31 @@ class Verdict:
     def _junit(self) -> ET.Element:
         """A suite a case, a test a frame, and one test for the whole."""
         root, rows = ET.Element("testsuites", name="wireval diff"), self.frames.rows
-        suite = ET.SubElement(root, "testsuite", name="all", tests="1", failures=str(int(self.pooled_worse)))
+        suite = ET.SubElement(root, "testsuite", name="all", tests="1", failures=str(int(self.judged == "worse")))
+        suite.set("skipped", str(int(self.judged == "withheld")))
         test = ET.SubElement(suite, "testcase", classname="all", name="over all frames")
-        if self.pooled_worse:
+        if self.judged == "worse":
             ET.SubElement(test, "failure", type="rms_ratio", message=self.paired)
+        elif self.judged == "withheld":
+            ET.SubElement(test, "skipped", message=self.paired or "no frame counts in both runs")
         for case, mine in rows.groupby("case", sort=False):
             groups = {f"frame {frame}": group for frame, group in mine.groupby("frame", dropna=False, sort=False)}
-            bad = {name: group[group["verdict"] == "regression"] for name, group in groups.items()}
+            bad = {name: group[group["verdict"].isin(["regression", "moved"])] for name, group in groups.items()}
             suite = ET.SubElement(root, "testsuite", name=str(case), tests=str(len(groups)))
             suite.set("failures", str(sum(len(group) > 0 for group in bad.values())))
             for name, group in bad.items():
                 test = ET.SubElement(suite, "testcase", classname=str(case), name=name.replace("frame <NA>", "case"))
                 if len(group):
                     said = [f"{r.column}: {_cell(r.before)} -> {_cell(r.after)}" for r in group.itertuples()]
-                    ET.SubElement(test, "failure", type="regression", message=said[0]).text = "\n".join(said)
+                    ET.SubElement(test, "failure", type=group["verdict"].iloc[0], message=said[0]).text = "\n".join(
+                        said
+                    )
         return root
+
+
+def _there(page: Path, place: Path) -> str:
+    """A link from a folder to a page; empty where there is none."""
+    return quote(os.path.relpath(page, place)) if page.exists() else ""
 
 
 def _cell(value: Any) -> str:

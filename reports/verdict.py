@@ -30,20 +30,59 @@ def verdict(statistics: Mapping[str, Any]) -> str:
     return " ".join(filter(None, (sentence, _against(statistics))))
 
 
+NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
+
+
+def standing(statistics: Mapping[str, Any]) -> str:
+    """NO_BETTER or NOT_SHOWN; empty where the wire beats the strongest predictor, or nothing is known of that."""
+    _, skill, least = _skill(statistics)
+    return NO_BETTER if skill <= 0.0 else NOT_SHOWN if least <= 0.0 else ""
+
+
+def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, str]:
+    """The word beside a heading and its look: good, poor or bad. What ran well but is no better than a guess is poor.
+
+    statistics : a row of summary.csv or overall.csv, empty where nothing was scored.
+    """
+    poor = standing(statistics) if good else ""
+    return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
+
+
+def unscored(cases: Iterable[tuple[str, str]]) -> str:
+    """Why no error stands over a whole run, from role and status of its cases; empty where a case was to be scored."""
+    known = [(str(role), str(status)) for role, status in cases]
+    learnt = [role == "calibration" for role, _ in known]
+    if known and all(learnt):
+        return (
+            'Nothing is scored: every case has role = "calibration", and frames that parameters are learnt from say '
+            'nothing about the simulator; add insertions of role = "validation". wireval calibrate learns from these.'
+        )
+    if known and all(own or status == "simulated" for own, (_, status) in zip(learnt, known, strict=True)):
+        return "Nothing is scored: no case has scans, traces or projections of a real wire to be compared with."
+    return ""
+
+
+def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float]:
+    """A rival in words, the skill against it and the lower end of its interval; NaN for what is not known."""
+    nan = float("nan")
+    for column, name in (("skill_strongest", statistics.get("strongest_null")), ("skill", "centreline")):
+        skill, least = (statistics.get(key) for key in (column, f"{column}_low"))
+        if number(skill) != NOTHING and name:
+            rival = _rival(str(name)) if column != "skill" else "the lumen's centreline"
+            return rival, float(skill or 0.0), nan if number(least) == NOTHING else float(least or 0.0)
+    return "", nan, nan
+
+
 def _against(statistics: Mapping[str, Any]) -> str:
     """Whether the skill, and the lower end of its interval where there is one, is above zero."""
-    for column, name in (("skill_strongest", statistics.get("strongest_null")), ("skill", "centreline")):
-        skill = statistics.get(column)
-        if number(skill) != NOTHING and name:
-            least = statistics.get(f"{column}_low")
-            known = number(least) != NOTHING
-            rival = _rival(str(name)) if column != "skill" else "the lumen's centreline"
-            if float(skill or 0.0) <= 0.0:
-                return f"That is no better (skill {number(skill)}) than {rival}."
-            if known and float(least or 0.0) <= 0.0:
-                return f"It is not shown to be better (the skill's interval reaches {number(least)}) than {rival}."
-            return f"That is better (skill {number(skill)}) than {rival}."
-    return ""
+    rival, skill, least = _skill(statistics)
+    if not rival:
+        return ""
+    said = {
+        NO_BETTER: f"That is no better (skill {number(skill)})",
+        NOT_SHOWN: f"It is not shown to be better (the skill's interval reaches {number(least)})",
+    }
+    return f"{said.get(standing(statistics), f'That is better (skill {number(skill)})')} than {rival}."
 
 
 def _rival(name: str) -> str:

@@ -14,6 +14,7 @@ import jsonschema
 import pytest
 
 from pipeline.cli import main
+from pipeline.load.views import read_views
 from pipeline.study.manifest import ManifestTables
 from tests.studies import reference_pages
 
@@ -70,7 +71,7 @@ def test_blocks_run_as_typed(
         elif block["kind"] == "python":
             exec(compile(block["text"], label(page), "exec"), names)
         else:
-            assert block["kind"] in ("toml", "yaml", "text"), "what is neither run nor said not to be"
+            assert block["kind"] in ("toml", "yaml", "text", "json"), "what is neither run nor said not to be"
 
 
 @pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=label)
@@ -122,6 +123,13 @@ def test_manifests_of_the_manual_fit_the_schema_and_the_code(tmp_path: Path) -> 
     for text in texts:
         jsonschema.validate(tomllib.loads(text), made)
         ManifestTables.model_validate(tomllib.loads(text), context={"folder": tmp_path})
+
+
+def test_the_layout_of_projections_in_the_manual_is_read(tmp_path: Path) -> None:
+    (text,) = blocks(DOCS / "adapters.md", "json")
+    (tmp_path / "projections.json").write_text(text, encoding="utf-8")
+    views = read_views(tmp_path / "projections.json", 2)
+    assert [len(view.points_px) for view in views] == [3, 2]
 
 
 @pytest.mark.parametrize(

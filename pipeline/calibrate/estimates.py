@@ -17,7 +17,7 @@ from pipeline.calibrate.unknowns import Unknown
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
-OFFSETS = (-2.0, 2.0)
+OFFSETS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 """Where profiles are looked at in standard deviations, beside those at which a parameter counts as seen."""
 RISE = 1.0
 """Rise of the objective (minus twice the log-posterior) at one standard deviation."""

@@ -25,11 +25,16 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add("--set", action="append", default=[], dest="settings", metavar="TABLE.KEY=VALUE", help="one setting")
 
 
+def add_quiet(parser: argparse._ActionsContainer) -> None:
+    """-q."""
+    parser.add_argument("-q", "--quiet", action="store_true", help="print the result alone")
+
+
 def add_verbosity(parser: argparse.ArgumentParser) -> None:
     """-q and -v."""
-    how = parser.add_mutually_exclusive_group().add_argument
-    how("-q", "--quiet", action="store_true", help="print the result alone")
-    how("-v", "--verbose", action="store_true", help="print every step, those of the simulation too")
+    how = parser.add_mutually_exclusive_group()
+    add_quiet(how)
+    how.add_argument("-v", "--verbose", action="store_true", help="print every step, those of the simulation too")
 
 
 def settings_of(args: argparse.Namespace) -> "list[Setting]":

@@ -19,7 +19,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     add = parser.add_argument
     add("manifest", type=Path, metavar="MANIFEST")
-    add("-o", "--out", type=Path, required=True, metavar="OUT", help="parameters.toml and calibration.html go there")
+    add(
+        "-o",
+        "--out",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help="parameters.toml and calibration.html (or design.html) go there",
+    )
     add("--design", action="store_true", help="predict from planned lumen, wire, depths and rolls; nothing is fitted")
     add("--no-cache", action="store_true", help="neither read nor write the stage store")
     add_settings(parser)
@@ -62,17 +69,17 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         say(f"{row['name']:20s} {row['value']:10.4g}  +- {sd:8s}{verdict}")
     for warning in misfit(fit):
         say(f"warning: {warning}")
-    left_out = [case.id for case in cases if case.id not in {used.id for used in found.cases}]
-    for name in left_out:
-        say(next(note for note in found.notes if note.startswith(f"{name}: left out")))
+    for note in found.left_out:
+        say(note)
     say(f"parameters: {file_in(args.out)}  page: {render_calibration(args.out)}")
-    return 1 if left_out else 0
+    return 1 if found.left_out else 0
 
 
 def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Predict and say."""
     from pipeline.run.calibration import design
     from pipeline.run.calibration_files import write_design
+    from reports.calibration import render_design
 
     rows, notes = design(cases, config, store)
     for note in notes:
@@ -81,4 +88,5 @@ def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config
         verdict = "seen" if row.seen else "NOT SEEN"
         say(f"{row.unknown.name:20s} +- {row.sd:8.3g}  ({row.unknown.enough:g} counts as seen)  {verdict}")
     write_design(args.out / "design.json", rows, notes)
+    say(f"page: {render_design(args.out)}")
     return 0

@@ -3,7 +3,7 @@
 import argparse
 
 from pipeline.commands import add_settings, resolved_settings, say
-from pipeline.commands.given import add_manifest, given
+from pipeline.commands.given import add_manifest, assumed_in, given
 
 HELP = "list every problem of a manifest at once; reads headers only"
 
@@ -15,14 +15,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 when nothing is wrong; raises InputError with every problem."""
+    """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
 
-    (manifest, _), settings = given(args), resolved_settings(args)
+    manifest, settings = given(args), resolved_settings(args)
     problems = check(manifest.cases, settings.config)
     if problems:
         raise InputError(problems)
+    for note in assumed_in(manifest.cases):
+        say(f"assumed, not confirmed: {note}")
     frames = sum(case.frame_count for case in manifest.cases)
     say(f"{args.manifest}: {len(manifest.cases)} case(s), {frames} frames: no problem found")
     return 0

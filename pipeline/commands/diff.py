@@ -1,11 +1,12 @@
 """``wireval diff OUT_A OUT_B``: what differs, the verdict with paired intervals, frame by frame: the gate for CI."""
 
 import argparse
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from pipeline.commands import say, unwritable
+from pipeline.commands import add_quiet, say, unwritable
 
 HELP = "paired differences of two outputs; exit 1 on a regression"
 FILES = {
@@ -24,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--tolerance", type=Path, metavar="T", help="TOML, column = allowed increase; a default ships")
     for name, what in FILES.items():
         add(f"--{name}", type=Path, metavar="FILE", help=f"write {what}")
+    add_quiet(parser)
 
 
 def main(args: argparse.Namespace) -> int:
@@ -39,7 +41,7 @@ def main(args: argparse.Namespace) -> int:
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
         raise UsageError([str(error)]) from None
     verdict.write(**places)
-    for line in verdict.lines():
+    for line in [verdict.sentence] if args.quiet else verdict.lines():
         say(line)
     return 1 if verdict.closed else 0
 
@@ -53,7 +55,7 @@ def _verdict(args: argparse.Namespace) -> Any:
     from reports.diff import DEFAULT_TOLERANCE, RATIO, diff_folders, load_tolerance
     from reports.origin import what_differs
     from reports.schema import SUMMARY
-    from reports.two_runs import Verdict
+    from reports.two_runs import Judged, Verdict
 
     if not args.second.is_dir():
         raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")
@@ -66,6 +68,11 @@ def _verdict(args: argparse.Namespace) -> Any:
     rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
     pooled = [row for row in rows if row["before"] != row["after"] and pd.notna(row["before"])]
     paired = ratio(before, after)
-    worse = paired is not None and paired.low > allowed
+    judged: Judged = "holds"
+    if paired is None or math.isnan(paired.low):
+        judged = "withheld"
+    elif paired.low > allowed:
+        judged = "worse"
     differs = what_differs(args.first, args.second)
-    return Verdict(differs, pooled, paired.verdict if paired else "", worse, frames)
+    runs = args.first, args.second
+    return Verdict(runs, differs, pooled, paired.verdict if paired else "", judged, frames)

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 from pipeline.commands import resolved_settings, say
 
 if TYPE_CHECKING:
-    from pipeline.study.manifest import Manifest
+    from collections.abc import Sequence
+
+    from pipeline.study.manifest import Case, Manifest
 
 NAME = "manifest.toml"
-Inferred = tuple[str, tuple[str, ...]]
-"""The text of a manifest, and sentences that say where each guess comes from."""
+Inferred = tuple[str, tuple[str, ...], tuple[str, ...]]
+"""The text of a manifest, sentences that say what was seen, and what is assumed."""
 
 
 def file_of(path: Path) -> Path:
@@ -46,8 +48,8 @@ def add_what_is_seen(parser: argparse.ArgumentParser) -> None:
     folder("--wire-radius", type=float, metavar="MM", help="outer radius of the wire")
 
 
-def given(args: argparse.Namespace, keep: Path | None = None) -> "tuple[Manifest, tuple[str, ...]]":
-    """The manifest, and what was assumed where it is inferred from scans, which is printed.
+def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
+    """The manifest; one that is inferred from scans is printed.
 
     keep : folder in which an inferred one is left as manifest.inferred.toml; None leaves nothing.
     """
@@ -64,15 +66,18 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "tuple[Manifest
         )
     path = file_of(path)
     if not path.is_dir():
-        return read_manifest(path), ()
-    text, assumptions = inferred(args)
-    say(text)
-    for note in assumptions:
-        say(f"assumed: {note}")
+        return read_manifest(path)
+    text, seen, _ = inferred(args)
+    say("\n".join([text, *seen]))
     with tempfile.TemporaryDirectory() as passing:
         written = Path(keep or passing) / "manifest.inferred.toml"
         write_text(written, text)
-        return read_manifest(written), assumptions
+        return read_manifest(written)
+
+
+def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:
+    """What nobody has confirmed of these cases, a sentence each."""
+    return tuple(f"case {case.id!r}: {text}" for case in cases for text in case.assumed)
 
 
 def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:

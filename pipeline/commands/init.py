@@ -29,12 +29,14 @@ def main(args: argparse.Namespace) -> int:
     path: Path = args.to or args.manifest / NAME
     if path.exists():
         raise UsageError([f"{path}: is there already; correct it, or write another with --to FILE"])
-    text, assumptions = inferred(args, beside=args.to is None)
-    head = [f"# {'assumed: ' * bool(n)}{note}" for n, note in enumerate(("correct what is assumed here", *assumptions))]
-    write_text(path, "\n".join([*head, "", text]))
+    text, seen, assumed = inferred(args, beside=args.to is None)
+    head = (
+        "# correct what is `assumed` below, and take each line out that you have confirmed: pages repeat what is left"
+    )
+    write_text(path, f"{head}\n\n{text}")
     read_manifest(path)
     say(f"written: {path}")
-    for note in assumptions:
-        say(f"assumed: {note}")
+    for note in (*seen, *(f"assumed: {text}" for text in assumed)):
+        say(note)
     say(f"correct it, then: wireval check {path} && wireval run {path} -o OUT")
     return 0

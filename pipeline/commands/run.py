@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, add_verbosity, resolved_settings, say, settings_of
-from pipeline.commands.given import add_calibrated, add_manifest, given
+from pipeline.commands.given import add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -85,7 +85,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
 
     if args.executor:  # workers elsewhere know nothing of this process's working folder
         args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
-    manifest, assumptions = given(args, None if args.dry_run else args.out)
+    manifest = given(args, None if args.dry_run else args.out)
     settings = resolved_settings(args)
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
@@ -97,11 +97,11 @@ def _plan(args: argparse.Namespace) -> "Plan":
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
     cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
+    notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
     for note in notes:
         say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
-    notes = (*assumptions, *notes)
     return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 

@@ -91,6 +91,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
             others = None if files is None else Others.model_validate(stated | ({"files": files} if files else {}))
             cases.append(case.model_copy(update={"simulated": others}))
         out = args.out / "simulators" / name if plans else args.out
-        template = Job(cases[0], settings, out, cache=default_root(), fresh=args.fresh, embed=args.embed)
+        how = {"fresh": args.fresh, "embed": args.embed, "simulator": name}
+        template = Job(cases[0], settings, out, cache=default_root(), **how)
         plans[name] = Plan(manifest, tuple(cases), template, workers=args.jobs, assumptions=notes)
     return plans

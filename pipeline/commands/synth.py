@@ -6,7 +6,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from pipeline.commands import complain, say
+from pipeline.commands import add_quiet, complain, say
 from pipeline.status import did_you_mean
 
 HELP = "write a synthetic study with truth, as real files"
@@ -38,6 +38,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add(
         "--scanner", default="psf", choices=("psf", "conebeam"), help="ideal, or 3D rotational X-ray (extra [conebeam])"
     )
+    add_quiet(parser)
 
 
 if TYPE_CHECKING:
@@ -110,14 +111,15 @@ def main(args: Namespace) -> int:
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
     quality = study.quality
-    say(
+    chat = (lambda _: None) if args.quiet else say
+    chat(
         f"truth: largest force residual {quality['largest_residual_N']:.1e} N; halving its resolution moves it by "
         f"{quality['halving_moves_mm']:.4f} mm"
     )
     earlier = len(earlier_files(args.out))
     if earlier:
-        say(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
-    manifest = write_study(study, args.out, format=args.format, progress=_progress)
+        chat(f"{args.out}: an earlier study is replaced: its {earlier} files are removed")
+    manifest = write_study(study, args.out, format=args.format, progress=None if args.quiet else _progress)
     say(f"{study.name}: written in {perf_counter() - clock:.0f} s.  manifest: {manifest}")
     return 0
 
@@ -161,5 +163,6 @@ def _share(args: Namespace, numbers: range) -> dict[int, str]:
     plan, written = catalogue.prepare(_scene(args), catalogue.SCANNERS[args.scanner], _wanted(args)), {}
     for number in numbers:
         written[number] = write_one_of(catalogue.insertion_into(plan, number), args.out, number + 1, args.format)
-        sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
+        if not args.quiet:
+            sys.stderr.write(f"insertion {number + 1}/{args.insertions}\n")
     return written

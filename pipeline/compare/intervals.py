@@ -74,7 +74,7 @@ def effective_frames(values: Sequence[Array]) -> float:
     """How many independent frames would tell as much: values (n,) of the frames of each insertion, in their order.
 
     Frames follow each other with one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), insertions have a
-    variance of their own. NaN where nothing can be told: no insertion of four frames.
+    variance of their own. At least 1. NaN where nothing can be told: no insertion of four frames.
     """
     own = [np.asarray(v, dtype=float) - np.mean(v) for v in values if len(v) > 3]
     if not own or not sum(float(v @ v) for v in own):
@@ -86,4 +86,5 @@ def effective_frames(values: Sequence[Array]) -> float:
     slower = (1 + r) / (1 - r)
     means = np.array([np.mean(v) for v in values])
     between = max(float(means.var(ddof=1)) - within * slower * len(means) / frames, 0.0) if len(means) > 1 else 0.0
-    return min(frames, (within + between) / (between / len(means) + within * slower / frames))
+    told = (within + between) / (between / len(means) + within * slower / frames)
+    return float(np.clip(told, 1.0, frames))

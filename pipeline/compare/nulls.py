@@ -135,7 +135,7 @@ def to_this_tip(clues: Clues, depth_mm: float, seen: Seen) -> Array | None:
 
 
 def between(_: Clues, depth_mm: float, seen: Seen) -> Array | None:
-    """The mean, at equal arc length, of the frames before and after: a ceiling, since it saw where the wire went."""
+    """The mean, at equal arc length, of the frames before and after: it saw where the wire went."""
     sides = [of_path(curve, depth_mm) for curve in (seen.previous_mm, seen.following_mm)]
     arc = samples(depth_mm, 0.5)
     both = [at_arc(curve, arc) for curve in sides if curve is not None]

@@ -19,13 +19,14 @@ from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.atomic import write_bytes
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
+from reports.verdict import unscored
 
 
 @dataclass(frozen=True)
 class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
-    sweep_lost : cases that crashed at a point of a sweep, which are none of ``cases``.
+    unscored : why there are none.     sweep_lost : cases that crashed at a point of a sweep, none of ``cases``.
     """
 
     cases: int
@@ -36,6 +37,7 @@ class Totals:
     p95_mm: float
     solver_s: float
     pooled: Mapping[str, Any] = field(default_factory=dict)
+    unscored: str = ""
     sweep_lost: int = 0
 
     @property
@@ -71,6 +73,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         float(np.percentile(points, 95)) if points.size else float("nan"),
         float(times["simulate_s"].sum()),
         whole,
+        unscored((result.role, result.status) for result in found),
     )
 
 

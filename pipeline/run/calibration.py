@@ -38,12 +38,13 @@ class CalibrationError(InputError):
 class Gathered:
     """Calibration cases and their insertions; depth_mm : what each frame's manifest states, NaN where nothing.
 
-    notes : what was left out, and what was assumed.
+    left_out : cases that cannot be used, and why.     notes : what was assumed of all, and what was warned of.
     """
 
     cases: tuple[Case, ...]
     trials: tuple[Trial, ...]
     stated_mm: tuple[np.ndarray[Any, np.dtype[np.float64]], ...]
+    left_out: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -65,7 +66,7 @@ def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> Gathered:
     """Segment and trace the cases; one that shows no wire is left out with a note."""
-    kept, trials, stated, notes = [], [], [], []
+    kept, trials, stated, left_out, notes = [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
         run = Context(case, config, store, log)
@@ -74,15 +75,15 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
         if known.failure is not None or len(frames) < LEAST_FRAMES:
             why = known.failure or f"{len(frames)} of {len(known.frames)} frames have a trace to be trusted"
-            notes.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
+            left_out.append(f"{case.id}: left out: {why}; at least {LEAST_FRAMES} are needed")
             continue
         say(f"{case.id}: {len(frames)} of {len(known.frames)} frames are fitted")
         kept.append(case)
         trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
         stated.append(np.array([frame.expected_mm for frame in frames]))
     if not trials:
-        raise CalibrationError(notes)
-    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(notes))
+        raise CalibrationError([*left_out, *notes])
+    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(left_out), tuple(notes))
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:

@@ -121,7 +121,8 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
         "starts": fit.fit.starts,
         "scale": fit.scale,
         "used": used_by(found),
-        "notes": [*misfit(fit), *found.notes],
+        "warnings": [*misfit(fit), *found.left_out],
+        "notes": found.notes,
         "provenance": code_state(),
     }
     write_json(path, {"schema": 1, **record})
@@ -129,5 +130,9 @@ def write_record(path: Path, found: Gathered, fit: Calibration) -> None:
 
 def write_design(path: Path, rows: list[Predicted], notes: tuple[str, ...]) -> None:
     """Write design.json: the predicted standard deviations of a planned study."""
-    found = [{"name": p.unknown.name, "sd": p.sd, "enough": p.unknown.enough, "seen": p.seen} for p in rows]
+    found = [
+        {"name": (u := p.unknown).name, "sd": p.sd, "enough": u.enough, "seen": p.seen, "logarithmic": u.logarithmic}
+        | {"what": u.what, "advice": "" if p.seen else ADVICE[u.name.split(":")[0]]}
+        for p in rows
+    ]
     write_json(path, jsonable({"schema": 1, "predicted": found, "notes": notes, "provenance": code_state()}))

@@ -32,7 +32,7 @@ from solver._compile import hash_of
 
 @dataclass(frozen=True)
 class Job:
-    """Everything that a worker needs for one case."""
+    """Everything that a worker needs for one case. simulator : whose wires they are, where there are several."""
 
     case: Case
     settings: Resolved
@@ -45,6 +45,12 @@ class Job:
     verbose: bool = False
     pictures: bool = True
     cores: int = 1
+    simulator: str = ""
+
+    @property
+    def label(self) -> str:
+        """What lines of progress call it."""
+        return f"{self.simulator}: {self.case.id}" if self.simulator else self.case.id
 
     @property
     def folder(self) -> Path:
@@ -102,7 +108,7 @@ def run_case(job: Job) -> None:
             paths = {source.path for source in (*job.case.frames, job.case.reference) if source is not None}
             list(readers.map(file_hash, (path for path in paths if path.exists())))
     key = job.key
-    progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
+    progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     with held(job.folder, progress.warn):
         again = _why_again(job, key)
         if again is None:

@@ -34,6 +34,7 @@ from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import Resolved, differing, to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.html import render_index
+from reports.schema import SWEEP
 from reports.verdict import next_command, typed
 
 
@@ -229,7 +230,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 
 
 def last_line(totals: Totals, index: Path) -> str:
-    """Counts, median error, time of the simulate stage and where the report lies."""
+    """Counts, median error, time of the simulate stage, and where the sweep's table and the report lie."""
     parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
@@ -238,9 +239,13 @@ def last_line(totals: Totals, index: Path) -> str:
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         parts.append(_with_interval(totals.pooled))
+    if totals.unscored:
+        parts.append(totals.unscored.rstrip("."))
     if totals.frames and totals.solver_s:
         parts.append(f"simulate {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
-    return ".  ".join(parts) + f".  report: {index}"
+    sweep = index.parent / SWEEP.file
+    parts += [f"sweep: {sweep}"] * sweep.exists()
+    return ".  ".join([*parts, f"report: {index}"])
 
 
 def _with_interval(pooled: Mapping[str, Any]) -> str:

@@ -16,6 +16,9 @@ from reports.atomic import writing
 
 Stage = Literal["load", "segment", "trace", "simulate", "compare", "report"]
 STAGES: tuple[Stage, ...] = ("load", "segment", "trace", "simulate", "compare", "report")
+Timed = Stage | Literal["clamp"]
+TIMED: tuple[Timed, ...] = (*STAGES[:3], "clamp", *STAGES[3:5])
+"""What has a column of seconds: the stages whose results are tables, and the clamp, with which `simulate` begins."""
 Progress = Callable[[str, int, int, str], None]
 """Called with stage, steps done, steps in all, and a short text."""
 
@@ -28,7 +31,7 @@ class Log:
     """
 
     progress: Progress
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys((*TIMED, "report"), 0.0))
     frame_seconds: dict[tuple[int, str], float] = field(default_factory=dict)
     assumptions: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -38,7 +41,7 @@ class Log:
     _levels: dict[str, dict[str, list[float]]] = field(default_factory=lambda: defaultdict(dict))
 
     @contextmanager
-    def timed(self, stage: Stage, frame: int | None = None) -> Iterator[None]:
+    def timed(self, stage: Timed, frame: int | None = None) -> Iterator[None]:
         """Add the time of a block to a stage, and to a frame where one is given."""
         clock = perf_counter()
         try:
@@ -50,7 +53,7 @@ class Log:
         """Note that a stage begins: the last line of the log of a case that is killed tells where it was."""
         self.progress(stage, 0, 0, "begins")
 
-    def spent(self, stage: Stage, seconds: float, frame: int | None = None) -> None:
+    def spent(self, stage: Timed, seconds: float, frame: int | None = None) -> None:
         """Add a time that was measured elsewhere."""
         self.seconds[stage] += seconds
         if frame is not None:

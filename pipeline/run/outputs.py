@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Row, Scored, is_pooled, pooled, skill_of, within
 from pipeline.model import Volume
-from pipeline.run.log import STAGES, Log
+from pipeline.run.log import TIMED, Log
 from pipeline.run.projections import projections
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.view import contact_at
+from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from reports import frames_file
 
-TIMED = STAGES[:-1]
-"""Stages whose seconds stand in the tables."""
 BEYOND = 2.0
 """Times u, beyond which an error is the model's."""
 
@@ -31,14 +30,15 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
     """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
     status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
-    good = sum(frame.ok for frame in known.frames)
+    planned = [frame for frame in known.frames if frame.status != FrameStatus.ROLL_FITTED.identifier]
+    good = sum(frame.ok for frame in planned)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
-    head |= {"frames": len(errors), "frames_ok": good, "frames_failed": len(errors) - good}
+    head |= {"frames": len(planned), "frames_ok": good, "frames_failed": len(planned) - good}
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     pairs = zip(errors, points, strict=True)
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
     if case.compared:
-        head["within_1mm"] = within(errors, len(errors))
+        head["within_1mm"] = within(errors, len(planned))
     wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)

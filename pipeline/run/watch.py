@@ -56,7 +56,7 @@ class Watch:
             return
         passed = time.time() - self._start
         rest = f", about {_clock(passed / done * (total - done))} left" if done < total else ""
-        what = job.case.id if job.pictures else f"{job.case.id} with {job.out.name}"
+        what = job.label if job.pictures else f"{job.label} with {job.out.name}"
         self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or 'finished'}\n")
         self.stream.flush()
 

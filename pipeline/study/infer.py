@@ -17,6 +17,11 @@ from pipeline.model import Array, Volume
 
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
+AT_EDGE = "the end of the wire nearest to the edge of the first frame"
+UNSUBTRACTED = (
+    "; without a reference to subtract the brightest thing there may be a filled vessel or a bone: such a guess is "
+    "several mm off, look at the first frame and correct both, or scan the phantom without the wire"
+)
 MANIFEST = """schema = 1
 
 [wires.assumed]
@@ -27,8 +32,11 @@ rest_curvature_per_mm = [[0.0, 0.15], [10.0, 0.15], [10.0, 0.0]]
 [[case]]
 id = "{id}"
 {reference}frames = [{frames}]
+assumed = [
+{assumed}]
 entry_mm = {entry}
 entry_direction = {direction}
+material_axis = {axis}
 wire = "assumed"
 """
 
@@ -98,8 +106,8 @@ def infer_manifest(
     radius_mm: float | None,
     config: LoadConfig,
     base: Path | None = None,
-) -> tuple[str, tuple[str, ...]]:
-    """The text of a manifest for one case from a folder of scans, and sentences that say where each guess comes from.
+) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """The text of a manifest for one case from a folder of scans; in sentences what was seen, and what is assumed.
 
     base : folder from which scans are named; None names them in full. Raises LoadError where there is nothing to go by.
     """
@@ -107,26 +115,37 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         raise unusable(folder, f"found no scans; allowed: {allowed}")
-    notes = [
+    seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
-    ]
+    )
+    where = ""
     if entry is None or direction is None:
-        first = load(read_header(frames[0], config), config=config)
         empty = load(read_header(reference, config), config=config) if reference else None
-        seen, direction = infer_entry(first, empty)
-        entry = seen if entry is None else entry
-        notes.append("entry_mm and entry_direction: the end of the wire nearest to the edge of the first frame")
-    radius = radius_mm or DEFAULT_RADIUS_MM
-    notes.append(f"wire: radius {radius} mm, stiffness and tip curve of a common 0.014 inch wire")
-    notes.append('roll_deg: 0, that is, a curved tip bends towards material_axis; roll_deg = "fit" where it is unknown')
-    notes.append("insertion_mm: not given, so the traced lengths are not checked against anything")
+        at, towards = infer_entry(load(read_header(frames[0], config), config=config), empty)
+        entry, direction = at if entry is None else entry, towards if direction is None else direction
+        where = AT_EDGE if reference else AT_EDGE + UNSUBTRACTED
+    notes = _assumed(radius_mm, where)
     text = MANIFEST.format(
-        radius=radius,
+        radius=radius_mm or DEFAULT_RADIUS_MM,
         id=re.sub(r"[^A-Za-z0-9._-]", "_", folder.resolve().name).lstrip("._-") or "case",
+        assumed="".join(f"  {json.dumps(note)},\n" for note in notes),
         reference=f"reference = {_named(reference, base)}\n" if reference else "",
         frames=", ".join(_named(p, base) for p in frames),
         entry=[round(float(x), 3) for x in entry],
         direction=[round(float(x), 5) for x in direction],
+        axis=np.eye(3)[np.argmin(np.abs(direction))].tolist(),
     )
-    return text, tuple(notes)
+    return text, seen, tuple(notes)
+
+
+def _assumed(radius_mm: float | None, where: str) -> list[str]:
+    """What nobody has said of a case. radius_mm : where it was said.     where : the entry was found, empty: said."""
+    stiffness = "stiffness and tip curve of a common 0.014 inch wire"
+    return [
+        f"wire: {stiffness}" if radius_mm else f"wire: radius {DEFAULT_RADIUS_MM} mm, {stiffness}",
+        *[f"entry_mm and entry_direction: {where}"] * bool(where),
+        "material_axis: the world axis least along entry_direction, as nothing tells of it",
+        'roll_deg: 0, that is, a curved tip bends towards material_axis; roll_deg = "fit" where it is unknown',
+        "insertion_mm: not given, so the traced lengths are not checked against anything",
+    ]

@@ -45,6 +45,7 @@ class Case(Strict):
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
     role: Literal["validation", "calibration"] = "validation"
+    assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
     group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
     reference: SourceText | None = None
     frames: Sources = ()

@@ -61,7 +61,7 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
     """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises InputError."""
     found: dict[str, Path] = {}
     for text in texts:
-        name, equals, place = text.rpartition("=") if "=" in text and not Path(text).exists() else ("", "", text)
+        name, equals, place = text.partition("=") if "=" in text and not Path(text).exists() else ("", "", text)
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name == "wireval":
             raise InputError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])

@@ -19,6 +19,7 @@ STAGE_COLOURS = {
     "load": "#C8C8C8",
     "segment": GREY,
     "trace": TRACED,
+    "clamp": "#F3C08A",
     "simulate": SIMULATED,
     "compare": "#E3B5E6",
     "report": INK,

@@ -135,6 +135,8 @@ def _tip_panel(axes: Axes, frame: FrameArrays, view: View) -> None:
 
 def _table(frame: FrameArrays) -> pd.DataFrame:
     parts = [points_table(points, frame=frame.frame, curve=label) for label, points in frame.curves.items()]
+    if frame.median_mm is not None:
+        parts.append(points_table(frame.median_mm, frame=frame.frame, curve="median of the ensemble"))
     nothing = pd.DataFrame([[frame.frame, "none"]], columns=["frame", "curve"])
     return pd.concat(parts or [nothing])
 

@@ -19,12 +19,10 @@ def run_time(case: CaseFiles) -> Drawing | None:
     frames, totals = case.timings[~whole], case.timings[whole]
     known = {stage: float(totals[name].sum()) for stage, name in names.items() if totals[name].sum() > 0}
     figure = new_figure(3.6)
-    left, right = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
+    panels = figure.subplots(1, 1 + bool(len(frames)), squeeze=False, width_ratios=(2.0, 1.0)[-1 - bool(len(frames)) :])
     if len(frames):
-        _stacked(left, frames, list(names))
-    else:
-        left.remove()
-    _totals(right, known)
+        _stacked(panels[0, 0], frames, [stage for stage, name in names.items() if has(frames, name)])
+    _totals(panels[0, -1], known)
     return Drawing(figure, case.timings[["case", "frame", *names.values()]])
 
 

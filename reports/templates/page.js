@@ -61,6 +61,20 @@
     setTimeout(() => { button.textContent = before; }, 1200);
   };
 
+  // What of a wide table lies beyond the edge is said, and a button goes there.
+  const hint = (pane, button, table) => {
+    const look = () => {
+      const edge = pane.getBoundingClientRect().right + 1;
+      const cut = [...table.tHead.rows[0].cells].filter((head) => head.getBoundingClientRect().right > edge).length;
+      button.hidden = !cut;
+      button.textContent = `${cut} more column${cut === 1 ? "" : "s"} \u2192`;
+      pane.classList.toggle("cut", cut > 0);
+    };
+    button.addEventListener("click", () => pane.scrollBy({ left: 0.8 * pane.clientWidth, behavior: "smooth" }));
+    pane.addEventListener("scroll", look);
+    new ResizeObserver(look).observe(pane);
+  };
+
   for (const box of all("[data-table]")) {
     const table = box.querySelector("table"), count = box.querySelector("output");
     all("thead th", table).forEach((head) => {
@@ -80,6 +94,12 @@
     all("input, select", box).forEach((control) => control.addEventListener("input", show));
     all("button[data-copy]", box).forEach((button) => button.addEventListener("click", () => copy(forms[button.dataset.copy](contentOf(table)), button)));
     show();
+    hint(box.querySelector(".scroll"), box.querySelector(".beyond"), table);
+  }
+  for (const pane of all(".pan")) { // a figure that is panned on a phone
+    const look = () => pane.classList.toggle("cut", pane.scrollLeft + pane.clientWidth < pane.scrollWidth - 2);
+    pane.addEventListener("scroll", look);
+    new ResizeObserver(look).observe(pane);
   }
   all("button[data-text]").forEach((button) => button.addEventListener("click", () => copy(button.dataset.text, button)));
 

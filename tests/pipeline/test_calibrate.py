@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration_files import misfit
 from pipeline.run.log import Log
+from pipeline.run.outputs import error_row, summary_row
 from pipeline.run.stages import Context, Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
@@ -293,7 +295,16 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert "UNIDENTIFIABLE" in capsys.readouterr().out
     page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
-    assert (study / "out" / "figures" / "profiles.png").exists()
+    lines = (study / "out" / "figures" / "profiles.csv").read_text(encoding="utf-8").splitlines()
+    assert max(Counter(line.split(",")[0] for line in lines).values()) >= 8, "a curve, not a tent"
+
+
+def test_a_planned_study_has_a_page(study, capsys):
+    assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "plan"), "--design"]) == 0
+    assert f"page: {study / 'plan' / 'design.html'}" in capsys.readouterr().out
+    page = (study / "plan" / "design.html").read_text(encoding="utf-8")
+    assert "a: 3 frames, voxels of" in page
+    assert "a tip with a curve, seen free of the wall" in page, "what would show the roll of a straight wire"
 
 
 def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
@@ -311,6 +322,8 @@ def test_a_fitted_roll_costs_the_frame_it_was_fitted_on(study):
     assert [frame.status for frame in known.frames] == ["no_wire", "roll_fitted", "ok"]
     assert [frame.roll_deg for frame in known.frames] == pytest.approx([-45.0] * 3, abs=3.0)
     assert known.frames[1].ok
+    row = summary_row(case, known, [error_row(frame) for frame in known.frames])
+    assert (row["frames"], row["frames_ok"], row["frames_failed"]) == (2, 1, 1), "what was fitted on is no result"
     assert not is_pooled({"status": known.frames[1].status}, np.ones(3))
     assert "the roll was fitted on frame 1, which is not scored" in run.log.assumptions[0]
     nothing = Known(lumen=lumen, frames=frames[:1])

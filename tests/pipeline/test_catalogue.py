@@ -34,7 +34,7 @@ def test_every_stage_is_entered_by_every_scene(outcomes: list[Outcome]) -> None:
 def test_no_error_grew_beyond_its_tolerance(outcomes: list[Outcome]) -> None:
     out = outcomes[0].folder.parents[1]
     tolerance = load_tolerance(GOLDEN / "tolerance.toml")
-    bad = diff_folders(GOLDEN, out, tolerance).regressions
+    bad = diff_folders(GOLDEN, out, tolerance).closing
     assert bad.empty, bad.to_string(index=False)
     assert main(["diff", str(GOLDEN), str(out), "--tolerance", str(GOLDEN / "tolerance.toml")]) == 0
 
@@ -47,7 +47,7 @@ def test_the_gate_closes_on_a_worse_run(outcomes: list[Outcome], tmp_path: Path)
         folder = tmp_path / "cases" / o.name
         folder.mkdir(parents=True)
         table.to_csv(folder / "errors.csv", index=False)
-    bad = diff_folders(GOLDEN, tmp_path, load_tolerance(GOLDEN / "tolerance.toml")).regressions
+    bad = diff_folders(GOLDEN, tmp_path, load_tolerance(GOLDEN / "tolerance.toml")).closing
     assert set(bad["case"]) == {"bend"}
     assert set(bad["column"]) == {"truth_rms_mm"}
 

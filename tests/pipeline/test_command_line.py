@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -80,17 +81,43 @@ def test_a_place_is_tried_without_leaving_anything(tmp_path: Path) -> None:
 def test_a_folder_is_checked_as_it_is_run(study: Path, scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study)]) == 0
     assert main(["check", str(scans)]) == 0
-    assert "assumed: reference: reference.mha" in capsys.readouterr().out
+    assert "assumed, not confirmed: case 'own_scans': wire: radius 0.18 mm" in capsys.readouterr().out
     assert not list(scans.rglob("*.toml")), "check writes nothing"
 
 
-def test_init_leaves_what_run_infers_and_names_scans_from_there(scans: Path, tmp_path: Path) -> None:
+def test_init_leaves_what_run_infers_and_names_scans_from_there(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["init", str(scans)]) == 0
     text = (scans / "manifest.toml").read_text(encoding="utf-8")
-    assert "# assumed: wire" in text
     case = tomllib.loads(text)["case"][0]
+    assert {note.partition(":")[0] for note in case["assumed"]} >= {
+        "wire",
+        "roll_deg",
+        "material_axis",
+        "entry_mm and entry_direction",
+    }
     assert case["frames"] == ["frames/frame_000.mha", "frames/frame_001.mha"]
+    capsys.readouterr()
     assert main(["check", str(scans.rename(tmp_path / "moved"))]) == 0, "the folder may be moved"
+    assert "assumed, not confirmed" in capsys.readouterr().out
+
+
+def test_a_guess_without_a_reference_is_called_poor_by_all(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    next(scans.glob("reference.*")).unlink()
+    assert main(["init", str(scans)]) == 0
+    assert "such a guess is several mm off" in capsys.readouterr().out
+    assert main(["check", str(scans)]) == 0
+    assert "such a guess is several mm off" in capsys.readouterr().out
+    main(["run", str(scans), "-o", str(tmp_path / "out"), "--until", "load", "-q"])
+    case = json.loads(next((tmp_path / "out").glob("cases/*/result.json")).read_text(encoding="utf-8"))
+    assert {text.partition(":")[0] for text in case["assumptions"]} >= {"wire", "roll_deg", "material_axis"}
+    assert main(["init", str(scans), "--to", str(tmp_path / "m.toml"), "--entry", "1,2,3", "--direction", "0,0,1"]) == 0
+    told = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
+    assert (told["entry_mm"], told["entry_direction"]) == ([1, 2, 3], [0, 0, 1])
+    assert not [text for text in told["assumed"] if text.startswith("entry")]
 
 
 def test_settings_are_a_file_that_reads_back_as_the_defaults(

@@ -102,6 +102,11 @@ def test_frames_that_resemble_their_neighbours_count_less(
     assert 0.6 * expected < np.median(found) < 1.4 * expected
 
 
+def test_frames_tell_at_least_as_much_as_one() -> None:
+    """Five frames that climb steadily: their correlation alone would make a third of a frame of them."""
+    assert intervals.effective_frames([np.linspace(1.0, 2.0, 5)]) == 1.0
+
+
 def test_nothing_to_tell_is_not_a_number() -> None:
     assert np.isnan(intervals.effective_frames([np.ones(2), np.ones(3)]))
     assert np.isnan(intervals.effective_frames([np.ones(9)]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.run.case import Job
@@ -68,6 +69,12 @@ def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:
     silent.finished(batch[0])
     assert len(stream.getvalue().splitlines()) == 2
     assert not Watch(batch, lines=True, stream=Terminal()).bar
+
+
+def test_lines_name_the_simulator_where_there_are_several(tmp_path: Path) -> None:
+    job = jobs(tmp_path, 1)[0]
+    assert job.label == "c0"
+    assert replace(job, simulator="sofa").label == "sofa: c0"
 
 
 def test_the_share_that_is_done_only_grows() -> None:

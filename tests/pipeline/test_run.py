@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import SimpleITK as sitk
+from matplotlib.colors import rgb_to_hsv
+from PIL import Image
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Curve
@@ -26,8 +29,9 @@ from pipeline.run.stages.known import Frame
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from reports import tables
+from reports.colours import TRACED, TRUE, rgb
 from reports.html import render_index
-from reports.schema import ERRORS, POINTS, SUMMARY
+from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
 from tests.studies.trees import differences
 
@@ -150,9 +154,15 @@ def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.Ca
     assert not (tmp_path / "out").exists()
 
 
-def test_a_sweep_moves_the_result_and_traces_once(study: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", str(tmp_path / "junit.xml")) == 0
+def test_a_sweep_moves_the_result_and_traces_once(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, junit = tmp_path / "out", str(tmp_path / "junit.xml")
+    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", junit, "-q") == 0
+    assert f"sweep: {out / 'sweep.csv'}.  report: {out / 'index.html'}" in capsys.readouterr().out
+    point = tables.read(next(out.glob("sweep/*/cases/*/timings.csv")), TIMINGS).iloc[0]
+    assert point["clamp_s"] > 0, "most of a point's time"
+    assert point[list(point.index[2:-2])].sum() > 0.8 * point["total_s"]
     table = pd.read_csv(out / "sweep.csv")
     assert list(table["parameter"]) == ["(plain)", "simulate.roll_offset_deg", "simulate.roll_offset_deg"]
     assert table["rms_mm"].nunique() == 3
@@ -281,6 +291,48 @@ def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> Non
     assert main(["report", str(tmp_path / "nothing")]) == 2
 
 
+PVBATCH, DISPLAY = shutil.which("pvbatch"), shutil.which("xvfb-run")
+
+
+@pytest.mark.skipif(
+    not (PVBATCH and DISPLAY), reason="ParaView is not installed: `apt-get install paraview xvfb xauth` brings pvbatch"
+)
+def test_paraview_opens_a_real_case(finished: Path, tmp_path: Path) -> None:
+    """The lumen of both files, wires over frames with their arrays, and a picture in which each wire has its colour."""
+    folder, picture = finished / "cases" / "bifurcation" / "view", tmp_path / "paraview.png"
+    script = Path(__file__).parents[1] / "reports" / "look_in_paraview.py"
+    words = [str(DISPLAY), "-a", str(PVBATCH), str(script), str(folder), str(picture)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
+    said = json.loads(done.stdout.splitlines()[-1])
+    assert said["lumen.vtp"]["cells"] == said["lumen.stl"]["cells"] > 1000
+    assert {name for name in said if name.endswith(".pvd")} == {
+        f"wire_{k}.pvd" for k in ("simulated", "traced", "true")
+    }
+    assert said["wire_simulated.pvd"]["times"] == list(range(FRAMES))
+    points = pd.read_csv(finished / "cases" / "bifurcation" / "points.csv.gz")
+    most = points[points["frame"] == FRAMES - 1]["error_mm"].max()
+    assert said["wire_simulated.pvd"]["arrays"]["error_mm"][1] == pytest.approx(most, rel=0.1)
+    hue, saturation, _ = np.moveaxis(rgb_to_hsv(np.asarray(Image.open(picture).convert("RGB")) / 255.0), -1, 0)
+    for name, colour in (("traced", TRACED), ("true", TRUE)):  # seen through the glass of the lumen
+        near = np.abs(hue - rgb_to_hsv(rgb(colour))[0]) < 0.04
+        assert (near & (saturation > 0.4)).sum() > 50, f"no {name} wire to be seen"
+
+
+def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    path = out / "cases" / "bifurcation" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result |= {"role": "calibration", "summary": result["summary"] | {"role": "calibration"}}
+    path.write_text(json.dumps(result), encoding="utf-8")
+    (path.parent / "ledger.json").unlink()
+    assert main(["report", str(out)]) == 0
+    assert 'Nothing is scored: every case has role = "calibration"' in capsys.readouterr().out
+    assert "Nothing is scored: every case has role" in (out / "index.html").read_text(encoding="utf-8")
+
+
 def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     assert main(["diff", str(finished), str(finished)]) == 0
     worse = tmp_path / "worse"
@@ -394,7 +446,8 @@ def test_a_folder_of_scans_is_enough(
     words = [f"--entry={','.join(map(str, entry))}", f"--direction={','.join(map(str, direction))}"]
     assert main(["run", str(folder), "-o", str(tmp_path / "out"), *words]) == 0
     printed = capsys.readouterr().out
-    assert "assumed: frames: 4 scans in natural order" in printed
+    assert "frames: 4 scans in natural order" in printed
+    assert printed.count("roll_deg: 0, that is") == 2, "in the manifest, and among what is assumed"
     assert "[wires.assumed]" in printed
     assert list(errors_of(tmp_path / "out")["trace_sigma_mm"].notna()) == [True] * FRAMES
 

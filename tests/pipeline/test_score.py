@@ -20,6 +20,7 @@ from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
 from pipeline.simulate.others import begun, not_to_depth, oddity
+from pipeline.study.others import named
 from reports.export import write_markups_curve, write_polyline_vtp
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
 
@@ -66,6 +67,10 @@ def test_a_trace_that_begins_at_its_tip_fails_by_name(known: Known) -> None:
     assert main(["run", str(folder / "turned.toml"), "-o", str(folder / "out-turned"), *QUICK]) == 1
     assert list(errors_of(folder / "out-turned")["status"])[1] == "trace_failed"
     assert "tip first" in (folder / "out-turned" / "failures.csv").read_text(encoding="utf-8")
+
+
+def test_a_folder_of_a_sweep_may_be_scored() -> None:
+    assert named(["mine=out/sweep/simulate.friction=0.2"]) == {"mine": Path("out/sweep/simulate.friction=0.2")}
 
 
 SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")

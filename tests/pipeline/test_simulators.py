@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.run.simulators import write_comparison
 from reports import tables
-from reports.schema import ERRORS, POINTS
+from reports.schema import ERRORS, POINTS, SUMMARY
 from reports.simulators import render_simulators
 
 Array = NDArray[np.float64]
@@ -108,6 +108,23 @@ def test_the_page(compared: Path) -> None:
     assert "rms_<wbr>ratio_<wbr>to_<wbr>wireval" in page
     assert page.count('<tr class="bad">') == 1, "the one with failed frames"
     assert (compared / "figures" / "who_is_nearest.png").exists()
+
+
+def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -> None:
+    """`score` writes the first simulator beside the page; a warning that our wires get, too, is none of another's."""
+    for name, skill in (("tip", 0.5), ("worse", -1.0), ("wireval", 0.4)):
+        (compared / "simulators").mkdir(exist_ok=True)
+        folder = (compared / name).rename(compared / "simulators" / name)
+        row = {"frames_failed": 0, "rms_mm": 0.3, "skill_strongest": skill, "strongest_null": "previous"}
+        tables.write(folder / "overall.csv", SUMMARY, [row])
+        path = folder / "cases" / "c0" / "result.json"
+        own = ["a faint frame", *["3 frames: with x and y turned most would not: are they RAS?"] * (name == "worse")]
+        path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"warnings": own}), encoding="utf-8")
+    page = render_simulators(compared).read_text(encoding="utf-8")
+    assert '<span class="status poor">no better than a guess</span>' in page
+    assert page.count('<span class="status good">ok</span>') == 2
+    assert "c0: 3 frames: with x and y turned most would not: are they RAS?" in page
+    assert "a faint frame" not in page
 
 
 def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:

@@ -62,6 +62,11 @@ def test_a_study_written_over_an_earlier_one_says_so(tmp_path: Path, capsys: pyt
     for frames in ("3", "2"):
         assert main([*words, "--frames", frames]) == 0
     assert "an earlier study is replaced: its 6 files are removed" in capsys.readouterr().out
+    assert main([*words, "--frames", "2", "-q"]) == 0
+    quiet = capsys.readouterr()
+    assert len(quiet.out.splitlines()) == 1
+    assert "manifest: " in quiet.out
+    assert quiet.err == ""
     assert len(list((tmp_path / "study" / "frames").iterdir())) == 2
     (tmp_path / "study" / "frames" / "mine.mha").write_bytes(b"")
     assert main([*words, "--frames", "2"]) == 2

@@ -12,7 +12,7 @@ from pipeline.cli import main
 from pipeline.run.simulators import write_comparison
 from reports import tables
 from reports.bench import render_bench
-from reports.calibration import render_calibration
+from reports.calibration import render_calibration, render_design
 from reports.schema import ERRORS
 from reports.simulators import render_simulators
 from tests.pipeline.test_simulators import even, write_tree
@@ -21,7 +21,8 @@ from tests.reports.test_bench import fake_bench
 
 def write_pages(run: Path, folder: Path) -> list[Path]:
     """Write them into a folder; ``run`` is a run's output."""
-    return [_diff(run, folder), _simulators(folder / "score"), _calibration(folder / "cal"), _bench(folder / "bench")]
+    made = [_diff(run, folder), _simulators(folder / "score"), _calibration(folder / "cal"), _bench(folder / "bench")]
+    return [*made, _design(folder / "plan")]
 
 
 def _diff(run: Path, folder: Path) -> Path:
@@ -54,11 +55,21 @@ def _calibration(folder: Path) -> Path:
         "starts": [[0.5, 57.0]],
         "scale": 1.0,
         "used": [{"case": "a"}],
+        "warnings": ["the calibrated wires lie 3.0 times as far from the traces as these are taken to be off"],
         "notes": ["a: nothing is known of the wall"],
         "provenance": {"wireval": "0.1.0"},
     }
     (folder / "calibration.json").write_text(json.dumps(record), encoding="utf-8")
     return render_calibration(folder)
+
+
+def _design(folder: Path) -> Path:
+    folder.mkdir()
+    told = {"enough": 0.25, "logarithmic": True, "what": "a factor", "advice": "a sharper bend"}
+    rows = [{"name": n, "sd": s, "seen": s < 1, **told} for n, s in (("taper", 0.1), ("wall", 1.5))]
+    record = {"predicted": rows, "notes": ["a: 4 frames, voxels of 0.30 mm"], "provenance": {"wireval": "0.1.0"}}
+    (folder / "design.json").write_text(json.dumps(record), encoding="utf-8")
+    return render_design(folder)
 
 
 def _bench(folder: Path) -> Path:

@@ -6,6 +6,7 @@ Skipped without playwright (extra ``browser``) or a Chromium on the path.
 from __future__ import annotations
 
 import importlib.util
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -188,6 +189,21 @@ def test_tables_sort_filter_and_copy(run: Path, opened: Opener) -> None:
     assert copies["Markdown"].splitlines()[1].startswith("| --- | ---")
     assert r"frames\_ok" in copies["LaTeX"]
     assert r"\end{tabular}" in copies["LaTeX"]
+
+
+def test_what_of_a_wide_table_is_out_of_sight_is_said_and_reached(run: Path, opened: Opener) -> None:
+    page = opened(run / "cases" / "good" / "report.html", NARROW)
+    box = page.locator("[data-table]").first
+    button, pane = box.locator("button.beyond"), box.locator(".scroll")
+    said = button.inner_text()
+    assert re.fullmatch(r"\d+ more columns →", said)
+    button.click()
+    page.wait_for_timeout(700)
+    assert pane.evaluate("pane => pane.scrollLeft") > 100
+    assert int(button.inner_text().split()[0]) < int(said.split()[0])
+    pane.evaluate("pane => { pane.scrollLeft = pane.scrollWidth; }")
+    page.wait_for_timeout(200)
+    assert not button.is_visible()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

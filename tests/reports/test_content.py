@@ -35,6 +35,13 @@ def test_numbers(value: Any, text: str) -> None:
     assert _content.number(value) == text
 
 
+def test_a_caption_speaks_of_what_is_there() -> None:
+    text = "Dashed: simulated{band|, in its band}{u_mm|; bars: u}."
+    table = pd.DataFrame({"curve": ["simulated", "band"], "u_mm": [math.nan, math.nan]})
+    assert _content.caption(text, table) == "Dashed: simulated, in its band."
+    assert _content.caption(text, pd.DataFrame({"u_mm": [1.0]})) == "Dashed: simulated; bars: u."
+
+
 def test_intervals_need_both_ends() -> None:
     assert _content.interval(0.1, 0.25) == "0.100 to 0.250"
     assert _content.interval(None, 0.25) == ""

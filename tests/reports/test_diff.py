@@ -36,7 +36,7 @@ def _row(**changes: object) -> dict[str, object]:
         ({"skill": 0.74}, "skill", "regression"),
         ({"skill": 0.99}, "skill", "better"),
         ({"branch_ok": False}, "branch_ok", "regression"),
-        ({"insertion_mm": 29.7}, "insertion_mm", "regression"),
+        ({"insertion_mm": 29.7}, "insertion_mm", "moved"),
         ({"insertion_mm": 30.1}, "insertion_mm", "within"),
         ({"rms_mm": None}, "rms_mm", "regression"),
         ({"status": "no_wire"}, "status", "regression"),
@@ -49,6 +49,8 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
     others = rows.drop(index=column)
     assert set(others["verdict"]) == {"same"}
     assert len(found.regressions) == (verdict == "regression")
+    assert len(found.closing) == (verdict in ("regression", "moved"))
+    assert ("1 values have moved: insertion_mm" in found.sentence) == (verdict == "moved")
 
 
 def test_a_recovered_frame_is_no_regression() -> None:
@@ -65,7 +67,7 @@ def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None
     bad = found.regressions[["case", "column", "after"]].to_numpy().tolist()
     assert bad == [["a", "frame", "missing"], ["b", "case", "missing"]]
     assert found.rows[found.rows["verdict"] == "new"]["case"].tolist() == ["c"]
-    assert "2 regressions" in found.sentence
+    assert found.sentence.endswith("2 regressions; the first: case a frame 1, frame present -> missing")
 
 
 @settings(max_examples=30, deadline=None)

@@ -70,7 +70,7 @@ def test_every_declared_section_has_a_figure_and_the_reverse() -> None:
     assert written == {s["figure"] for page in PAGES for s in declared(page)}
     for page in PAGES:
         for section in declared(page):
-            assert section["read"].endswith(".")
+            assert section["read"].rstrip("}").endswith(".")
             assert section["bad"].startswith(("Bad:", "Look"))
 
 
@@ -172,6 +172,25 @@ def test_what_was_simulated_stands_on_the_page(run: Path) -> None:
     page = (folder / "report.html").read_text(encoding="utf-8")
     for text in ("catheter.radius_mm", "catheter.insertion_mm", "<code>down</code>", "half as long ones lie within"):
         assert text in page, text
+
+
+def test_captions_speak_of_no_budget_where_none_was_drawn(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=3),))
+    page = render_case(out / "cases" / "c").read_text(encoding="utf-8")
+    assert "Solid: the wire traced in the scan; dashed: the simulated wire; dots: the tips." in page
+    for absent in ("median of the ensemble", "two standard deviations", "u_val is what", "{"):
+        assert absent not in " ".join(re.findall(r"<figcaption>(.*?)</figcaption>", page, re.S)), absent
+
+
+def test_a_lumen_that_is_not_found_is_one_failure_not_one_a_frame(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("c", frames=3),))
+    path = out / "cases" / "c" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    told = {"case": "c", "stage": "segment", "status": "segment_failed", "sentence": "no lumen", "message": "grey"}
+    frames = [row | told for row in result["frames"]]
+    changed = result | {"status": "segment_failed", "frames": frames, "failures": [told]}
+    path.write_text(json.dumps(changed), encoding="utf-8")
+    assert "Failures (1)" in render_case(path.parent).read_text(encoding="utf-8")
 
 
 def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:

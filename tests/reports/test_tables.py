@@ -40,7 +40,7 @@ SUMMARY_HEADER = (
     "null_pinned_rms_mm,null_neighbours_rms_mm,num_mm,u_input_mm,u_val_mm,share_beyond_2u,log_score_bits,"
     "energy_score_mm"
 )
-TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,simulate_s,compare_s,total_s,peak_memory_MiB"
+TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,clamp_s,simulate_s,compare_s,total_s,peak_memory_MiB"
 FAILURES_HEADER = "case,frame,stage,status,sentence,message,log"
 
 

@@ -90,6 +90,7 @@ def test_a_frame_that_became_worse_stands_in_every_file(first: Path, second: Pat
     rows = tables.read(path, ERRORS)
     rows.loc[2, "tip_mm"] += 1.0
     tables.write(path, ERRORS, rows)
+    (second / "cases" / "b" / "report.html").touch()
     files = {kind: tmp_path / f"diff.{kind}" for kind in ("json", "markdown", "junit", "html")}
     asked = [word for kind, file in files.items() for word in (f"--{kind}", str(file))]
     assert main(["diff", str(first), str(second), *asked]) == 1
@@ -102,7 +103,34 @@ def test_a_frame_that_became_worse_stands_in_every_file(first: Path, second: Pat
     assert bad is not None
     assert bad.get("name") == "frame 2"
     assert "| b | 2 | tip_mm |" in files["markdown"].read_text(encoding="utf-8")
-    assert "tip_mm" in files["html"].read_text(encoding="utf-8")
+    page = files["html"].read_text(encoding="utf-8")
+    assert "tip_mm" in page
+    assert str(first) in page, "which runs these are"
+    assert str(second) in page
+    assert '<a href="second/cases/b/report.html#viewer=2">2</a>' in page
+
+
+def test_a_depth_that_moved_closes_the_gate_and_is_not_called_worse(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = second / "cases" / "b" / ERRORS.file
+    rows = tables.read(path, ERRORS)
+    rows.loc[2, "insertion_mm"] += 1.0
+    tables.write(path, ERRORS, rows)
+    assert main(["diff", "-q", str(first), str(second), "--junit", str(tmp_path / "diff.xml")]) == 1
+    said = capsys.readouterr().out
+    assert said == "MOVED: 3 cases compared: no regression; 1 values have moved: insertion_mm\n"
+    assert [f.get("type") for f in ET.parse(tmp_path / "diff.xml").findall(".//failure")] == ["moved"]
+
+
+def test_what_too_few_insertions_cannot_tell_is_skipped_not_passed(first: Path, tmp_path: Path) -> None:
+    two = [shutil.copytree(first, tmp_path / name) for name in ("one", "other")]
+    for out in two:
+        shutil.rmtree(out / "cases" / "c")
+    assert main(["diff", *map(str, two), "--junit", str(tmp_path / "diff.xml")]) == 0
+    skipped = ET.parse(tmp_path / "diff.xml").findall(".//testcase[@name='over all frames']/skipped")
+    assert len(skipped) == 1
+    assert "at least 3 needed" in str(skipped[0].get("message"))
 
 
 def test_what_is_missing_is_worse(first: Path, second: Path, tmp_path: Path) -> None:
@@ -138,6 +166,6 @@ def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
     from reports.diff import diff_folders
 
     frames = diff_folders(first, first, {})
-    verdict = Verdict([{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", False, frames)
+    verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
     assert "a\\|b &lt;c&gt;" in verdict._markdown()
-    assert replace(verdict, pooled_worse=True).closed
+    assert replace(verdict, judged="worse").closed

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import next_command, typed, verdict, worst_frames
+from reports.verdict import badge, next_command, typed, unscored, verdict, worst_frames
 
 
 @pytest.mark.parametrize(
@@ -26,6 +26,29 @@ def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None
     # a newcomer is told what "roll unknown" means
     rival = "the simulator that does not know the roll, mean of 12 wires 30 degrees apart."
     assert text.endswith(f"{said}the strongest trivial predictor: {rival}")
+
+
+@pytest.mark.parametrize(
+    ("skill", "low", "text", "look"),
+    [
+        (0.9, 0.7, "ok", "good"),
+        (0.9, None, "ok", "good"),
+        (None, None, "ok", "good"),
+        (0.4, -0.1, "not shown to be better than a guess", "poor"),
+        (-0.2, None, "no better than a guess", "poor"),
+    ],
+)
+def test_no_green_badge_beside_a_negative_skill(skill: float | None, low: float | None, text: str, look: str) -> None:
+    row = {"skill_strongest": skill, "skill_strongest_low": low, "strongest_null": "previous"}
+    assert badge("ok", True, row) == {"text": text, "look": look}
+    assert badge("no_wire", False, row) == {"text": "no_wire", "look": "bad"}
+
+
+def test_a_run_without_a_score_says_why() -> None:
+    assert unscored([("calibration", "ok"), ("calibration", "no_wire")]).startswith("Nothing is scored: every case")
+    assert "to be compared with" in unscored([("validation", "simulated"), ("calibration", "ok")])
+    assert unscored([("validation", "no_wire"), ("calibration", "ok")]) == ""
+    assert unscored([]) == ""
 
 
 def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:

@@ -29,6 +29,7 @@ NOTE = "*Written by `make pages` from the code; do not edit.*\n"
 KEYS = {
     "id": "Name of the case and of its folder in OUT.",
     "role": "What the case is for: a calibration case counts in no score.",
+    "assumed": "What nobody has confirmed yet, a sentence each; `init` writes them, `check` and the pages repeat them.",
     "group": "Insertions of one group are one unit of the intervals. Default: the case itself.",
     "reference": "Scan without the wire. Without it the lumen is segmented from the first frame.",
     "frames": "With the wire: a pattern in natural order, or a list; files, DICOM folders, `study.h5#/frames`.",

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from pipeline.load import read_headers
 from pipeline.load.curves import read_truth
 from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.study.manifest import not_one_per_frame
+from pipeline.study.manifest import Case, not_one_per_frame
 
 
 def open_case(run: Context, known: Known) -> Known:
@@ -15,7 +17,7 @@ def open_case(run: Context, known: Known) -> Known:
     case = run.case
     with run.log.timed("load"):
         scans = read_headers(case.reference, case.frames, run.config.load, case.spacing_mm)
-    run.log.assumptions += scans.assumed
+    run.log.assumptions += [*case.assumed, *_axis_assumed(case), *scans.assumed]
     count = len(scans.frames) or case.frame_count
     wrong = not_one_per_frame(case.lists, count)
     if wrong:
@@ -36,6 +38,14 @@ def open_case(run: Context, known: Known) -> Known:
         truth = read_truth(case.truth, count)
         frames = [replace(f, truth_mm=points) for f, points in zip(frames, truth, strict=True)]
     return replace(known, scans=scans, frames=tuple(frames))
+
+
+def _axis_assumed(case: Case) -> list[str]:
+    """A sentence where a wire with a curved tip is turned by a roll whose zero nobody has stated."""
+    curved = bool(np.any(np.atleast_2d(case.wire.rest_curvature_per_mm)[:, -1]))
+    if not curved or case.material_axis is not None or case.roll_deg == "fit":
+        return []
+    return ["material_axis is not stated: at roll 0 the tip bends towards the world axis least along entry_direction"]
 
 
 def each_frame(given: float | tuple[float, ...], count: int) -> tuple[float, ...]:

@@ -26,14 +26,16 @@ NEARLY_MM = 1.0
 
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
-    known = with_fitted_roll(run, known)
-    clamp = clamp_of(run, known)
+    with run.log.timed("clamp"):
+        known = with_fitted_roll(run, known)
+        clamp = clamp_of(run, known)
     known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
     if run.case.simulated is None:
         return _replayed(run, known)
     try:
         # the predictors that are simulations need segments of some length: those that the solver would choose
-        segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
+        with run.log.timed("simulate"):
+            segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
     except StageError:
         segment = float("nan")
     return replace(known, frames=frames_of_others(run, known), segment_mm=segment)
