@@ -52,6 +52,11 @@ class Job:
         return self.out / "cases" / self.case.id
 
     @property
+    def simulates(self) -> bool:
+        """Whether the solver is needed."""
+        return self.until in ("simulate", "compare", "report")
+
+    @property
     def wants_pages(self) -> ledger.Pages:
         """Which pages are asked for."""
         if not self.pictures or self.until != "report":
@@ -98,9 +103,7 @@ def _why_again(job: Job, key: str) -> str | None:
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
     if job.cores > 1:
-        with ThreadPoolExecutor(job.cores) as readers:  # files are hashed outside of the interpreter
-            paths = {source.path for source in (*job.case.frames, job.case.reference) if source is not None}
-            list(readers.map(file_hash, (path for path in paths if path.exists())))
+        _hashed(job)
     key = job.key
     progress = CaseProgress(job.case.id, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     with held(job.folder, progress.warn):
@@ -115,13 +118,22 @@ def run_case(job: Job) -> None:
         _compute(job, key, progress)
 
 
+def _hashed(job: Job) -> None:
+    """Hash the files of a case, which is done outside of the interpreter; meanwhile load what is needed for sure."""
+    with ThreadPoolExecutor(job.cores) as readers:
+        paths = {source.path for source in (*job.case.frames, job.case.reference) if source is not None}
+        hashes = readers.map(file_hash, (path for path in paths if path.exists()))
+        if job.simulates and _kernels_on_disk() and (job.fresh or ledger.read(job.folder) is None):
+            _kernels_loaded()
+        list(hashes)
+
+
 def _compute(job: Job, key: str, progress: CaseProgress) -> None:
-    simulates = job.until in ("simulate", "compare", "report")
-    if simulates:
+    if job.simulates:
         load_kernels(progress)
     clock = perf_counter()
     log = Log(progress)
-    run = Context(job.case, job.settings.config, Store(job.cache, progress.warn), log, job.cores, simulates)
+    run = Context(job.case, job.settings.config, Store(job.cache, progress.warn), log, job.cores, job.simulates)
     known = run_stages(run, job.until)
     _write(job, known, log, key, clock)
     if job.wants_pages:
@@ -180,9 +192,12 @@ def _kernels_loaded() -> float:
     return perf_counter() - clock
 
 
+def _kernels_on_disk() -> bool:
+    return bool(any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR"))
+
+
 def load_kernels(progress: CaseProgress) -> None:
     """Compile or load the solver's kernels before anything is timed; says so where it is the first run."""
-    cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
-    if not cached:
+    if not _kernels_on_disk():
         progress.say("compiling the solver, once per installation: about half a minute")
     progress.write(f"kernels ready in {_kernels_loaded():.2f} s")

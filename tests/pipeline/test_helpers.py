@@ -77,7 +77,48 @@ def test_what_a_lost_helper_leaves_is_done_here(end: Any, capfd: pytest.CaptureF
         return number + (earlier(number - 1) if number else 0)
 
     assert shared(deadly, 12, 3) == list(np.cumsum(range(12)))
-    assert ("ended by SIGKILL" in capfd.readouterr().err) == (end is killed)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("a process that helped " + ("was ended by SIGKILL" if end is killed else "met 3"))
+    assert int(line.split()[-8]) in range(1, 10)
+    assert line.endswith(" of 12 parts were done without help")
+
+
+def test_what_only_a_helper_met_is_told_and_an_error_that_comes_again_speaks_for_itself() -> None:
+    here, told = os.getpid(), list[str]()
+
+    def failing(number: int, _: Earlier[int]) -> int:
+        time.sleep(0.02)
+        if os.getpid() != here or number == never:
+            raise MemoryError("no more of it")
+        return number
+
+    never = -1
+    assert shared(failing, 6, 2, told=told.append) == list(range(6))
+    assert len(told) == 1
+    assert told[0].startswith("a process that helped met MemoryError('no more of it'): ")
+    never = 5
+    with pytest.raises(MemoryError):
+        shared(failing, 6, 2, told=told.append)
+    assert len(told) == 1
+    assert shared(failing, 3, 1, told=told.append) == [0, 1, 2]
+    assert len(told) == 1
+
+
+def test_what_kept_helpers_from_helping_stands_in_the_log(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    here = os.getpid()
+
+    def elsewhere(*given: Any, **named: Any) -> Curve:
+        if os.getpid() != here:
+            raise MemoryError("no more of it")
+        return trace(*given, **named)
+
+    monkeypatch.setattr(tracing, "trace", elsewhere)
+    run(study, tmp_path / "two", "--no-cache", "-j", "2")
+    assert "bifurcation: a process that helped met MemoryError('no more of it'): " in capfd.readouterr().err
+    log = (tmp_path / "two" / "cases" / "bifurcation" / "log.txt").read_text(encoding="utf-8")
+    assert "trace 0/0  a process that helped met MemoryError('no more of it'): " in log
 
 
 def test_without_room_for_results_or_another_process_it_is_done_alone(monkeypatch: pytest.MonkeyPatch) -> None:

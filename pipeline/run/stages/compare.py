@@ -6,7 +6,6 @@ from dataclasses import replace
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
-from pipeline.run.helpers import shared
 from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
 from pipeline.run.stages.entries import four_entries
@@ -51,7 +50,7 @@ def _all_compared(
                 done = replace(done, truth=truth)
         return done, part.log
 
-    parts = shared(one, len(known.frames), run.cores, inherited=(known.lumen, clues and clues.way))
+    parts = run.share("compare", one, len(known.frames), inherited=(known.lumen, clues and clues.way))
     for _, log in parts:
         run.log.add(log)
     return tuple(frame for frame, _ in parts)

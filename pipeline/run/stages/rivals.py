@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array
-from pipeline.run.helpers import nothing, shared
+from pipeline.run.helpers import nothing
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import insertion_of, simulate
 from pipeline.simulate.config import SimulateConfig
@@ -29,7 +29,7 @@ def simulated_rivals(run: Context, known: Known, first: Callable[[], object] = n
         return {}
     plain = run.config.simulate
     ways = [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]
-    straight, *turned = shared(lambda i, _: _wires(run, known, frames, *ways[i]), len(ways), run.cores, first)
+    straight, *turned = run.share("compare", lambda i, _: _wires(run, known, frames, *ways[i]), len(ways), first)
     found: dict[int, dict[str, Array]] = {}
     for i, frame in enumerate(frames):
         arc = samples(frame.depth_mm, run.config.compare.sample_mm)
