@@ -11,9 +11,11 @@ import argparse
 import os
 import shutil
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -31,6 +33,17 @@ def study(folder: Path, cases: int) -> Path:
     each = [case.replace('id = "bifurcation"', f'id = "case-{i:03d}"') for i in range(cases)]
     (folder / "manifest.toml").write_text(head + "".join(f"[[case]]{one}\n" for one in each), encoding="utf-8")
     return folder / "manifest.toml"
+
+
+IMPORTED = "pipeline.commands.run", "pipeline.commands.synth", workers.PRELOADED
+"""What a command imports before it begins."""
+
+
+def start_s() -> float:
+    """Seconds until a command has imported what it needs, which is done on one core."""
+    clock = time.perf_counter()
+    subprocess.run([sys.executable, "-c", f"import {', '.join(IMPORTED)}"], check=True)
+    return time.perf_counter() - clock
 
 
 def said(words: list[str]) -> float:
@@ -102,12 +115,15 @@ def main() -> int:
     parser.add_argument("--size", type=int, default=256, help="of its scans, voxels")
     parser.add_argument("--one-case", action="store_true", help="that row alone")
     given = parser.parse_args()
+    for module in IMPORTED:
+        import_module(module)
     with tempfile.TemporaryDirectory() as name:
         gains, loops = one_case(Path(name), given.frames, given.size, given.pairs)
     print(
         f"one case of {given.frames} frames of {given.size}^3, {given.pairs} pairs, -j 2 against -j 1: {spread(gains)}"
     )
-    print(f"a busy loop in two processes: {spread(loops)}", flush=True)
+    print(f"a busy loop in two processes: {spread(loops)}")
+    print(f"the start of a command, which is not in these: {start_s():.1f} s", flush=True)
     if not given.one_case:
         many_cases(given)
     return 0
