@@ -132,7 +132,12 @@ def _hashing(job: Job) -> Iterator[Callable[[], None]]:
         return
     with ThreadPoolExecutor(job.cores - 1) as readers:  # the interpreter is not held meanwhile
         hashes = readers.map(file_hash, paths)
-        yield lambda: deque(hashes, 0).clear()
+
+        def wait() -> None:
+            readers.shutdown()
+            deque(hashes, 0)  # an error of theirs is met here
+
+        yield wait
 
 
 def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> None:

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 from dataclasses import replace
@@ -22,8 +23,10 @@ import SimpleITK as sitk
 from pipeline import THREADS
 from pipeline.cli import main
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.run import case
 from pipeline.run.helpers import Earlier, shared
 from pipeline.run.launch import Plan, cores_each
+from pipeline.run.stages import segment as segmenting
 from pipeline.run.stages import trace as tracing
 from pipeline.run.workers import Limits
 from pipeline.trace import trace
@@ -227,6 +230,41 @@ def test_a_case_on_two_cores_is_the_case_on_one_file_by_file_and_so_is_what_the_
         assert differences(tmp_path / "one", tmp_path / name) == [], name
     result = json.loads((tmp_path / "warm" / "cases" / "bifurcation" / "result.json").read_bytes())
     assert result["counters"]["trace"][ASKED] > 0
+
+
+def test_files_are_hashed_while_the_lumen_is_segmented_and_nothing_is_forked_beside_a_thread(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, int]] = []
+    fork, hashed, segmented = os.fork, case.file_hash, segmenting.segment
+
+    def slowly(path: Path) -> str:
+        time.sleep(0.1)
+        told.append((path.name, threading.active_count()))
+        return hashed(path)
+
+    def segment(*given: Any, **named: Any) -> Lumen:
+        told.append(("segment", threading.active_count()))
+        return segmented(*given, **named)
+
+    def forked() -> int:
+        told.append(("fork", threading.active_count()))
+        return fork()
+
+    monkeypatch.setattr(case, "file_hash", slowly)
+    monkeypatch.setattr(segmenting, "segment", segment)
+    alone = threading.active_count()
+    run(study, tmp_path / "one", "--no-cache", "--until", "trace")
+    names = [name for name, _ in told]
+    assert names.index("segment") == 1 + FRAMES
+    told.clear()
+    monkeypatch.setattr(os, "fork", forked)
+    run(study, tmp_path / "two", "--no-cache", "-j", "2", "--until", "trace")
+    names = [name for name, _ in told]
+    assert names.index("segment") < FRAMES
+    assert names.index("fork") == 2 + FRAMES
+    assert {count for name, count in told if name == "fork"} == {alone}
+    assert differences(tmp_path / "one", tmp_path / "two") == []
 
 
 def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
