@@ -27,9 +27,12 @@ from pipeline.run import case
 from pipeline.run.helpers import Earlier, shared
 from pipeline.run.launch import Plan, cores_each
 from pipeline.run.stages import segment as segmenting
+from pipeline.run.stages import simulate as simulating
 from pipeline.run.stages import trace as tracing
 from pipeline.run.workers import Limits
 from pipeline.trace import trace
+from reports.schema import TIMINGS
+from reports.tables import read
 from tests.studies.trees import differences
 
 FRAMES = 4
@@ -288,6 +291,22 @@ def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     image = sitk.ReadImage(str(first))
     sitk.WriteImage(image + 30, str(first))
     assert run(other, tmp_path / "other", "-j", "2", "--until", "trace") == {"segment": 1, "trace": FRAMES - 2}
+
+
+def test_the_fit_of_the_clamp_counts_as_simulation(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is most of a sweep point's time, and was missing from the table of times."""
+    fitted = simulating.clamp_of
+
+    def slowly(*given: Any) -> Any:
+        time.sleep(0.2)
+        return fitted(*given)
+
+    monkeypatch.setattr(simulating, "clamp_of", slowly)
+    run(study, tmp_path / "out", "--until", "simulate")
+    times = read(tmp_path / "out" / "cases" / "bifurcation" / TIMINGS.file, TIMINGS)["simulate_s"]
+    assert times.iloc[0] > times.iloc[1:].sum() + 0.2
 
 
 def plan_of(workers: int, **more: Any) -> Plan:

@@ -27,7 +27,8 @@ NEARLY_MM = 1.0
 def simulate_frames(run: Context, known: Known) -> Known:
     """Replay the insertion; a frame without a known depth is passed over."""
     known = with_fitted_roll(run, known)
-    clamp = clamp_of(run, known)
+    with run.log.timed("simulate"):
+        clamp = clamp_of(run, known)
     known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
     if run.case.simulated is None:
         return _replayed(run, known)
