@@ -74,7 +74,7 @@ def read_run(folder: Path, site: str) -> dict[str, Any]:
     data = cover.get_data()
     tests: dict[str, dict[str, list[str]]] = {}
     lines: dict[str, tuple[int, int]] = {}
-    for file in data.measured_files():
+    for file in (file for file in data.measured_files() if file.endswith(".py")):  # no templates
         name = Path(file).relative_to(ROOT).as_posix()
         each = {str(line): [c for c in contexts if c] for line, contexts in data.contexts_by_lineno(file).items()}
         tests[name] = each
