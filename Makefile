@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale mutants cluster clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants shuffled cluster clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -167,10 +167,22 @@ interrupt: setup
 scale: setup
 	$(BIN)/python -m tests.studies.scale
 
+# all tests with coverage, in a random order: the modules of which less than 80 % of the lines are executed
+COVERAGE = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target $(OUT)/coverage coverage
+coverage: setup
+	$(COVERAGE)
+	$(BIN)/python -m tests.studies.executed --site $(OUT)/coverage -- \
+	  -n 2 --dist loadfile -p randomly --randomly-seed=$(SEED)
+
 # 100 random changes of product lines, each against the tests that execute them: the share that is noticed (hours)
 mutants: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --target $(OUT)/coverage coverage
-	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage
+	$(COVERAGE)
+	$(BIN)/python -m tests.studies.mutants --seed $(SEED) --site $(OUT)/coverage -- -n 2 --dist loadfile
+
+# all tests in three random orders
+shuffled: setup
+	for seed in 1 2 3; do \
+	  $(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -p randomly --randomly-seed=$$seed || exit 1; done
 
 clean:
 	rm -rf $(OUT) build dist *.egg-info

@@ -35,14 +35,15 @@ def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
     return [work(number) for number in range(count)]
 
 
-def draw_sections(page: str, data: Any, folder: Path, embed: bool) -> list[dict[str, Any]]:
+def draw_sections(page: str, data: Any, folder: Path, embed: bool, each: Each = one_by_one) -> list[dict[str, Any]]:
     """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
 
     Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or the files
     themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
     gone is removed, so that nobody finds it in the folder.
     """
-    return list(filter(None, (_section(page, entry, data, folder, embed) for entry in declared(page))))
+    entries = declared(page)
+    return list(filter(None, each(lambda i: _section(page, entries[i], data, folder, embed), len(entries))))
 
 
 def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed: bool) -> dict[str, Any]:
@@ -136,7 +137,7 @@ def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
     return {"viewer": viewer["of"], "curves": curves, "sections": [section for section in sections if section]}
 
 
-def render_index(out_dir: Path, embed: bool = False) -> Path:
+def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
     cases, failures = _read_cases(out_dir)
     summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
@@ -162,7 +163,7 @@ def render_index(out_dir: Path, embed: bool = False) -> Path:
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
-        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed), key=_is_tall),
+        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed, each), key=_is_tall),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),

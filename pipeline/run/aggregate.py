@@ -50,7 +50,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
     cases = found_cases(out)
     found, whole = [case.result for case in cases], overall(with_another(out, cases))
-    rows, times = [result.summary for result in found], _times(out, found)
+    rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
         (SUMMARY.file, SUMMARY, rows),
@@ -71,20 +71,24 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         sum(row["frames_ok"] for row in rows),
         float(np.median(points)) if points.size else float("nan"),
         float(np.percentile(points, 95)) if points.size else float("nan"),
-        float(times["simulate_s"].sum()),
+        replayed_s,
         whole,
         unscored((result.role, result.status) for result in found),
     )
 
 
-def _times(out: Path, found: Sequence[Result]) -> pd.DataFrame:
-    """timings.csv of the run: the row about the whole of each case. A file that is damaged costs its times alone."""
-    parts = []
+def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
+    """timings.csv of the run, the row about the whole of each case, and the seconds that frames took to be simulated.
+
+    A file that is damaged costs its times alone.
+    """
+    parts, replayed_s = [], 0.0
     for result in found:
         with suppress(OSError, ValueError):
             table = tables.read_if_there(out / "cases" / result.case / TIMINGS.file, TIMINGS)
             parts.append(table[table["frame"].isna()])
-    return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS)
+            replayed_s += float(table.loc[table["frame"].notna(), "simulate_s"].sum())
+    return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS), replayed_s
 
 
 def write_junit(path: Path, found: Sequence[Result]) -> None:

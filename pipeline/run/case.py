@@ -3,7 +3,10 @@
 import functools
 import os
 import shutil
+from collections import deque
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +16,7 @@ from pipeline.compare.metrics import METRICS
 from pipeline.compare.nulls import NULLS
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
-from pipeline.run.helpers import shared
+from pipeline.run.helpers import nothing, shared
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
@@ -24,7 +27,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import writing
-from reports.html import render_case
+from reports.html import Each, render_case
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up
 from solver._compile import hash_of
@@ -56,6 +59,11 @@ class Job:
     def folder(self) -> Path:
         """Where the case's files go."""
         return self.out / "cases" / self.case.id
+
+    @property
+    def simulates(self) -> bool:
+        """Whether the solver is needed."""
+        return self.until in ("simulate", "compare", "report")
 
     @property
     def wants_pages(self) -> ledger.Pages:
@@ -103,14 +111,12 @@ def _why_again(job: Job, key: str) -> str | None:
 
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
-    if job.cores > 1:
-        with ThreadPoolExecutor(job.cores) as readers:  # files are hashed outside of the interpreter
-            paths = {source.path for source in (*job.case.frames, job.case.reference) if source is not None}
-            list(readers.map(file_hash, (path for path in paths if path.exists())))
-    key = job.key
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
-    with held(job.folder, progress.warn):
-        again = _why_again(job, key)
+    with _hashing(job) as hashed, held(job.folder, progress.warn):
+        again: str | None = ""
+        if not job.fresh and ledger.read(job.folder) is not None:
+            hashed()
+            again = _why_again(job, job.key)
         if again is None:
             _heal(job, progress)
             return
@@ -118,18 +124,38 @@ def run_case(job: Job) -> None:
         progress.start()
         if again:
             progress.warn(again)
-        _compute(job, key, progress)
+        _compute(job, hashed, progress)
 
 
-def _compute(job: Job, key: str, progress: CaseProgress) -> None:
-    simulates = job.until in ("simulate", "compare", "report")
-    if simulates:
+@contextmanager
+def _hashing(job: Job) -> Iterator[Callable[[], None]]:
+    """Hash the files of a case, with several cores while other things are done; yields what waits for the end."""
+    sources = (job.case.reference, *job.case.frames)
+    paths = dict.fromkeys(source.path for source in sources if source is not None and source.path.exists())
+    if job.cores == 1:
+        deque(map(file_hash, paths), 0)
+        yield nothing
+        return
+    with ThreadPoolExecutor(job.cores - 1) as readers:  # the interpreter is not held meanwhile
+        hashes = readers.map(file_hash, paths)
+
+        def wait() -> None:
+            readers.shutdown()
+            deque(hashes, 0)  # an error of theirs is met here
+
+        yield wait
+
+
+def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> None:
+    if job.simulates:
         load_kernels(progress)
     clock = perf_counter()
     log = Log(progress)
-    run = Context(job.case, job.settings.config, Store(job.cache, progress.warn), log, job.cores, simulates)
+    store = Store(job.cache, progress.warn)
+    run = Context(job.case, job.settings.config, store, log, job.cores, job.simulates, hashed)
     known = run_stages(run, job.until)
-    _write(job, known, log, key, clock)
+    hashed()
+    _write(job, known, log, job.key, clock)
     if job.wants_pages:
         draw(job.folder, job.wants_pages, job.cores)
     progress.write(f"done in {perf_counter() - clock:.2f} s")
@@ -149,10 +175,15 @@ def _heal(job: Job, progress: CaseProgress) -> None:
         progress("compare", 1, 1, "unchanged since the last run, kept")
 
 
+def each_on(cores: int) -> Each:
+    """Who draws the figures of a page."""
+    return lambda work, count: shared(lambda number, _: work(number), count, cores)
+
+
 def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     """Draw the pages of a case anew, and record them."""
     shutil.rmtree(folder / "figures", ignore_errors=True)
-    render_case(folder, embed=pages == "embedded", each=lambda work, count: shared(lambda i, _: work(i), count, cores))
+    render_case(folder, pages == "embedded", each_on(cores))
     ledger.record_pages(folder, pages)
 
 
@@ -167,9 +198,11 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
         if rows:
             tables.write(job.folder / table.file, table, rows)
-    outputs.write_frames(job.folder / ledger.FRAMES, known)
+    write_arrays = functools.partial(outputs.write_frames, job.folder / ledger.FRAMES, known)
     if job.pictures:
-        write_view(job.folder / "view", known, job.cores)
+        write_view(job.folder / "view", known, job.cores, write_arrays)
+    else:
+        write_arrays()
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})

@@ -13,7 +13,6 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from multiprocessing import connection
 from multiprocessing.context import ForkProcess
 from pathlib import Path
@@ -28,6 +27,8 @@ R = TypeVar("R")
 Earlier = Callable[[int], R]
 """The result of a part before this one; waited for where it is not there yet."""
 Work = Callable[[int, Earlier[R]], R]
+ERROR = "error"
+"""The file in which a helper says what it has met."""
 LOOK_S = 0.002
 """How often is looked whether a part has come that is waited for."""
 
@@ -35,32 +36,44 @@ LOOK_S = 0.002
 class _LostError(Exception):
     """A helper has ended before its work was done."""
 
-    def __init__(self, code: int) -> None:
-        super().__init__(code)
-        if code < 0:  # else it has met an error, which will be met here
-            name = signal.Signals(-code).name
-            sys.stderr.write(f"a process that helped was ended by {name} (out of memory?): done without its help\n")
-
 
 def nothing() -> None:
     """What is to be done first where nothing is."""
 
 
+def said(text: str) -> None:
+    """Tell the reader."""
+    sys.stderr.write(text + "\n")
+
+
 def shared(
-    work: Work[R], count: int, cores: int, first: Callable[[], object] = nothing, inherited: Sequence[object] = ()
+    work: Work[R],
+    count: int,
+    cores: int,
+    first: Callable[[], object] = nothing,
+    inherited: Sequence[object] = (),
+    told: Callable[[str], object] = said,
 ) -> list[R]:
     """``[work(i, earlier) for i in range(count)]``, shared out in this order; no result may be None.
 
     A part may ask for the results of earlier ones. first : done by this process before it takes part, and only where
     there are helpers.     inherited : large objects that results refer to, which every fork has: they are not sent.
+    told : who hears what kept helpers from helping, and how much had to be done without them.
     """
     parts = _Parts(work, count, inherited)
     if min(cores, count) > 1:
-        with suppress(OSError), TemporaryDirectory(prefix="wireval-") as folder:
-            parts.folder = Path(folder)
-            parts.share_out(cores - 1, first)
-            parts.collect()
-    return parts.in_order()
+        try:
+            with TemporaryDirectory(prefix="wireval-") as folder:
+                parts.folder = Path(folder)
+                parts.share_out(cores - 1, first)
+                parts.collect()
+        except OSError as error:
+            parts.hindrance = str(error)
+    left = count - len(parts.own)
+    done = parts.in_order()  # an error that belongs to a part is met again, and says itself what it is
+    if parts.hindrance:
+        told(f"{parts.hindrance}: {left} of {count} parts were done without help")
+    return done
 
 
 class _Packer(pickle.Pickler):
@@ -92,6 +105,7 @@ class _Parts(Generic[R]):
     """The parts of a job, each taken once; their results, here or as files that every process sees."""
 
     folder: Path
+    hindrance = ""
 
     def __init__(self, work: Work[R], count: int, inherited: Sequence[object]) -> None:
         self.work, self.count, self.inherited = work, count, inherited
@@ -117,9 +131,11 @@ class _Parts(Generic[R]):
                 number = int.from_bytes(taken, sys.byteorder)
                 self._keep(number, self.work(number, self.result))
             self._wait()
-        except Exception:
-            # _LostError, or a part's own: going through them in their order shows the first one
-            pass
+        except _LostError as error:
+            self.hindrance = str(error)
+        except Exception as error:
+            # a part's own: going through them in their order shows the first one
+            self.hindrance = f"a part ended with {error!r}"
         finally:
             os.close(turns)
             for helper in self.helpers:
@@ -144,7 +160,7 @@ class _Parts(Generic[R]):
         while (known := self._known(number)) is None:
             for helper in self.helpers:
                 if helper.exitcode:
-                    raise _LostError(helper.exitcode)
+                    raise self._lost(helper.exitcode)
             time.sleep(LOOK_S)
         return known
 
@@ -172,7 +188,8 @@ class _Parts(Generic[R]):
             while taken := os.read(turns, 4):
                 number = int.from_bytes(taken, sys.byteorder)
                 self._keep(number, self.work(number, self.result))
-        except Exception:
+        except Exception as error:
+            (self.folder / ERROR).write_text(repr(error), encoding="utf-8", errors="replace")
             sys.exit(1)
 
     def _wait(self) -> None:
@@ -183,4 +200,11 @@ class _Parts(Generic[R]):
                 helper = waiting.pop(sentinel)
                 helper.join()
                 if helper.exitcode:
-                    raise _LostError(helper.exitcode)
+                    raise self._lost(helper.exitcode)
+
+    def _lost(self, code: int) -> _LostError:
+        """What ended a helper, in words."""
+        if code < 0:
+            return _LostError(f"a process that helped was ended by {signal.Signals(-code).name} (out of memory?)")
+        error = self.folder / ERROR
+        return _LostError(f"a process that helped met {error.read_text(encoding='utf-8') if error.exists() else code}")

@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.run.aggregate import Totals, aggregate, write_junit
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
-from pipeline.run.case import Job, clear, finished, run_case
+from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
@@ -155,7 +155,7 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     if junit:
         write_junit(junit, found_results(out))
-    return totals, render_index(out, embed=plan.template.embed)
+    return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 
 def cores_each(plan: Plan, jobs: int) -> int:

@@ -4,7 +4,7 @@ The lumen, closed, as surface and label map; every frame's wires as lines with a
 the frames, and a scene that opens everything.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from pipeline.model import Array, Lumen, arc_length
-from pipeline.run.helpers import shared
+from pipeline.run.helpers import nothing, shared
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from reports import colours, export
@@ -23,17 +23,22 @@ _LEAST = 1e-3
 """Least distance, in voxels, of a voxel's centre from the surface beyond the grid's edge: no triangle without area."""
 
 
-def write_view(folder: Path, known: Known, cores: int = 1) -> None:
-    """The lumen and every frame's wires, each in a file; then what opens them together."""
+def write_view(folder: Path, known: Known, cores: int = 1, beside: Callable[[], object] = nothing) -> None:
+    """The lumen and every frame's wires, each in a file; then what opens them together.
+
+    beside : writes what stands elsewhere, and shares the cores.
+    """
 
     def one(number: int, _earlier: object) -> bool:
-        if number:
-            _write_wires(folder, known.frames[number - 1])
+        if number > 1:
+            _write_wires(folder, known.frames[number - 2])
+        elif number == 1:
+            beside()
         elif known.lumen is not None:
             _write_lumen(folder, known.lumen)
         return True
 
-    shared(one, 1 + len(known.frames), cores)
+    shared(one, 2 + len(known.frames), cores)
     for kind in ("traced", "simulated", "true"):
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]

@@ -76,6 +76,20 @@ def test_scenes_are_the_same_in_any_order_and_cover_every_axis() -> None:
     assert max(max(abs(r) for r in p.rolls) for p in ranges) > 3000.0
 
 
+def test_rubbing_goes_in_and_out_again_with_friction_as_wires_have_it() -> None:
+    plan = ScenePlan(0, 0, way="relax", joints=300, depths=[20.0], rolls=[0.0, 5.0], lumen_mm=1.0)
+    found = [AXES["rubbing"](plan, np.random.default_rng(seed)) for seed in range(200)]
+    friction = np.array([one["friction"] for one in found])
+    assert 0.0 < friction.min() < 0.02 < 0.48 < friction.max() < 0.5
+    for one in found:
+        way = np.array(one["depths"])
+        deepest = int(np.argmax(way))
+        np.testing.assert_allclose(np.diff(way[: deepest + 1]), np.diff(RUBBING_MM))
+        np.testing.assert_array_equal(way, way[::-1])
+        assert (one["way"], one["joints"], one["rolls"]) == ("insertion", 200, [0.0])
+        assert 0.3 <= (way[0] - RUBBING_MM[0]) / plan.length_mm <= 0.9
+
+
 def _solved(**changes: Any) -> tuple[ScenePlan, Any, Any, Any]:
     plan = ScenePlan(0, 0, way="relax", joints=20, depths=[20.0], rolls=[0.0], lumen_mm=1.0, tilt_deg=20.0)
     for name, value in changes.items():

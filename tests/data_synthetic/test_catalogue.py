@@ -150,6 +150,7 @@ def test_the_page_of_the_catalogue_is_up_to_date() -> None:
 def test_scene_builds_small_with_a_sound_truth(name: str) -> None:
     study = catalogue.build(name, **SMALL)
     assert study.quality["largest_residual_N"] < 1e-7
+    assert study.quality["node_spacing_mm"] == pytest.approx(min(SMALL["truth_step_mm"], study.truth[0].depth_mm / 8))
     assert study.frame(1).shape == study.reference.shape == study.grid.shape
     assert len(study.expected) == 2
     lengths = [np.linalg.norm(np.diff(f.points_mm, axis=0), axis=1).sum() for f in study.truth]

@@ -10,7 +10,8 @@ from collections import Counter
 from pathlib import Path
 
 from pipeline.cli import main as wireval
-from tests.fuzz.harness import Ending, judged
+from tests.fuzz.examples import EXAMPLES
+from tests.fuzz.harness import Ending, Input, judged
 from tests.fuzz.inputs import all_inputs
 
 VERDICTS = (
@@ -37,6 +38,16 @@ def base_study(folder: Path) -> Path:
     return study
 
 
+def chosen(args: argparse.Namespace) -> list[Input]:
+    """What is tried."""
+    inputs = [i for i in all_inputs(args.seed, args.count) if args.only in (i.kind, "") or args.only in i.name]
+    sample = dict.fromkeys(inputs[:: args.every])
+    if args.examples:
+        by_name = {(i.kind, i.name): i for i in inputs}
+        sample |= dict.fromkeys(by_name[kind, name] for kind, names in EXAMPLES.items() for name in names)
+    return list(sample)
+
+
 def main() -> int:
     """Exit 1 where an input does not end well."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -44,15 +55,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="of this kind alone, or with this in their names")
     parser.add_argument("--every", type=int, default=1, help="only every N-th")
+    parser.add_argument("--examples", action="store_true", help="and those of tests/fuzz/examples.py")
     args = parser.parse_args()
     table: Counter[tuple[str, str]] = Counter()
     slowest, largest = Ending("well"), Ending("well")
     with tempfile.TemporaryDirectory() as place:
         base = base_study(Path(place))
-        inputs = [
-            i for i in all_inputs(args.seed, args.count) if args.only in (*([i.kind] * 1), "") or args.only in i.name
-        ]
-        for given in inputs[:: args.every]:
+        for given in chosen(args):
             ending = judged(given, base, Path(place) / "tried")
             table[given.kind, ending.verdict] += 1
             slowest = max(slowest, ending, key=lambda e: e.seconds)

@@ -133,8 +133,18 @@ def manifests(rng: np.random.Generator, count: int) -> Iterator[Input]:
     }  # fmt: skip
     for name, content in raw.items():
         yield Input("manifest", name, lambda f, c=content: (f / "manifest.toml").write_bytes(c) and None, True)
+    yield Input("manifest", "a name that is not UTF-8", not_utf8, False)
     for k in range(count):
         yield Input("manifest", f"random {k}", random_manifest(int(rng.integers(2**31))), False)
+
+
+def not_utf8(folder: Path) -> None:
+    """A sound frame under a name that is no text."""
+    (frame,) = (folder / "frames").iterdir()
+    frame.rename(frame.with_stem(os.fsdecode(b"\xff\xfe")))
+    path = folder / "manifest.toml"
+    found = json.dumps(f"frames/*{frame.suffix}")
+    path.write_text(replaced(path.read_text(encoding="utf-8"), "frames", found, "[[case]]"), encoding="utf-8")
 
 
 def random_manifest(seed: int) -> Callable[[Path], None]:

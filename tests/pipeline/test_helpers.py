@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 from dataclasses import replace
@@ -22,11 +23,16 @@ import SimpleITK as sitk
 from pipeline import THREADS
 from pipeline.cli import main
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.run import case
 from pipeline.run.helpers import Earlier, shared
 from pipeline.run.launch import Plan, cores_each
+from pipeline.run.stages import segment as segmenting
+from pipeline.run.stages import simulate as simulating
 from pipeline.run.stages import trace as tracing
 from pipeline.run.workers import Limits
 from pipeline.trace import trace
+from reports.schema import TIMINGS
+from reports.tables import read
 from tests.studies.trees import differences
 
 FRAMES = 4
@@ -77,7 +83,48 @@ def test_what_a_lost_helper_leaves_is_done_here(end: Any, capfd: pytest.CaptureF
         return number + (earlier(number - 1) if number else 0)
 
     assert shared(deadly, 12, 3) == list(np.cumsum(range(12)))
-    assert ("ended by SIGKILL" in capfd.readouterr().err) == (end is killed)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("a process that helped " + ("was ended by SIGKILL" if end is killed else "met 3"))
+    assert int(line.split()[-8]) in range(1, 10)
+    assert line.endswith(" of 12 parts were done without help")
+
+
+def test_what_only_a_helper_met_is_told_and_an_error_that_comes_again_speaks_for_itself() -> None:
+    here, told = os.getpid(), list[str]()
+
+    def failing(number: int, _: Earlier[int]) -> int:
+        time.sleep(0.02)
+        if os.getpid() != here or number == never:
+            raise MemoryError("no more of it")
+        return number
+
+    never = -1
+    assert shared(failing, 6, 2, told=told.append) == list(range(6))
+    assert len(told) == 1
+    assert told[0].startswith("a process that helped met MemoryError('no more of it'): ")
+    never = 5
+    with pytest.raises(MemoryError):
+        shared(failing, 6, 2, told=told.append)
+    assert len(told) == 1
+    assert shared(failing, 3, 1, told=told.append) == [0, 1, 2]
+    assert len(told) == 1
+
+
+def test_what_kept_helpers_from_helping_stands_in_the_log(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    here = os.getpid()
+
+    def elsewhere(*given: Any, **named: Any) -> Curve:
+        if os.getpid() != here:
+            raise MemoryError("no more of it")
+        return trace(*given, **named)
+
+    monkeypatch.setattr(tracing, "trace", elsewhere)
+    run(study, tmp_path / "two", "--no-cache", "-j", "2")
+    assert "bifurcation: a process that helped met MemoryError('no more of it'): " in capfd.readouterr().err
+    log = (tmp_path / "two" / "cases" / "bifurcation" / "log.txt").read_text(encoding="utf-8")
+    assert "trace 0/0  a process that helped met MemoryError('no more of it'): " in log
 
 
 def test_without_room_for_results_or_another_process_it_is_done_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,6 +235,41 @@ def test_a_case_on_two_cores_is_the_case_on_one_file_by_file_and_so_is_what_the_
     assert result["counters"]["trace"][ASKED] > 0
 
 
+def test_files_are_hashed_while_the_lumen_is_segmented_and_nothing_is_forked_beside_a_thread(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[tuple[str, int]] = []
+    fork, hashed, segmented = os.fork, case.file_hash, segmenting.segment
+
+    def slowly(path: Path) -> str:
+        time.sleep(0.1)
+        told.append((path.name, threading.active_count()))
+        return hashed(path)
+
+    def segment(*given: Any, **named: Any) -> Lumen:
+        told.append(("segment", threading.active_count()))
+        return segmented(*given, **named)
+
+    def forked() -> int:
+        told.append(("fork", threading.active_count()))
+        return fork()
+
+    monkeypatch.setattr(case, "file_hash", slowly)
+    monkeypatch.setattr(segmenting, "segment", segment)
+    alone = threading.active_count()
+    run(study, tmp_path / "one", "--no-cache", "--until", "trace")
+    names = [name for name, _ in told]
+    assert names.index("segment") == 1 + FRAMES
+    told.clear()
+    monkeypatch.setattr(os, "fork", forked)
+    run(study, tmp_path / "two", "--no-cache", "-j", "2", "--until", "trace")
+    names = [name for name, _ in told]
+    assert names.index("segment") < FRAMES
+    assert names.index("fork") == 2 + FRAMES
+    assert {count for name, count in told if name == "fork"} == {alone}
+    assert differences(tmp_path / "one", tmp_path / "two") == []
+
+
 def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -209,6 +291,24 @@ def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     image = sitk.ReadImage(str(first))
     sitk.WriteImage(image + 30, str(first))
     assert run(other, tmp_path / "other", "-j", "2", "--until", "trace") == {"segment": 1, "trace": FRAMES - 2}
+
+
+def test_the_fit_of_the_clamp_has_a_time_of_its_own(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is most of a sweep point's time, and was missing from the table of times; the last line is of the frames."""
+    fitted = simulating.clamp_of
+
+    def slowly(*given: Any) -> Any:
+        time.sleep(0.2)
+        return fitted(*given)
+
+    monkeypatch.setattr(simulating, "clamp_of", slowly)
+    run(study, tmp_path / "out", "--until", "simulate")
+    times = read(tmp_path / "out" / "cases" / "bifurcation" / TIMINGS.file, TIMINGS)["clamp_s"]
+    replayed = times.iloc[1:].sum()
+    assert times.iloc[0] > replayed + 0.2
+    assert f"simulate {1000.0 * replayed / FRAMES:.1f} ms/frame" in capsys.readouterr().out
 
 
 def plan_of(workers: int, **more: Any) -> Plan:

@@ -106,6 +106,21 @@ def test_two_runs_are_compared_on_the_frames_that_both_have(
     assert said in capsys.readouterr().out
 
 
+def test_a_run_three_times_as_far_off_has_three_times_the_ratio_and_its_interval(tmp_path: Path) -> None:
+    worse = [1.5, 0.8, 1.3, 1.1]
+    for name, factor in zip("abcd", worse, strict=True):
+        write_case(tmp_path / "first", name, [GOOD, GOOD * 1.2])
+        for run, times in (("second", 1.0), ("third", 3.0)):
+            write_case(tmp_path / run, name, [GOOD * factor * times, GOOD * 1.2 * factor * times])
+    first, second, third = (found_cases(tmp_path / run) for run in ("first", "second", "third"))
+    one, other = ratio(first, second), ratio(first, third)
+    assert one is not None
+    assert other is not None
+    assert one.value == pytest.approx(np.sqrt(np.mean(np.square(worse))))
+    assert one.low < one.value < one.high
+    assert [other.value, other.low, other.high] == pytest.approx([3 * one.value, 3 * one.low, 3 * one.high])
+
+
 def test_runs_without_a_frame_in_common_have_no_ratio(tmp_path: Path) -> None:
     write_case(tmp_path / "a", "one", [0.1])
     write_case(tmp_path / "b", "two", [0.1])

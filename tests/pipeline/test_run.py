@@ -589,7 +589,12 @@ def test_check_lists_problems_of_the_scans(study: Path, tmp_path: Path, capsys: 
     (folder / "manifest.toml").write_text(text, encoding="utf-8")
     shutil.copy(study / "reference.mha", folder / "reference.mha")
     assert main(["check", str(folder / "manifest.toml")]) == 2
-    assert "lies outside the scan" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "lies outside the scan" in said
+    image = sitk.ReadImage(str(study / "reference.mha"))
+    ends = [image.TransformIndexToPhysicalPoint(at) for at in ((0, 0, 0), [n - 1 for n in image.GetSize()])]
+    first, last = ([float(round(x, 1)) for x in end] for end in ends)
+    assert f"the scan spans {first} to {last} mm in LPS" in said
 
 
 def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) -> None:

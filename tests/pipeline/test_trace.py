@@ -16,7 +16,7 @@ from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import of_length, trace
 from pipeline.trace.config import TraceConfig
-from pipeline.trace.subtraction import levelled, subtracted
+from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted
 from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
 from tests.bench.imaging.topology import earlier, plain
@@ -354,3 +354,12 @@ def test_below_the_least_contrast_a_previous_curve_counts_only_where_the_frame_c
         curve, outcome = tangles.run(seed, 2.0, wire=wire, previous=earlier(seed, wire))
         assert curve.status is status
         assert outcome.right
+
+
+def test_blocks_that_hold_nothing_are_level() -> None:
+    sums, counts = np.zeros((9, 9, 9)), np.zeros((9, 9, 9))
+    counts[:2, :2, :2] = BLOCK**3
+    sums[:2, :2, :2] = 5.0 * BLOCK**3
+    smooth = _smooth(sums, counts)
+    assert smooth[0, 0, 0] == pytest.approx(5.0)
+    assert np.all(smooth[6:, 6:, 6:] == 0.0)

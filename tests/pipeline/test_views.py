@@ -179,6 +179,22 @@ def test_a_wire_too_short_for_a_shift_fails_by_name(known: Known, tmp_path: Path
 NEAR_SOURCE = (CENTRE - 400.0 * np.array([0.3, -0.95, 0.1])).tolist()
 
 
+@pytest.mark.parametrize(("scale", "good"), [(1.29, True), (1.31, False), (1 / 1.29, True), (1 / 1.31, False)])
+def test_a_wire_lies_near_the_isocentre_within_a_third_of_the_way(scale: float, good: bool) -> None:
+    """What is ``scale`` times nearer to the source is seen as so many times larger, up to 1.3, on either side."""
+    beam, points = np.array([0.3, -0.95, 0.1]), helix()
+    beam /= np.linalg.norm(beam)
+    source = CENTRE - 810.0 * beam
+    screen = screen_of(c_arm().matrix, CENTRE, seen(c_arm(), points))
+    flat = points - ((points - CENTRE) @ beam)[:, None] * beam
+    moved = source + (flat - source) / scale
+    if good:
+        np.testing.assert_allclose(screen.flat(moved), flat, atol=1e-6)
+    else:
+        with pytest.raises(ValueError, match="times as large"):
+            screen.flat(moved)
+
+
 def read_backwards(frame: dict[str, Any]) -> dict[str, Any]:
     return frame | {"points_px": frame["points_px"][::-1]}
 

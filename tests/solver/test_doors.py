@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import solver
-from solver import Catheter, Grid, GuideWire, Insertion, Insertions, VesselWall, relax, skips, warm_up
+from solver import Catheter, Grid, GuideWire, Insertion, Insertions, VesselWall, doors, relax, skips, warm_up
 from tests.solver.scenes import tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -261,6 +261,28 @@ def test_what_cannot_be_used_is_refused_by_name_at_the_call(call: Callable[..., 
     word = {"distance": "(distance|grid values)", "start": "(start|crop)", "stop": "(stop|crop)"}.get(name, name)
     with pytest.raises(ValueError, match=rf"(?s)^\w+: {word}: got .+; allowed: .+; \w+"):
         call(**{name: value})
+
+
+def test_the_ends_of_a_range_lie_within_it() -> None:
+    allowed = doors.Range(0.5, 2.0, "1 is usual")
+    assert [doors.number("wall", "k", end, allowed) for end in (0.5, 2.0, np.float32(0.5), np.array(2))] == [
+        0.5,
+        2,
+        0.5,
+        2,
+    ]
+    for beyond in (np.nextafter(0.5, 0.0), np.nextafter(2.0, 3.0)):
+        with pytest.raises(ValueError, match=r"a number from 0\.5 to 2"):
+            doors.number("wall", "k", beyond, allowed)
+
+
+def test_two_voxels_along_each_axis_are_enough_for_a_wall() -> None:
+    """One is not."""
+    x = np.mgrid[0:2, 0:2, 0:2][0].astype(float) - 0.25
+    wall = VesselWall(Grid(x), 1.0)
+    np.testing.assert_allclose(wall.look_up([[0.25, 0.5, 0.5]])[0], 0.0, atol=1e-12)
+    with pytest.raises(ValueError, match="at least 2 voxels"):
+        VesselWall(Grid(x[:1]), 1.0)
 
 
 def test_no_public_argument_is_left_out() -> None:

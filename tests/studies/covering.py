@@ -1,4 +1,4 @@
-"""A plugin of pytest: which test executes which line, for `make mutants`. Needs the package coverage.
+"""A plugin of pytest: which test executes which line, for `make coverage`. Needs the package coverage.
 
 Lines that are executed outside of tests (imports, constants) belong to none. Compiled kernels are not seen.
 """

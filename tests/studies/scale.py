@@ -11,14 +11,17 @@ import argparse
 import os
 import shutil
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
+from importlib import import_module
 from multiprocessing import get_context
 from pathlib import Path
 
 from pipeline.cli import main as wireval
 from pipeline.run import workers
+from pipeline.run.log import TIMED
 from reports.schema import TIMINGS
 from reports.tables import read
 
@@ -31,6 +34,17 @@ def study(folder: Path, cases: int) -> Path:
     each = [case.replace('id = "bifurcation"', f'id = "case-{i:03d}"') for i in range(cases)]
     (folder / "manifest.toml").write_text(head + "".join(f"[[case]]{one}\n" for one in each), encoding="utf-8")
     return folder / "manifest.toml"
+
+
+IMPORTED = "pipeline.commands.run", "pipeline.commands.synth", workers.PRELOADED
+"""What a command imports before it begins."""
+
+
+def start_s() -> float:
+    """Seconds until a command has imported what it needs, which is done on one core."""
+    clock = time.perf_counter()
+    subprocess.run([sys.executable, "-c", f"import {', '.join(IMPORTED)}"], check=True)
+    return time.perf_counter() - clock
 
 
 def said(words: list[str]) -> float:
@@ -102,12 +116,15 @@ def main() -> int:
     parser.add_argument("--size", type=int, default=256, help="of its scans, voxels")
     parser.add_argument("--one-case", action="store_true", help="that row alone")
     given = parser.parse_args()
+    for module in IMPORTED:
+        import_module(module)
     with tempfile.TemporaryDirectory() as name:
         gains, loops = one_case(Path(name), given.frames, given.size, given.pairs)
     print(
         f"one case of {given.frames} frames of {given.size}^3, {given.pairs} pairs, -j 2 against -j 1: {spread(gains)}"
     )
-    print(f"a busy loop in two processes: {spread(loops)}", flush=True)
+    print(f"a busy loop in two processes: {spread(loops)}")
+    print(f"the start of a command, which is not in these: {start_s():.1f} s", flush=True)
     if not given.one_case:
         many_cases(given)
     return 0
@@ -131,7 +148,9 @@ def many_cases(given: argparse.Namespace) -> None:
                 if count == 1:
                     times = read(root / "out" / TIMINGS.file, TIMINGS)
                     again.append(said([*words, str(root / "out")]) / took[1])
-                    stages = sum(times[f"{s}_s"].sum() for s in ("load", "segment", "trace", "simulate", "compare"))
+                    stages = sum(times[f"{s}_s"].sum() for s in TIMED)
+                        times[f"{s}_s"].sum() for s in ("load", "segment", "trace", "clamp", "simulate", "compare")
+                    )
                     beside.append(1.0 - stages / times["total_s"].sum())
             gains.append(took[1] / took[2])
         loop = [one / two for one, two in zip(loops[::2], loops[1::2], strict=True)]

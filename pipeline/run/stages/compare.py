@@ -1,19 +1,20 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from pipeline.compare import compare, compare_truth
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
-from pipeline.run.helpers import shared
 from pipeline.run.log import Log
 from pipeline.run.stages.budget import budgeted
-from pipeline.run.stages.entries import four_entries
+from pipeline.run.stages.entries import four_entries, replayed_entries
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.run.stages.views import compare_in_views
 from pipeline.status import FrameStatus
+from solver import Solution
 
 
 def compare_frames(run: Context, known: Known) -> Known:
@@ -21,16 +22,32 @@ def compare_frames(run: Context, known: Known) -> Known:
     if run.case.projections:
         with run.log.timed("compare"):
             return replace(known, frames=compare_in_views(run, known))
+    clues = _clues(run, known)
+    if clues is None:
+        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {})))
     with run.log.timed("compare"):
-        clues = _clues(run, known)
-        simulated = simulated_rivals(run, known, clues.known_ways) if clues else {}
-        if clues:
-            clues.known_ways()
+        entered, simulated = _simulated_otherwise(run, known, clues.known_ways)
+        clues.known_ways()
     known = replace(known, frames=_all_compared(run, known, clues, simulated))
-    if clues is not None and run.config.compare.simulated_nulls:
-        with run.log.timed("compare"):
-            known = replace(known, entries=four_entries(run, known, clues.way))
+    with run.log.timed("compare"):
+        known = replace(known, entries=four_entries(run, known, entered, clues.way) if entered else ())
     return budgeted(run, known)
+
+
+def _simulated_otherwise(
+    run: Context, known: Known, first: Callable[[], object]
+) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
+    """The wires from four entries, and by frame those of simulators that lack something.
+
+    first : what can be done while helpers simulate.
+    """
+    ways = rival_ways(run, known)
+
+    def one(number: int, _earlier: object) -> Any:
+        return rival_wires(run, known, *ways[number - 1]) if number else replayed_entries(run, known)
+
+    entered, *wires = run.share("compare", one, 1 + len(ways), first)
+    return entered, simulated_rivals(run, known, wires)
 
 
 def _all_compared(
@@ -51,7 +68,7 @@ def _all_compared(
                 done = replace(done, truth=truth)
         return done, part.log
 
-    parts = shared(one, len(known.frames), run.cores, inherited=(known.lumen, clues and clues.way))
+    parts = run.share("compare", one, len(known.frames), inherited=(known.lumen, clues and clues.way))
     for _, log in parts:
         run.log.add(log)
     return tuple(frame for frame, _ in parts)

@@ -17,37 +17,55 @@ from pipeline.simulate import insertion_of, together
 from pipeline.simulate.clamp import depth_from
 from solver import Solution
 
+Entry = tuple[Clamp, str]
+"""A clamp, and where depths come from."""
 
-def four_entries(run: Context, known: Known, way: Way) -> tuple[dict[str, Any], ...]:
-    """Rows of entries.csv, over the frames that are ok and come to rest in all four; none where there are not four."""
-    frames = [frame for frame in known.frames if frame.ok and frame.comparison is not None]
-    stated = run.case.insertion_mm is not None and run.case.frames
-    if not frames or not stated or known.clamp is None or run.config.simulate.entry == "manifest":
-        return ()
+
+def _frames(known: Known) -> list[Frame]:
+    """Those that are to be compared."""
+    return [f for f in known.frames if f.ok and f.traced and f.simulated is not None and len(f.simulated.joints_mm) > 1]
+
+
+def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:
+    """By their names; none where there are not four."""
+    stated = run.case.insertion_mm is not None and run.case.frames and run.config.compare.simulated_nulls
+    if not _frames(known) or not stated or known.clamp is None or run.config.simulate.entry == "manifest":
+        return {}
     clamps = {"estimated": known.clamp, "manifest": manifest_clamp(run, known)[0]}
-    ways = [(clamp, depth) for clamp in clamps for depth in ("traced", "manifest")]
-    depths = [[_depth(frame, clamps[clamp], depth) for frame in frames] for clamp, depth in ways]
-    wires = _replayed(run, known, frames, [clamps[clamp] for clamp, _ in ways], depths)
+    return {(name, depth): (clamp, depth) for name, clamp in clamps.items() for depth in ("traced", "manifest")}
+
+
+def replayed_entries(run: Context, known: Known) -> list[list[Solution]]:
+    """The wires of each frame from four entries, with the segments of the case."""
+    case, config, lumen, frames = run.case, run.config, known.lumen, _frames(known)
+    assert lumen is not None
+    entries = _entries(run, known).values()
+    if not entries:
+        return []
+    solver = replace(config.solver, segment_mm=known.segment_mm)
+    shared = solver, config.simulate, case.catheter
+    insertions = [insertion_of(case.wire, case.wall, lumen, clamp, *shared) for clamp, _ in entries]
+    tips = [frame.catheter_mm for frame in frames] if case.catheter else None
+    depths = [[_depth(frame, *entry) for frame in frames] for entry in entries]
+    return together(insertions, depths, [frame.roll_deg for frame in frames], tips)
+
+
+def four_entries(
+    run: Context, known: Known, wires: Sequence[Sequence[Solution]], way: Way
+) -> tuple[dict[str, Any], ...]:
+    """Rows of entries.csv, over the frames that are ok and come to rest in all four; none where there are not four.
+
+    wires : of ``replayed_entries``.
+    """
+    frames = _frames(known)
     kept = [i for i in range(len(frames)) if all(one[i].converged for one in wires)]
     pairs = [[_pair(run, known, frames[i], one[i], way) for i in kept] for one in wires]
-    return tuple(_row(*names, own) for names, own in zip(ways, pairs, strict=True)) if kept else ()
+    return tuple(_row(*names, own) for names, own in zip(_entries(run, known), pairs, strict=True) if own)
 
 
 def _depth(frame: Frame, clamp: Clamp, depth: str) -> float:
     assert frame.curve is not None
     return depth_from(clamp, frame.curve) if depth == "traced" else frame.expected_mm
-
-
-def _replayed(
-    run: Context, known: Known, frames: Sequence[Frame], clamps: Sequence[Clamp], depths: Sequence[Sequence[float]]
-) -> list[list[Solution]]:
-    """The wires of each frame from four entries, with the segments of the case."""
-    case, config, lumen = run.case, run.config, known.lumen
-    assert lumen is not None
-    solver = replace(config.solver, segment_mm=known.segment_mm)
-    insertions = [insertion_of(case.wire, case.wall, lumen, c, solver, config.simulate, case.catheter) for c in clamps]
-    tips = [frame.catheter_mm for frame in frames] if case.catheter else None
-    return together(insertions, depths, [frame.roll_deg for frame in frames], tips)
 
 
 def _pair(run: Context, known: Known, frame: Frame, wire: Solution, way: Way) -> Pair:

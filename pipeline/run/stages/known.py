@@ -1,6 +1,6 @@
 """What the steps of a case work with, and what they have found out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar, cast
 
@@ -14,6 +14,7 @@ from pipeline.load.views import View
 from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.cache import Store
+from pipeline.run.helpers import R, Work, nothing, said, shared
 from pipeline.run.log import Log, Stage
 from pipeline.run.stages.before import ASKS, Before, is_asks
 from pipeline.run.store import key_of
@@ -123,6 +124,7 @@ class Context:
     """A case, its settings, the store of earlier results and the log.
 
     cores : that the case may take.     simulates : it will be simulated after it is traced.
+    without_threads : waits for those of this process, before another one is forked from it.
     """
 
     case: Case
@@ -131,10 +133,29 @@ class Context:
     log: Log
     cores: int = 1
     simulates: bool = False
+    without_threads: Callable[[], object] = nothing
 
     def part(self) -> "Context":
         """The same for a part of the case that may be done in another process."""
         return replace(self, log=self.log.part(), cores=1)
+
+    def share(
+        self,
+        stage: Stage,
+        work: Work[R],
+        count: int,
+        first: Callable[[], object] = nothing,
+        inherited: Sequence[object] = (),
+    ) -> list[R]:
+        """``helpers.shared`` on the cores of the case; what kept helpers from helping stands in its log, too."""
+
+        def told(text: str) -> None:
+            said(f"{self.case.id}: {text}")
+            self.log.progress(stage, 0, 0, text)
+
+        if min(count, self.cores) > 1:
+            self.without_threads()
+        return shared(work, count, self.cores, first, inherited, told)
 
     def load(self, crop: Crop, frame: int | None = None) -> Volume:
         """Read a box of a scan."""

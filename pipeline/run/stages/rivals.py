@@ -4,14 +4,13 @@ Both have everything else of the simulated wire, the clamp and the depths too. O
 mean, at equal arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.arrays.polyline import at_arc, samples
 from pipeline.model import Array
-from pipeline.run.helpers import nothing, shared
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import insertion_of, simulate
 from pipeline.simulate.config import SimulateConfig
@@ -19,32 +18,43 @@ from pipeline.simulate.config import SimulateConfig
 ROLLS = 12
 
 
-def simulated_rivals(run: Context, known: Known, first: Callable[[], object] = nothing) -> dict[int, dict[str, Array]]:
+Wires = list[Array | None]
+"""The wire of each frame that was simulated; None where it comes to no rest."""
+
+
+def _simulated(known: Known) -> list[Frame]:
+    return [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
+
+
+def rival_ways(run: Context, known: Known) -> list[tuple[SimulateConfig, float]]:
+    """Settings and turns to be simulated, by themselves each; none where nothing is to be."""
+    if not run.config.compare.simulated_nulls or not _simulated(known) or not np.isfinite(known.segment_mm):
+        return []
+    plain = run.config.simulate
+    return [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]
+
+
+def simulated_rivals(run: Context, known: Known, wires: Sequence[Wires]) -> dict[int, dict[str, Array]]:
     """By frame and by name, the wires (n, 3) of both; a frame that was not simulated has none.
 
-    first : what can be done while helpers simulate.
+    wires : of each of ``rival_ways``.
     """
-    frames = [f for f in known.frames if f.simulated is not None and len(f.simulated.joints_mm) > 1]
-    if not run.config.compare.simulated_nulls or not frames or not np.isfinite(known.segment_mm):
+    if not wires:
         return {}
-    plain = run.config.simulate
-    ways = [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]
-    straight, *turned = shared(lambda i, _: _wires(run, known, frames, *ways[i]), len(ways), run.cores, first)
+    straight, *turned = wires
     found: dict[int, dict[str, Array]] = {}
-    for i, frame in enumerate(frames):
+    for i, frame in enumerate(_simulated(known)):
         arc = samples(frame.depth_mm, run.config.compare.sample_mm)
-        known_rolls = [at_arc(wire, arc) for wires in turned if (wire := wires[i]) is not None]
+        known_rolls = [at_arc(wire, arc) for one in turned if (wire := one[i]) is not None]
         mean = np.mean(known_rolls, axis=0) if len(known_rolls) > ROLLS // 2 else None
         both = {"roll_unknown": mean, "no_tip_curve": straight[i]}
         found[frame.index] = {name: np.asarray(wire) for name, wire in both.items() if wire is not None}
     return found
 
 
-def _wires(
-    run: Context, known: Known, frames: Sequence[Frame], config: SimulateConfig, turn_deg: float
-) -> list[Array | None]:
-    """The wire of each frame under other settings, turned; None where it comes to no rest."""
-    case, lumen, clamp = run.case, known.lumen, known.clamp
+def rival_wires(run: Context, known: Known, config: SimulateConfig, turn_deg: float) -> Wires:
+    """The wires under other settings, turned."""
+    case, lumen, clamp, frames = run.case, known.lumen, known.clamp, _simulated(known)
     assert lumen is not None
     assert clamp is not None
     settings = replace(run.config.solver, segment_mm=known.segment_mm, finest_mm=run.config.solver.step_mm)

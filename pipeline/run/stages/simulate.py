@@ -12,9 +12,9 @@ from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
-from pipeline.simulate import LEVELS, altered, insertion_of, simulate
+from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.clamp import depth_from
-from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, lengths_mm, resolve
+from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
 from solver import Snap, Solution
 
@@ -43,27 +43,13 @@ def simulate_frames(run: Context, known: Known) -> Known:
 
 def _replayed(run: Context, known: Known) -> Known:
     """The solver's own wires."""
-    lumen, clamp, case, config, log = known.lumen, known.clamp, run.case, run.config, run.log
-    assert lumen is not None
-    assert clamp is not None
+    case, log = run.case, run.log
     frames = list(known.frames)
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
     if case.catheter is not None:
         log.warnings += [_cut_short(f) for f in replay if f.catheter_mm > f.depth_mm + NEARLY_MM]
-
-    def insert(segment_mm: float, refined: bool) -> list[Solution]:
-        """The wire of every frame with segments of one length."""
-        finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
-        settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
-        insertion = insertion_of(case.wire, case.wall, lumen, clamp, settings, config.simulate, case.catheter)
-        # a wire that is traced a little short of the catheter's tip ends with it
-        tips = [min(f.catheter_mm, f.depth_mm) for f in replay] if case.catheter else None
-        found = simulate(insertion, [f.depth_mm for f in replay], [f.roll_deg for f in replay], tips)
-        return list(_noted(log, replay, found, len(frames)))
-
     try:
-        curvature = altered(case.wire, config.simulate).rest_curvature_per_mm
-        resolved = resolve(insert, lengths_mm(config.solver.segment_mm, curvature))
+        resolved = _resolved(run, known, replay)
     except ValueError as error:
         raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
@@ -74,6 +60,44 @@ def _replayed(run: Context, known: Known) -> Known:
         frames[frame.index] = judged(found, wire, case.wire.radius_mm)
     log.warnings += _pressed_deep(replay, resolved.wires, case.wire.radius_mm)
     return replace(known, frames=tuple(frames), segment_mm=resolved.segment_mm)
+
+
+def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
+    """The wires of frames, with segments as short as it takes; ValueError where the solver refuses what it is given."""
+    config = run.config
+    assert known.lumen is not None
+    lengths = lengths_mm(config.solver.segment_mm, altered(run.case.wire, config.simulate).rest_curvature_per_mm)
+    # two lengths are needed whatever comes of the first one: side by side, where there are cores
+    tries = [(lengths[0], len(lengths) == 1), *((shorter, True) for shorter in lengths[1:2])]
+    wall_of(known.lumen.distance, config.solver.hull)  # inherited by all
+    found = run.share("simulate", lambda i, _: _inserted(run, known, frames, *tries[i]), len(tries))
+    ahead = dict(zip(tries, found, strict=True))
+
+    def insert(segment_mm: float, refined: bool) -> list[Solution]:
+        """The wire of every frame with segments of one length."""
+        asked = segment_mm, refined
+        wires, log = ahead[asked] if asked in ahead else _inserted(run, known, frames, *asked)
+        run.log.add(log)
+        return wires
+
+    return resolve(insert, lengths)
+
+
+def _inserted(
+    run: Context, known: Known, frames: Sequence[Frame], segment_mm: float, refined: bool
+) -> tuple[list[Solution], Log]:
+    """The wires of frames with segments of one length, and what is noted. refined : rough steps are taken again."""
+    case, config, part = run.case, run.config, run.part()
+    assert known.lumen is not None
+    assert known.clamp is not None
+    finest_mm = config.solver.finest_mm if refined else config.solver.step_mm
+    settings = replace(config.solver, segment_mm=segment_mm, finest_mm=finest_mm)
+    shared = known.lumen, known.clamp, settings, config.simulate, case.catheter
+    # a wire that is traced a little short of the catheter's tip ends with it
+    tips = [min(f.catheter_mm, f.depth_mm) for f in frames] if case.catheter else None
+    depths, rolls = [f.depth_mm for f in frames], [f.roll_deg for f in frames]
+    found = simulate(insertion_of(case.wire, case.wall, *shared), depths, rolls, tips)
+    return list(_noted(part.log, frames, found, len(known.frames))), part.log
 
 
 def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:

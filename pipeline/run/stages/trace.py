@@ -12,7 +12,7 @@ from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
-from pipeline.run.helpers import Earlier, nothing, shared
+from pipeline.run.helpers import Earlier, nothing
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
@@ -35,7 +35,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     work = _Tracing(run, known, given)
     # a second and more with 256^3 voxels, while the helpers trace
     wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.simulates else nothing
-    parts = shared(work.part, len(known.frames), run.cores, wall)
+    parts = run.share("trace", work.part, len(known.frames), wall)
     for part in parts:
         run.log.add(part.log)
     frames = [part.frame for part in parts]

@@ -14,7 +14,7 @@ from pipeline.compare.views import Screen, counted, nulls_in, pair_in, screen_of
 from pipeline.load.views import View
 from pipeline.model import Array
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.rivals import simulated_rivals
+from pipeline.run.stages.rivals import rival_ways, rival_wires, simulated_rivals
 from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 
@@ -22,7 +22,9 @@ from pipeline.status import FrameStatus
 def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     """The frames with their errors on the planes of their views, beside those of predictors with the same freedom."""
     clues, config = _clues(run, known), run.config.compare
-    simulated = {} if clues is None else simulated_rivals(run, known)
+    ways = [] if clues is None else rival_ways(run, known)
+    wires = run.share("compare", lambda i, _: rival_wires(run, known, *ways[i]), len(ways))
+    simulated = simulated_rivals(run, known, wires)
     seen = [Seen(simulated=simulated.get(frame.index, {})) for frame in known.frames]
     frames = [_compared(frame, clues, told, config) for frame, told in zip(known.frames, seen, strict=True)]
     limited = "" if clues is None else _limited(frames, clues, config)
