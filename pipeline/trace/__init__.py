@@ -7,10 +7,12 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.ranges import Profile
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.explain import explained, missed_mm
+from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import near_rotation_plane
 
@@ -29,6 +31,7 @@ def trace(
     reference: Volume | None = None,
     previous: Curve | None = None,
     expected_mm: float | None = None,
+    opacity: Profile | None = None,
     config: TraceConfig | None = None,
 ) -> Curve:
     """The wire of one frame from the plane of entry to the tip.
@@ -36,13 +39,16 @@ def trace(
     frame, reference : scans of one geometry, with and without wire (without, or where correlated noise hides the wire:
     the background is modelled from the lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve
     of the frame before, if any; it is consulted only where the frame alone leaves doubts.  expected_mm : insertion
-    depth, which helps to decide.
+    depth, which helps to decide.  opacity : the wire's brightness per length over the distance from its tip (any
+    unit), a number or pairs; found where it is not given.
     Returns a Curve; what went wrong is its status and note.
     """
     config = config or TraceConfig()
     image = subtracted(frame, lumen, reference)
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
-    entry = EntryPose(image.local(np.asarray(entry_mm, float)[None])[0], image.turned(heading), expected_mm)
+    entry = EntryPose(
+        image.local(np.asarray(entry_mm, float)[None])[0], image.turned(heading), expected_mm, Opacity.of(opacity)
+    )
     curve = BACK_END(image, entry, previous, config)
     if reference is not None and image.correlated and curve.status is FrameStatus.TRACE_LOW_CONTRAST:
         # smoothing takes white noise off the reference; correlated noise it adds to the frame's, 1.4 times as much

@@ -144,7 +144,7 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
 def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candidate:
     """The candidate with all that goes on beyond its tip."""
     for _ in range(MOST_PIECES):
-        more = _read_off(image, prolonged(image, best.attempt, entry.direction), entry)
+        more = _read_off(image, prolonged(image, best.attempt, entry), entry)
         if not more:
             break
         best = more[0]
@@ -245,5 +245,5 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     if image.modelled:
         # the lumen's own grey under the wire is taken from beside it, and the fit done again
         image = levelled(image, dense(best.attempt.tube, image.voxel), best.attempt.tube.sigma)
-        best = _agreed(best, _read_off(image, again(image, best.attempt, entry.direction), entry)[0])
+        best = _agreed(best, _read_off(image, again(image, best.attempt, entry), entry)[0])
     return _faint_for_its_noise(_curve(image, best))

@@ -37,10 +37,15 @@ SURE = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start."""
+    """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start.
+
+    stated : by the manifest, not found.  missing_mm : by which the wire then goes on beyond the line that was found.
+    """
 
     edges: Array
     levels: Array
+    stated: bool = False
+    missing_mm: float = 0.0
 
     def at(self, share: Array) -> Array:
         """Brightness (n,) at shares (n,) of the length."""

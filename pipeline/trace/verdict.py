@@ -12,12 +12,13 @@ from scipy.spatial import cKDTree
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import Attempt
+from pipeline.trace.attempt import Attempt, tube_length
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.section import fills_vessel, out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.tube import Tube
 
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
@@ -89,18 +90,26 @@ def _averaged(values: Array, width: int) -> Array:
     return np.asarray(np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same"))
 
 
-def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, float]:
+def _shares(tube: Tube, points: Array) -> Array:
+    """Shares (n,) of the tube's length at which points (n, 3) lie, the last at its end."""
+    arc = arc_length(points)
+    return np.asarray(1.0 - (arc[-1] - arc) / max(tube_length(tube), arc[-1]))
+
+
+def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, Array]:
     """Grey on the curve (n,) over its usual height along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
 
-    The blur in which grey is read leaves 0.36 of the noise, the mean the rest.
+    The usual height is the stated one, where one is stated. The blur in which grey is read leaves 0.36 of the noise,
+    the mean the rest.
     """
-    grey = image.along(points)
-    usual = _usual(grey, attempt.tube.steps)
-    share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
+    grey, steps = image.along(points), attempt.tube.steps
+    height = steps.at(_shares(attempt.tube, points)) if steps.stated else np.ones(len(points))
+    usual = float(np.median(grey / height)) if steps.stated else _usual(grey, steps)
+    share = _averaged(grey / height, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
     gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
     cnr = attempt.cnr(image)
-    return share, 0.4 * gain / cnr / float(np.sqrt(count)) if cnr > 0.0 else float("inf")
+    return share, 0.4 * gain / cnr / float(np.sqrt(count)) / height if cnr > 0.0 else np.full(len(points), np.inf)
 
 
 def _usual(grey: Array, steps: Steps) -> float:
@@ -142,7 +151,7 @@ def seen_steps(steps: Steps, share: Array) -> NDArray[np.bool_]:
     dim = (levels > 0.6 * LEAST_LEVEL) & (levels < 2.0 * FAINT)
     last = len(dim) - 1
     from_start, to_end = np.logical_and.accumulate(dim), np.logical_and.accumulate(dim[::-1])[::-1]
-    return np.asarray((from_start | to_end)[piece] & (last > 0))
+    return np.asarray((from_start | to_end)[piece] & (last > 0) & (not steps.stated))
 
 
 def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float) -> Verdict:
@@ -150,12 +159,12 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
-    known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
+    known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
     double = _beside_itself(points, step, image.voxel)
     if not image.thick_slices:
-        double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+        double |= _doubled(share, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
@@ -164,7 +173,7 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
+def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:
     """Points (n,) where two strands may lie on one crest: not round, or too bright where nobody can tell.
 
     The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
@@ -202,9 +211,13 @@ Objection = tuple[bool, FrameStatus, str, str, str]
 
 def _of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
+    missing_mm = attempt.tube.steps.missing_mm
     return (
+        (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
+         "look whether the picture shows more of it, or correct opacity in the manifest"),
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
-         "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
+         "a line beyond the tip that could not be followed", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),
         (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
@@ -230,7 +243,7 @@ def _of_the_line(
     image: Subtraction,
     attempt: Attempt,
     points: Array,
-    seen: tuple[Array, float, NDArray[np.bool_]],
+    seen: tuple[Array, Array, NDArray[np.bool_]],
     lengths: tuple[float, float, float],
 ) -> tuple[Objection, ...]:
     """What may be wrong along a curve (n, 3)."""
