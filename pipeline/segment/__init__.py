@@ -10,7 +10,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.levels import brighter, scanner_blur
-from pipeline.segment.necks import add_necks
+from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
 from pipeline.segment.uneven import evened
@@ -43,7 +43,9 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
         found = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
     said = warning(open_ones) + brighter(wall.levels) + bright + uneven.warning(least)
-    said += add_necks(wall.values, grid, site.corner, region, blur, config.outer_mm)
+    box = wall.values, site.corner
+    said += add_necks(region.necks, box, grid, region.levels, blur)
+    said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
     distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
         distance, wall.levels.half, said,

@@ -104,7 +104,7 @@ def thin_branches(volume: Grid, low: Index, order: Index, levels: GreyLevels, af
     np.maximum.at(length, part, steps + 1)
     np.maximum.at(most, part, share)
     good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
-    return found[good[part]]
+    return np.asarray(found[good[part]], np.int64)
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:

@@ -42,6 +42,8 @@ RAY_STEP = 0.1
 """Angle (rad) from one to the next: a voxel at its end."""
 RAY_SURE = 4.5
 """Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
+OUTER_SURE = 2.5
+"""and those from which its outer half is."""
 OUTSIDE_CONE = 0.85
 """Least cosine between the wire's end and the way on which the lumen may have ended too early."""
 OUTSIDE_VOXELS = 1.5
@@ -54,7 +56,7 @@ FEW = 0.1
 """Share of the ways below which what is bright on them is no vessel but the edge of bone, or a wire straight ahead."""
 AHEAD_RAD = 0.15
 """Angle to the wire's end up to which a way is straight ahead: the nearest of ``_cone``."""
-MOST_RAYS = 12
+MOST_RAYS = 24
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
 """A piece nearer to the wire than this is what the fit left of it."""
@@ -122,18 +124,21 @@ def _cone(heading: Array) -> Array:
 def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
     """The end (3,) of the straight piece from a point along which grey stands out most; None for none.
 
-    RAY_MM long, or half of that, as the wire may end within it.
+    Half of RAY_MM long, as the wire may end within it; the whole where half of it is too little to be sure.
     """
     h = image.voxel
     s = np.arange(1.5 * h, RAY_MM, h)
     directions = _cone(heading)
     grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
-    count = np.array([len(s) // 2, len(s)])
-    mean = np.cumsum(grey, axis=0)[count - 1] / count[:, None]
-    sure = mean * np.sqrt(count / INDEPENDENT_VOXELS)[:, None] / image.noise_in(CREST_VOXELS)
-    n, best = np.unravel_index(int(np.argmax(sure)), sure.shape)
-    seen = sure[n, best] > RAY_SURE and mean[n, best] > least
-    return np.asarray(start + s[count[n] - 1] * directions[best]) if seen else None
+    noise = image.noise_in(CREST_VOXELS)
+    for stop in (len(s) // 2, len(s)):
+        mean, outer = np.mean(grey[:stop], axis=0), np.mean(grey[stop // 2 : stop], axis=0)
+        # the way on that noise prefers begins on the wire's last voxels, and ends on nothing
+        ends = outer * np.sqrt((stop - stop // 2) / INDEPENDENT_VOXELS) > OUTER_SURE * noise
+        best = int(np.argmax(np.where(ends, mean, -np.inf)))
+        if mean[best] * np.sqrt(stop / INDEPENDENT_VOXELS) > RAY_SURE * noise and mean[best] > least and ends[best]:
+            return np.asarray(start + s[stop - 1] * directions[best])
+    return None
 
 
 def seen_outside(image: Subtraction, line: Array) -> bool:

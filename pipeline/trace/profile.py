@@ -31,6 +31,8 @@ LEAST_LEVEL = 0.1
 """Share of the usual grey from which something is wire: a plastic tip has 0.15, streaks a few hundredths."""
 INDEPENDENT_VOXELS = 1.7
 """Length of wire over which the noise of crest grey is one."""
+END_SIGMAS = 3.0
+"""Standard deviations within which an end is possible."""
 SURE = 6.0
 """Standard deviations by which a fainter piece stands out of the noise, all of it taken together."""
 
@@ -85,11 +87,14 @@ def _segments(value: Array, cost: float) -> NDArray[np.int64]:
     return np.array(found[:0:-1], np.int64)
 
 
-def _levels(profile: Array, arc: Array, edges: Array, sigma: float) -> tuple[Array, float]:
-    """Heights of blurred steps between edges that fit a profile best, and the sum of squares that is left."""
+def _levels(profile: Array, arc: Array, edges: Array, sigma: float, beyond: bool = True) -> tuple[Array, float]:
+    """Heights of blurred steps between edges that fit a profile best, and the sum of squares that is left.
+
+    beyond : something may lie beyond the last edge, too.
+    """
     inner = ndtr((arc[:, None] - edges[None]) / sigma)
     one, none = np.ones((len(arc), 1)), np.zeros((len(arc), 1))
-    design = np.hstack([one, inner]) - np.hstack([inner, none])
+    design = (np.hstack([one, inner]) - np.hstack([inner, none]))[:, : len(edges) + beyond]
     level = np.linalg.lstsq(design, profile, rcond=None)[0]
     return level, float(np.sum((profile - design @ level) ** 2))
 
@@ -151,6 +156,25 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
         :-1
     ]
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
+
+
+def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -> tuple[float, float]:
+    """How much further back and further on (mm) a wire with steps may end, by the profile of its last piece.
+
+    Ends are as likely as they leave the profile explained; what is three standard deviations off counts as possible.
+    """
+    h = image.voxel
+    line = resampled(extended(points, AHEAD_VOXELS * h, 0.25 * h), 0.25 * h)
+    arc, grey = arc_length(line), image.along(line)
+    end = float(arc_length(points)[-1])
+    edge = float(steps.edges[-1]) * end
+    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
+    near = arc > edge - BAND_VOXELS * h
+    tries = np.arange(edge + 0.5 * blur, arc[-1], 0.2 * h)
+    costs = np.array([_levels(grey[near], arc[near], np.array([edge, e]), blur, beyond=False)[1] for e in tries])
+    variance = image.noise_in(CREST_VOXELS) ** 2 * 4.0 * INDEPENDENT_VOXELS
+    likely = tries[costs - costs.min() < END_SIGMAS**2 * variance]
+    return max(0.0, end - float(likely[0])), max(0.0, float(likely[-1]) - end)
 
 
 def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt, tube_length
+from pipeline.trace.ends import Objection, beside_itself, of_the_ends
 from pipeline.trace.link import extended, resampled
-from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import fills_vessel, out_of_round
+from pipeline.trace.section import out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 
@@ -46,14 +45,8 @@ IN_CONTACT = 0.035
 beside it, is below 0.03."""
 OBLONG = 0.12
 """and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
-EDGE_VOXELS = 2.0
-"""Distance from the scan's end within which a tip is none: wires that leave end 1.0 inside at the most (100 traces at
-5 to 90 degrees, CNR 4 to 30; nearly all lie outside), tips within the scan where they are, to 0.4."""
 BESIDE_VOXELS = 2.2
 """Two strands of one curve nearer than this share their crest."""
-MOST_APART = 3.0
-"""Slice distance over pixel size from which a curve needs its length confirmed: of 12 wires in slices of 2 mm and
-pixels of 0.5 mm, 8 were more than a pixel off or short."""
 MOST_DOUBLE_MM = 2.0
 """Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
@@ -162,13 +155,13 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
-    double = _beside_itself(points, step, image.voxel)
+    double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
         double |= _doubled(share, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
-    objections += _of_the_ends(image, attempt, points, length_mm)
+    objections += of_the_ends(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
@@ -183,60 +176,6 @@ def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArra
     least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
     hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
     return np.asarray(hidden | (oblong > least + 3.0 * own))
-
-
-def _beside_itself(points: Array, step: float, voxel: float) -> NDArray[np.bool_]:
-    """Points (n,) within BESIDE_VOXELS of a stretch of the curve that is further along it than that can be."""
-    apart = round(3.0 * BESIDE_VOXELS * voxel / max(step, 1e-9))
-    pairs = cKDTree(points).query_pairs(BESIDE_VOXELS * voxel, output_type="ndarray")
-    out = np.zeros(len(points), bool)
-    out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
-    return out
-
-
-def _named(image: Subtraction, point: Array) -> str:
-    """A place in LPS mm, for a message."""
-    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
-
-
-def _at_edge(image: Subtraction, point: Array) -> bool:
-    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
-    index = point / image.spacing + image.region.corner
-    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
-
-
-Objection = tuple[bool, FrameStatus, str, str, str]
-"""Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
-
-
-def _of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
-    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
-    missing_mm = attempt.tube.steps.missing_mm
-    return (
-        (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
-         f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
-         "look whether the picture shows more of it, or correct opacity in the manifest"),
-        (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
-         "a line beyond the tip that could not be followed", "a tip with nothing beyond it",
-         "look whether the wire's end is fainter than the rest"),
-        (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
-         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
-         "a lumen that holds the tip",
-         "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
-        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
-         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
-         "turn entry_direction round, or state insertion_mm if this is right"),
-        (image.slices_apart >= MOST_APART and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
-         f"slices {image.slices_apart:.1f} times as far apart as pixels",
-         f"less than {MOST_APART} times, or insertion_mm",
-         "state insertion_mm: in such slices a wire's ends are lost by more than its uncertainty says"),
-        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
-         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
-         "leave this frame out, or scan a larger field"),
-        (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
-         "a line as thick as its vessel", "a wire, which is thinner",
-         "check that the frame shows a wire, and that the reference has the frame's contrast"),
-    )  # fmt: skip
 
 
 def _of_the_line(

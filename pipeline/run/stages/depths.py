@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.arrays.grids import spread
 from pipeline.run.stages.known import Frame
@@ -33,7 +32,8 @@ def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
         return out
     curves = [curve for i in known if (curve := frames[i].trusted_curve) is not None]
     apart = np.array([curve.length_mm - frames[i].expected_mm for i, curve in zip(known, curves, strict=True)])
-    usual = median_filter(apart, AROUND, mode="nearest")
+    first = np.clip(np.arange(len(apart)) - AROUND // 2, 0, max(0, len(apart) - AROUND))
+    usual = np.array([np.median(apart[n : n + AROUND]) for n in first])
     tips = np.nan_to_num([curve.tip_sigma_mm for curve in curves])
     limit = np.maximum(max(LEAST_VOXELS * voxel_mm, SURE * spread(apart - usual)), SURE_TIP * tips)
     for n in np.flatnonzero(np.abs(apart - usual) > limit):
