@@ -136,19 +136,17 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
     own = max(4, len(line) - round(AHEAD_VOXELS / 0.25))
     usual = max(float(np.median(grey[:own])), 1e-9)
     noise = image.noise_in(CREST_VOXELS) / usual
-    tail = arc >= arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
-    edges = np.zeros(0)
+    edges, last = np.zeros(0), 0
     if not _is_even(grey[: max(1, own - 8)] / usual, noise, 0.25):
         edges = _edges(grey / usual, arc, noise, blur, h)
-        if len(edges):
-            level = _levels(grey / usual, arc, edges, blur)[0]
-            seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
-            last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
-            start = edges[last - 1] + 0.5 * blur if last else arc[0]
-            stop = edges[last] + 3.0 * blur if last < len(edges) else arc[-1]
-            tail = (arc >= max(start, stop - (AHEAD_VOXELS + BACK_VOXELS) * h)) & (arc <= stop)
-            edges = edges[:last]
-    end = max(step_position(grey[tail], arc[tail], blur), arc[0] + 2 * h)
+        level = _levels(grey / usual, arc, edges, blur)[0]
+        seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
+        last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
+    end = _end_of(last, edges, arc, grey, (blur, h))
+    if last and level[last] < level[last - 1] and end - edges[last - 1] < BAND_VOXELS * h:
+        last -= 1  # the blur of the end, not a part of the wire
+        end = _end_of(last, edges, arc, grey, (blur, h))
+    edges = edges[:last]
     line, edges = line[arc <= end], edges[edges < end - h]
     if not len(edges):
         return np.asarray(line), EVEN
@@ -156,6 +154,15 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
         :-1
     ]
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
+
+
+def _end_of(last: int, edges: Array, arc: Array, grey: Array, size: tuple[float, float]) -> float:
+    """Arc at which the piece before edge ``last`` ends, by its own step alone. size : blur and voxel, mm."""
+    blur, h = size
+    start = edges[last - 1] + 0.5 * blur if last else arc[0]
+    stop = edges[last] + 3.0 * blur if last < len(edges) else arc[-1]
+    tail = (arc >= max(start, stop - (AHEAD_VOXELS + BACK_VOXELS) * h)) & (arc <= stop)
+    return max(step_position(grey[tail], arc[tail], blur), float(arc[0]) + 2 * h)
 
 
 def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -> tuple[float, float]:
