@@ -45,9 +45,9 @@ def _at_edge(image: Subtraction, point: Array) -> bool:
 
 
 def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float]:
-    """How much further back and on (mm) a wire may end whose brightness has steps."""
+    """How much further back and on (mm) a wire may end whose brightness has steps, or in correlated noise."""
     tube = attempt.tube
-    if not len(tube.steps.edges):
+    if not len(tube.steps.edges) and not image.correlated:
         return 0.0, 0.0
     return end_range(image, dense(tube, 0.25 * image.voxel), tube.steps, tube.sigma)
 

@@ -166,7 +166,7 @@ def _end_of(last: int, edges: Array, arc: Array, grey: Array, size: tuple[float,
 
 
 def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -> tuple[float, float]:
-    """How much further back and further on (mm) a wire with steps may end, by the profile of its last piece.
+    """How much further back and further on (mm) a wire may end, by the profile of its last piece.
 
     Ends are as likely as they leave the profile explained; what is three standard deviations off counts as possible.
     """
@@ -174,11 +174,12 @@ def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -
     line = resampled(extended(points, AHEAD_VOXELS * h, 0.25 * h), 0.25 * h)
     arc, grey = arc_length(line), image.along(line)
     end = float(arc_length(points)[-1])
-    edge = float(steps.edges[-1]) * end
+    edge = float(steps.edges[-1]) * end if len(steps.edges) else max(0.0, end - BACK_VOXELS * h)
+    before = [edge] if len(steps.edges) else []
     blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
     near = arc > edge - BAND_VOXELS * h
     tries = np.arange(edge + 0.5 * blur, arc[-1], 0.2 * h)
-    costs = np.array([_levels(grey[near], arc[near], np.array([edge, e]), blur, beyond=False)[1] for e in tries])
+    costs = np.array([_levels(grey[near], arc[near], np.array([*before, e]), blur, beyond=False)[1] for e in tries])
     variance = image.noise_in(CREST_VOXELS) ** 2 * 4.0 * INDEPENDENT_VOXELS
     likely = tries[costs - costs.min() < END_SIGMAS**2 * variance]
     return max(0.0, end - float(likely[0])), max(0.0, float(likely[-1]) - end)

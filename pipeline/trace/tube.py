@@ -28,6 +28,8 @@ GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
 """End weights of the fourth-order Gregory rule: the tip's position hangs on the quadrature of the last samples."""
 START_VOXELS = 8.0
 """How far from its point the start plane reaches: what the blurred wire before it lights up."""
+DIM_END = 0.5
+"""Brightness of the wire's end, over that of its brightest part, below which the fit has no offset."""
 BLUR_HELD = 2
 """First iterations in which the blur is held: before the curve lies on the wire it would grow."""
 SLIDING, POLISHED = 3e-2, 1e-6
@@ -248,7 +250,7 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
     samples, prior = sampling(tube, image.voxel), _prior(tube, image)
     slot = sparse_zeros(image.grey.shape, np.int32)
     # a bright piece is no Gaussian to a few hundredths, which its offset takes up; a dim one drowned in that
-    stepped = [-1] if len(tube.steps.edges) else []
+    stepped = [-1] if tube.steps.levels[-1] < DIM_END * tube.steps.levels.max() else []
     done = 0
     for done in range(1, iterations + 1):
         found, _, line = _equations(image, tube, samples, prior, slot)

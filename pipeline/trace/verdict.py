@@ -23,6 +23,8 @@ LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
 LEAST_WITH_PRIOR = 1.5
 """and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
+NARROWEST = 0.7
+"""Share of the scanner's blur that a faint line is wide at the least: nothing is sharper, but noise."""
 LEAST_SEEN = 2.0
 """The same over what noise does to the fit: noise correlated over 0.8 voxel counts 2.4-fold. Below it the wire is
 followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
@@ -191,7 +193,12 @@ def _of_the_line(
     most_mm = LEFTOVER_MM if cnr > SURE_CNR else max(FAINT_LEFTOVER_MM, 0.1 * length_mm)
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
+    thin = attempt.tube.sigma < NARROWEST * image.wall_blur_mm and not image.thick_slices
     return (
+        (thin and cnr < SURE_CNR, FrameStatus.TRACE_LOW_CONTRAST,
+         f"a line of blur {attempt.tube.sigma:.2f} mm, {cnr:.1f} noises bright",
+         f"no less than {NARROWEST:g} of the scanner's own blur, {image.wall_blur_mm:.2f} mm",
+         "check that the frame shows a wire; scan with more dose or give the frame before"),
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
          f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
          "scan with more dose or give the frame before"),
