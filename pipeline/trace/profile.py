@@ -153,6 +153,10 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
     level = _levels(grey[arc <= end + 2 * blur] / usual, arc[arc <= end + 2 * blur], np.append(edges, end), blur)[0][
         :-1
     ]
+    if level[-1] < LEAST_LEVEL:  # the blur of a bright end, once more: nothing of it is left beside its own step
+        line, end, edges, level = line[: np.searchsorted(arc, edges[-1])], float(edges[-1]), edges[:-1], level[:-1]
+    if not len(edges):
+        return np.asarray(line), EVEN
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
 
 

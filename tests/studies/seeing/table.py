@@ -61,7 +61,8 @@ def on_wire(curve, scene):
     for a, b in scene.gaps:
         seen |= (arc > a - 1) & (arc < b + 1)
     wrong = []
-    sure = off[~flagged]
+    # what lies beyond the true tip is the tip's error, which has its own bound
+    sure = off[~flagged & ((points - true[-1]) @ (true[-1] - true[-8]) <= 0)]
     if len(sure) and (sure.mean() > MEAN * (2 if scene.cnr < 6 else 1) or sure.max() > WORST):
         wrong.append(f"mean {sure.mean():.2f}, worst {sure.max():.2f} voxel")
     if flagged.any() and off[flagged].max() > BRIDGED:
