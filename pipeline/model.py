@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
-from pipeline.ranges import FiniteProfile, NonNegative, Number, Positive, PositiveProfile, Radius
+from pipeline.ranges import FiniteProfile, NonNegative, Number, OpacityProfile, Positive, PositiveProfile, Radius
 from pipeline.status import FrameStatus
 from solver.grid import Grid, read_only
 
@@ -34,6 +34,7 @@ class Wire:
     rest_curvature_per_mm: FiniteProfile = 0.0
     torsional_stiffness_N_mm2: Annotated[float, Field(gt=0), Number] = float("inf")
     weight_N_per_mm: Annotated[float, Field(ge=0, le=1), Number] = 0.0
+    opacity: OpacityProfile | None = None
 
 
 @dataclass(frozen=True)

@@ -68,4 +68,5 @@ Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector that is made to have length 1."""
 PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9))]
+OpacityProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-3, highest=1e6))]
 FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0))]

@@ -5,11 +5,12 @@ from numpy.typing import ArrayLike
 
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
-from pipeline.segment import uneven
+from pipeline.segment import bone, uneven
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
 from pipeline.segment.levels import brighter, scanner_blur
+from pipeline.segment.necks import add_necks, closed_necks
 from pipeline.segment.surface import prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
 from pipeline.segment.uneven import evened
@@ -36,14 +37,19 @@ def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = 
     site = prepare(grid, region.voxels, region.taps, config.margin_mm, region.thin)
     wall = wall_of(site, region.levels, config.outer_mm)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
-    touching = contacts(site.grid.with_values(read_only(wall.values)))
+    open_ones = contacts(site.grid.with_values(read_only(wall.values)))
+    bright = bone.touching(grid, site.grid.with_values(read_only(wall.values)), site.corner, wall.levels)
     if len(region.thin):
         found = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
+    said = warning(open_ones) + brighter(wall.levels) + bright + uneven.warning(least)
+    box = wall.values, site.corner
+    said += add_necks(region.necks, box, grid, region.levels, blur)
+    said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
     distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
-        distance, wall.levels.half, warning(touching) + brighter(wall.levels) + uneven.warning(least),
-        {**region.counters, **wall.counters, "touching_places": float(len(touching))},
+        distance, wall.levels.half, said,
+        {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
          "scanner_blur_mm": blur, "least_filling": least},
     )  # fmt: skip

@@ -3,6 +3,8 @@
 Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,7 +12,8 @@ from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
 from pipeline.segment.levels import GreyLevels, Index, Region, failed, levels_at, seed_voxels
-from pipeline.segment.thin import thin_branches
+from pipeline.segment.necks import through_necks
+from pipeline.segment.thin import low_region, thin_branches
 from solver.grid import Grid
 
 LEAST_CONTRAST = 2.0
@@ -51,10 +54,14 @@ def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Regi
     levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
     affinity = estimate_affinity(levels, config)
     order, read = _connected(grid, seeds, affinity, config)
-    thin, more = thin_branches(grid, seeds, order, levels, affinity)
+    low, more = low_region(grid, seeds, levels, affinity)
     total = float(np.prod(grid.shape))
     counters = {
         "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
-        "voxels_visited": float(len(order)), "voxels_thin": float(len(thin)),
     }  # fmt: skip
-    return Region(order, thin, levels, affinity.taps, counters)
+    region = Region(order, np.zeros(0, np.int64), levels, affinity.taps, counters)
+    if not len(config.other_seeds_mm):  # what is to be left out might be what lies behind
+        region = through_necks(grid, low, region, affinity, config)
+    thin = thin_branches(grid, low, region.voxels, levels, affinity)
+    counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(thin))}
+    return replace(region, thin=thin, counters=counters)

@@ -207,7 +207,7 @@ class Region:
     """The voxels of a vessel (flat indices of the scan), and what its wall is to be found by.
 
     thin : flat indices of branches too thin for a wall at half height.  levels : grey inside and outside.  taps : the
-    separable smoothing of the grey in which the wall is looked for.
+    separable smoothing of the grey in which the wall is looked for.  necks : axes (n, 3), voxels, of places that are.
     """
 
     voxels: Index
@@ -215,6 +215,7 @@ class Region:
     levels: GreyLevels
     taps: NDArray[np.float32]
     counters: Counters
+    necks: tuple[NDArray[np.float64], ...] = ()
 
 
 def failed(got: str, allowed: str, do: str) -> StageError:

@@ -66,7 +66,7 @@ def _low_affinity(levels: GreyLevels, affinity: Affinity) -> Affinity | None:
     return affinity._replace(homogeneity=alike, feature=feature)
 
 
-def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
+def beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
     """Voxels of ``low`` that the blur of ``thick`` does not reach, flat and ascending, and the same voxels in a box."""
     corner, shape = padded_box(low, volume, 0.0)
     state = sparse_zeros(shape, np.uint8)
@@ -79,22 +79,24 @@ def _beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]
     return found, numbered(shape, inner)
 
 
-def thin_branches(
-    volume: Grid, seeds: Index, order: Index, levels: GreyLevels, affinity: Affinity
-) -> tuple[Index, float]:
-    """Flat indices of the voxels of thin branches beyond the vessel ``order``, and the number of voxels read."""
+def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinity) -> tuple[Index, float]:
+    """Flat indices of what hangs together with the seeds at the faintest grey, and the number of voxels read."""
     tables = _low_affinity(levels, affinity)
+    return (np.zeros(0, np.int64), 0.0) if tables is None else connect(volume, seeds, tables, 0.5, neighbours(6))
+
+
+def thin_branches(volume: Grid, low: Index, order: Index, levels: GreyLevels, affinity: Affinity) -> Index:
+    """Flat indices of the voxels of thin branches beyond the vessel ``order``, among those of ``low_region``."""
     nothing = np.zeros(0, np.int64)
-    if tables is None:
-        return nothing, 0.0
-    low, read = connect(volume, seeds, tables, 0.5, neighbours(6))
+    if len(low) <= len(order):
+        return nothing
     bright = smooth_voxels(volume.values, affinity.taps, order)
     thick = order[bright >= levels.outside + FULL * levels.contrast]
-    if len(low) <= len(order) or len(thick) == 0:
-        return nothing, read
-    found, beyond = _beyond_skirt(volume, thick, low)
+    if len(thick) == 0:
+        return nothing
+    found, beyond = beyond_skirt(volume, thick, low)
     if len(found) < SHORTEST:
-        return nothing, read
+        return nothing
     part, steps = along_cores(beyond, np.ones(len(found), bool))
     share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
     count = np.bincount(part)
@@ -102,7 +104,7 @@ def thin_branches(
     np.maximum.at(length, part, steps + 1)
     np.maximum.at(most, part, share)
     good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
-    return found[good[part]], read
+    return np.asarray(found[good[part]], np.int64)
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:

@@ -7,10 +7,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from pipeline.model import Curve, Lumen, Volume
+from pipeline.ranges import Profile
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
+from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.explain import explained, missed_mm
+from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import near_rotation_plane
 
@@ -29,6 +32,7 @@ def trace(
     reference: Volume | None = None,
     previous: Curve | None = None,
     expected_mm: float | None = None,
+    opacity: Profile | None = None,
     config: TraceConfig | None = None,
 ) -> Curve:
     """The wire of one frame from the plane of entry to the tip.
@@ -36,18 +40,19 @@ def trace(
     frame, reference : scans of one geometry, with and without wire (without, or where correlated noise hides the wire:
     the background is modelled from the lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve
     of the frame before, if any; it is consulted only where the frame alone leaves doubts.  expected_mm : insertion
-    depth, which helps to decide.
+    depth, which helps to decide.  opacity : the wire's brightness per length over the distance from its tip (any
+    unit), a number or pairs; found where it is not given.
     Returns a Curve; what went wrong is its status and note.
     """
     config = config or TraceConfig()
-    image = subtracted(frame, lumen, reference)
     heading = np.asarray(entry_direction, float) / np.linalg.norm(np.asarray(entry_direction, float))
-    entry = EntryPose(image.local(np.asarray(entry_mm, float)[None])[0], image.turned(heading), expected_mm)
-    curve = BACK_END(image, entry, previous, config)
-    if reference is not None and image.correlated and curve.status is FrameStatus.TRACE_LOW_CONTRAST:
-        # smoothing takes white noise off the reference; correlated noise it adds to the frame's, 1.4 times as much
-        alone = BACK_END(subtracted(frame, lumen, None), entry, previous, config)
-        curve = alone if alone.status is FrameStatus.OK and _same(alone, curve, image.voxel) else curve
+    stated = EntryPose(np.asarray(entry_mm, float), heading, expected_mm, Opacity.of(opacity))
+    curve = _seen((frame, reference, lumen), stated, previous, config)
+    larger = times(float(np.min(frame.spacing_mm)))
+    if curve.status is not FrameStatus.OK and larger > 1:
+        scans = coarse_scan(frame, larger), reference and coarse_scan(reference, larger), coarse_lumen(lumen, larger)
+        again = _seen(scans, stated, previous, config)
+        curve = again if again.status is FrameStatus.OK else curve
     if len(curve.points_mm) == 0:
         return curve
     axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
@@ -55,6 +60,21 @@ def trace(
     in_plane_mm = float(in_plane.mean()) * curve.length_mm
     curve = replace(curve, in_plane=in_plane, counters={**curve.counters, "in_plane_mm": in_plane_mm})
     return of_length(curve, expected_mm, config)
+
+
+def _seen(
+    scans: tuple[Volume, Volume | None, Lumen], stated: EntryPose, previous: Curve | None, config: TraceConfig
+) -> Curve:
+    """The wire of a frame, by its reference and lumen. stated : in LPS."""
+    frame, reference, lumen = scans
+    image = subtracted(frame, lumen, reference)
+    entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
+    curve = BACK_END(image, entry, previous, config)
+    if reference is None or not image.correlated or curve.status is not FrameStatus.TRACE_LOW_CONTRAST:
+        return curve
+    # smoothing takes white noise off the reference; correlated noise it adds to the frame's, 1.4 times as much
+    alone = BACK_END(subtracted(frame, lumen, None), entry, previous, config)
+    return alone if alone.status is FrameStatus.OK and _same(alone, curve, image.voxel) else curve
 
 
 def _same(curve: Curve, other: Curve, voxel: float) -> bool:

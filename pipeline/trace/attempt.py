@@ -12,6 +12,7 @@ from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.link import Path, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
 from pipeline.trace.profile import EVEN, Steps, ended
+from pipeline.trace.stated import Opacity, ended_as_stated
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube, fit_tube, predicted, spline_through, tint_nodes
 
@@ -37,12 +38,13 @@ FIRST_BLUR = 0.9
 class EntryPose:
     """The point (3,) at which the wire enters and its direction there (3,), in kernel coordinates; and its depth.
 
-    expected_mm : insertion depth that the manifest gives, mm; None where it gives none.
+    expected_mm, opacity : insertion depth, mm, and brightness that the manifest gives; None where it gives none.
     """
 
     point: Array
     direction: Array
     expected_mm: float | None = None
+    opacity: Opacity | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,7 @@ def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN) -> Tube:
     return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0, steps=steps)
 
 
-def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find_tip: bool = True) -> Tube | None:
+def _fitted(image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True) -> Tube | None:
     """The tube along a path; None where the path is so wrong that its equations have no solution.
 
     cut : wire goes on before the path's first point.
@@ -109,9 +111,11 @@ def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find
     h = image.voxel
     try:
         line, steps = resampled(points, 0.5 * h), EVEN
-        if find_tip:
+        if find_tip and entry.opacity is None:
             line, steps = ended(image, line, FIRST_BLUR * h)
-        plane = (line[0] + 2.0 * h * direction, direction) if cut else None
+        elif find_tip and entry.opacity is not None:
+            line, steps = ended_as_stated(image, line, FIRST_BLUR * h, entry.opacity)
+        plane = (line[0] + 2.0 * h * entry.direction, entry.direction) if cut else None
         return fit_tube(image, replace(first_tube(image, line, steps), start_plane=plane))
     except (np.linalg.LinAlgError, ValueError):
         return None
@@ -119,10 +123,10 @@ def _fitted(image: Subtraction, points: Array, cut: bool, direction: Array, find
 
 def dense(tube: Tube, step: float) -> Array:
     """Points of the tube's curve about ``step`` mm apart."""
-    return tube.at(np.linspace(0, tube.intervals, max(3, round(_length(tube) / step) + 1)))
+    return tube.at(np.linspace(0, tube.intervals, max(3, round(tube_length(tube) / step) + 1)))
 
 
-def _length(tube: Tube) -> float:
+def tube_length(tube: Tube) -> float:
     """Length of the tube's curve, mm."""
     return float(arc_length(tube.at(np.linspace(0, tube.intervals, 4 * tube.intervals + 1)))[-1])
 
@@ -146,28 +150,30 @@ def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Arr
 
 
 def _attempt(
-    image: Subtraction, path: Path, direction: Array, pieces: list[Tracklet], known: Array, behind_mm: float = 0.0
+    image: Subtraction, path: Path, entry: EntryPose, pieces: list[Tracklet], known: Array, behind_mm: float = 0.0
 ) -> Attempt | None:
     """The tube along a path, and what it leaves of the pieces; None where there is no such tube."""
-    tube = _fitted(image, path.points, behind_mm > 0.0, direction)
+    tube = _fitted(image, path.points, behind_mm > 0.0, entry)
     if tube is None:
         return None
     return Attempt(tube, path, _leftover(image, tube, pieces, known), pieces, known, behind_mm=behind_mm)
 
 
-def prolonged(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt | None:
+def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt | None:
     """The attempt with what goes on beyond its tip; None where nothing does.
 
     The same attempt, marked as going on, where something is seen that no fit reaches.
     """
     line = dense(attempt.tube, 0.5 * image.voxel)
-    path = beyond(image, attempt.tube, line)
+    path, stray = beyond(image, attempt.tube, line, attempt.known)
+    if path is None and stray:
+        return replace(attempt, goes_on=True)
     if path is None:
         # a dim end is looked for straight ahead; once more from where it was found, as wires bend
-        found = again(image, attempt, direction) if len(attempt.tube.steps.edges) else attempt
-        return found if _length(found.tube) > _length(attempt.tube) + image.voxel else None
-    tube = _fitted(image, path.points, attempt.cut, direction)
-    if tube is None or _length(tube) < _length(attempt.tube) + 3.0 * image.voxel:
+        found = again(image, attempt, entry) if len(attempt.tube.steps.edges) else attempt
+        return found if tube_length(found.tube) > tube_length(attempt.tube) + image.voxel else None
+    tube = _fitted(image, path.points, attempt.cut, entry)
+    if tube is None or tube_length(tube) < tube_length(attempt.tube) + 3.0 * image.voxel:
         return replace(attempt, goes_on=True)
     gaps = attempt.path.points[attempt.path.bridged]
     points = np.concatenate([gaps, path.points])
@@ -203,12 +209,12 @@ def cold(
         return None
     behind = len(whole.points) - len(path.points)
     behind_mm = float(arc_length(whole.points[: behind + 1])[-1]) if behind else 0.0
-    return _attempt(image, path, entry.direction, pieces, whole.points, behind_mm)
+    return _attempt(image, path, entry, pieces, whole.points, behind_mm)
 
 
-def again(image: Subtraction, attempt: Attempt, direction: Array) -> Attempt:
+def again(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt:
     """The attempt fitted anew, tip and all, to another image of the same frame; itself where that has no solution."""
-    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, direction)
+    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, entry)
     return attempt if tube is None else replace(attempt, tube=tube)
 
 
@@ -219,7 +225,7 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
     """
     h = image.voxel
     old = image.local(previous.points_mm)
-    tube = _fitted(image, old, False, entry.direction, find_tip=False) if len(old) >= 8 else None
+    tube = _fitted(image, old, False, entry, find_tip=False) if len(old) >= 8 else None
     if tube is None:
         return None
     line = dense(tube, 0.5 * h)
@@ -234,7 +240,7 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
         first = int(np.argmax(ahead)) if ahead.any() else len(ahead)
         points = np.concatenate([line, onward.points[first:]])
         path = Path(points, np.concatenate([path.bridged, onward.bridged[first:]]), onward.bridges)
-    found = _attempt(image, path, entry.direction, rest, np.zeros((0, 3)))
+    found = _attempt(image, path, entry, rest, np.zeros((0, 3)))
     return None if found is None else replace(found, from_previous=True)
 
 

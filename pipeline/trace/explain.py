@@ -17,7 +17,7 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
-from pipeline.trace.tube import Tube, point_sigmas
+from pipeline.trace.tube import DIM_END, Tube, point_sigmas
 from pipeline.trace.verdict import LEAST_SEEN, SURE_CNR, Verdict, judge, note_of
 
 SAMPLE_VOXELS = 1.0
@@ -35,7 +35,7 @@ BEND_SHARE = 0.0125
 WALL_ERROR, WALL_REACH = 0.13, 5.0
 """Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
 PLAIN_TIP, STEP_TIP = 0.08, 0.25
-"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one whose brightness has steps."""
+"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one with a dim end."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
 BRIDGE_SIGMA_VOXELS = 0.5
@@ -144,7 +144,7 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
 def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candidate:
     """The candidate with all that goes on beyond its tip."""
     for _ in range(MOST_PIECES):
-        more = _read_off(image, prolonged(image, best.attempt, entry.direction), entry)
+        more = _read_off(image, prolonged(image, best.attempt, entry), entry)
         if not more:
             break
         best = more[0]
@@ -192,7 +192,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     across, along = inflation(image, best.points, tube)
     bias = _model_error(image, best)
     sigma = np.hypot(across * best.sigma, bias)
-    own_tip = (STEP_TIP if len(tube.steps.edges) else PLAIN_TIP) * image.voxel
+    own_tip = (STEP_TIP if tube.steps.levels[-1] < DIM_END else PLAIN_TIP) * image.voxel
     tip_sigma = float(np.hypot(along[-1] * best.tip_sigma, own_tip))
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {
@@ -245,5 +245,5 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     if image.modelled:
         # the lumen's own grey under the wire is taken from beside it, and the fit done again
         image = levelled(image, dense(best.attempt.tube, image.voxel), best.attempt.tube.sigma)
-        best = _agreed(best, _read_off(image, again(image, best.attempt, entry.direction), entry)[0])
+        best = _agreed(best, _read_off(image, again(image, best.attempt, entry), entry)[0])
     return _faint_for_its_noise(_curve(image, best))

@@ -42,6 +42,8 @@ RAY_STEP = 0.1
 """Angle (rad) from one to the next: a voxel at its end."""
 RAY_SURE = 4.5
 """Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
+OUTER_SURE = 2.5
+"""and those from which its outer half is."""
 OUTSIDE_CONE = 0.85
 """Least cosine between the wire's end and the way on which the lumen may have ended too early."""
 OUTSIDE_VOXELS = 1.5
@@ -54,7 +56,7 @@ FEW = 0.1
 """Share of the ways below which what is bright on them is no vessel but the edge of bone, or a wire straight ahead."""
 AHEAD_RAD = 0.15
 """Angle to the wire's end up to which a way is straight ahead: the nearest of ``_cone``."""
-MOST_RAYS = 12
+MOST_RAYS = 24
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
 """A piece nearer to the wire than this is what the fit left of it."""
@@ -122,18 +124,21 @@ def _cone(heading: Array) -> Array:
 def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
     """The end (3,) of the straight piece from a point along which grey stands out most; None for none.
 
-    RAY_MM long, or half of that, as the wire may end within it.
+    Half of RAY_MM long, as the wire may end within it; the whole where half of it is too little to be sure.
     """
     h = image.voxel
     s = np.arange(1.5 * h, RAY_MM, h)
     directions = _cone(heading)
     grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
-    count = np.array([len(s) // 2, len(s)])
-    mean = np.cumsum(grey, axis=0)[count - 1] / count[:, None]
-    sure = mean * np.sqrt(count / INDEPENDENT_VOXELS)[:, None] / image.noise_in(CREST_VOXELS)
-    n, best = np.unravel_index(int(np.argmax(sure)), sure.shape)
-    seen = sure[n, best] > RAY_SURE and mean[n, best] > least
-    return np.asarray(start + s[count[n] - 1] * directions[best]) if seen else None
+    noise = image.noise_in(CREST_VOXELS)
+    for stop in (len(s) // 2, len(s)):
+        mean, outer = np.mean(grey[:stop], axis=0), np.mean(grey[stop // 2 : stop], axis=0)
+        # the way on that noise prefers begins on the wire's last voxels, and ends on nothing
+        ends = outer * np.sqrt((stop - stop // 2) / INDEPENDENT_VOXELS) > OUTER_SURE * noise
+        best = int(np.argmax(np.where(ends, mean, -np.inf)))
+        if mean[best] * np.sqrt(stop / INDEPENDENT_VOXELS) > RAY_SURE * noise and mean[best] > least and ends[best]:
+            return np.asarray(start + s[stop - 1] * directions[best])
+    return None
 
 
 def seen_outside(image: Subtraction, line: Array) -> bool:
@@ -178,34 +183,42 @@ def _walked(image: Subtraction, line: Array, least: float) -> Array:
     return np.array(found[1:]).reshape(-1, 3)
 
 
-def _from_crests(image: Subtraction, line: Array, faintest: float) -> Tracklet | None:
-    """The nearest piece of crest in the box around the tip that leads on from it."""
+def _from_crests(image: Subtraction, line: Array, known: Array, faintest: float) -> tuple[Tracklet | None, bool]:
+    """The nearest piece of crest in the box around the tip that leads on from it; and whether there is one that is as
+    sure but leads elsewhere.
+    """
     tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
     reach, at = np.ceil(REACH_MM / image.spacing), np.rint(tip / image.spacing)
     near = _near(image.region, at - reach, at + reach)
     if len(near.runs) == 0:
-        return None
-    noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(line)
-    pieces = find_crests(replace(image, region=near), WIDE_VOXELS, SIGMAS)
-    found = ((p, _onward(p, tip, heading)) for p in pieces if _stands_out(p, noise, image.voxel))
-    runs = [
-        r
-        for p, r in found
-        if r is not None
-        and np.mean(tree.query(r.points)[0] > BESIDE_VOXELS * image.voxel) > 0.5
-        and p.grey > 0.5 * faintest * (APART_TIMES if _apart(r, tip) else 1.0)
-        and (_height(p, noise, image.voxel) > SURE_APART or not _apart(r, tip))
-    ]
-    return min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip))) if runs else None
+        return None, False
+    noise, tree = image.noise_in(WIDE_VOXELS), cKDTree(np.concatenate([line, known]))
+    runs, stray = [], False
+    for piece in find_crests(replace(image, region=near), WIDE_VOXELS, SIGMAS):
+        run = _onward(piece, tip, heading)
+        if not _stands_out(piece, noise, image.voxel) or not _off(run or piece, tree, image.voxel):
+            continue
+        sure = _height(piece, noise, image.voxel) > SURE_APART and piece.grey > 0.5 * faintest * APART_TIMES
+        if run is not None and (sure or (not _apart(run, tip) and piece.grey > 0.5 * faintest)):
+            runs.append(run)
+        stray |= sure
+    return min(runs, key=lambda r: float(np.linalg.norm(r.points[0] - tip))) if runs else None, stray
 
 
-def beyond(image: Subtraction, tube: Tube, line: Array) -> Path | None:
-    """The wire's line (n, 3) continued along what goes on from its tip; None where nothing does."""
+def _off(piece: Tracklet, tree: cKDTree, voxel: float) -> bool:
+    """Whether most of a piece is no rest of the wire that was fitted."""
+    return bool(np.mean(tree.query(piece.points)[0] > BESIDE_VOXELS * voxel) > 0.5)
+
+
+def beyond(image: Subtraction, tube: Tube, line: Array, known: Array) -> tuple[Path | None, bool]:
+    """The wire's line (n, 3) continued along what goes on from its tip, None where nothing does; and whether something
+    bright near the tip, off all ``known`` points (m, 3), leads elsewhere.
+    """
     h = image.voxel
     tip, heading = line[-1], tip_tangent(line, TANGENT_MM)
     faintest = FAINTEST * tube.peak * float(tube.steps.levels[-1])
     with image.showing(tube.voxels, tube.rest):
-        run = _from_crests(image, line, faintest)
+        run, stray = _from_crests(image, line, known, faintest)
         if run is None:
             walked = _walked(image, line, faintest)
     if run is not None:
@@ -214,7 +227,7 @@ def beyond(image: Subtraction, tube: Tube, line: Array) -> Path | None:
     elif len(walked):
         more, empty = walked, 0
     else:
-        return None
+        return None, stray
     bridged = np.zeros(len(line) + len(more), bool)
     bridged[len(line) : len(line) + empty] = True
-    return Path(np.concatenate([line, more]), bridged, int(empty > 0))
+    return Path(np.concatenate([line, more]), bridged, int(empty > 0)), stray

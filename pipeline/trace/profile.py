@@ -31,16 +31,23 @@ LEAST_LEVEL = 0.1
 """Share of the usual grey from which something is wire: a plastic tip has 0.15, streaks a few hundredths."""
 INDEPENDENT_VOXELS = 1.7
 """Length of wire over which the noise of crest grey is one."""
+END_SIGMAS = 3.0
+"""Standard deviations within which an end is possible."""
 SURE = 6.0
 """Standard deviations by which a fainter piece stands out of the noise, all of it taken together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start."""
+    """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start.
+
+    stated : by the manifest, not found.  missing_mm : by which the wire then goes on beyond the line that was found.
+    """
 
     edges: Array
     levels: Array
+    stated: bool = False
+    missing_mm: float = 0.0
 
     def at(self, share: Array) -> Array:
         """Brightness (n,) at shares (n,) of the length."""
@@ -80,11 +87,14 @@ def _segments(value: Array, cost: float) -> NDArray[np.int64]:
     return np.array(found[:0:-1], np.int64)
 
 
-def _levels(profile: Array, arc: Array, edges: Array, sigma: float) -> tuple[Array, float]:
-    """Heights of blurred steps between edges that fit a profile best, and the sum of squares that is left."""
+def _levels(profile: Array, arc: Array, edges: Array, sigma: float, beyond: bool = True) -> tuple[Array, float]:
+    """Heights of blurred steps between edges that fit a profile best, and the sum of squares that is left.
+
+    beyond : something may lie beyond the last edge, too.
+    """
     inner = ndtr((arc[:, None] - edges[None]) / sigma)
     one, none = np.ones((len(arc), 1)), np.zeros((len(arc), 1))
-    design = np.hstack([one, inner]) - np.hstack([inner, none])
+    design = (np.hstack([one, inner]) - np.hstack([inner, none]))[:, : len(edges) + beyond]
     level = np.linalg.lstsq(design, profile, rcond=None)[0]
     return level, float(np.sum((profile - design @ level) ** 2))
 
@@ -126,26 +136,57 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
     own = max(4, len(line) - round(AHEAD_VOXELS / 0.25))
     usual = max(float(np.median(grey[:own])), 1e-9)
     noise = image.noise_in(CREST_VOXELS) / usual
-    tail = arc >= arc[-1] - (AHEAD_VOXELS + BACK_VOXELS) * h
-    edges = np.zeros(0)
+    edges, last = np.zeros(0), 0
     if not _is_even(grey[: max(1, own - 8)] / usual, noise, 0.25):
         edges = _edges(grey / usual, arc, noise, blur, h)
-        if len(edges):
-            level = _levels(grey / usual, arc, edges, blur)[0]
-            seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
-            last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
-            start = edges[last - 1] + 0.5 * blur if last else arc[0]
-            stop = edges[last] + 3.0 * blur if last < len(edges) else arc[-1]
-            tail = (arc >= max(start, stop - (AHEAD_VOXELS + BACK_VOXELS) * h)) & (arc <= stop)
-            edges = edges[:last]
-    end = max(step_position(grey[tail], arc[tail], blur), arc[0] + 2 * h)
+        level = _levels(grey / usual, arc, edges, blur)[0]
+        seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
+        last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
+    end = _end_of(last, edges, arc, grey, (blur, h))
+    if last and level[last] < level[last - 1] and end - edges[last - 1] < BAND_VOXELS * h:
+        last -= 1  # the blur of the end, not a part of the wire
+        end = _end_of(last, edges, arc, grey, (blur, h))
+    edges = edges[:last]
     line, edges = line[arc <= end], edges[edges < end - h]
     if not len(edges):
         return np.asarray(line), EVEN
     level = _levels(grey[arc <= end + 2 * blur] / usual, arc[arc <= end + 2 * blur], np.append(edges, end), blur)[0][
         :-1
     ]
+    if level[-1] < LEAST_LEVEL:  # the blur of a bright end, once more: nothing of it is left beside its own step
+        line, end, edges, level = line[: np.searchsorted(arc, edges[-1])], float(edges[-1]), edges[:-1], level[:-1]
+    if not len(edges):
+        return np.asarray(line), EVEN
     return np.asarray(line), Steps(edges / end, np.maximum(level, 0.0))
+
+
+def _end_of(last: int, edges: Array, arc: Array, grey: Array, size: tuple[float, float]) -> float:
+    """Arc at which the piece before edge ``last`` ends, by its own step alone. size : blur and voxel, mm."""
+    blur, h = size
+    start = edges[last - 1] + 0.5 * blur if last else arc[0]
+    stop = edges[last] + 3.0 * blur if last < len(edges) else arc[-1]
+    tail = (arc >= max(start, stop - (AHEAD_VOXELS + BACK_VOXELS) * h)) & (arc <= stop)
+    return max(step_position(grey[tail], arc[tail], blur), float(arc[0]) + 2 * h)
+
+
+def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -> tuple[float, float]:
+    """How much further back and further on (mm) a wire may end, by the profile of its last piece.
+
+    Ends are as likely as they leave the profile explained; what is three standard deviations off counts as possible.
+    """
+    h = image.voxel
+    line = resampled(extended(points, AHEAD_VOXELS * h, 0.25 * h), 0.25 * h)
+    arc, grey = arc_length(line), image.along(line)
+    end = float(arc_length(points)[-1])
+    edge = float(steps.edges[-1]) * end if len(steps.edges) else max(0.0, end - BACK_VOXELS * h)
+    before = [edge] if len(steps.edges) else []
+    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
+    near = arc > edge - BAND_VOXELS * h
+    tries = np.arange(edge + 0.5 * blur, arc[-1], 0.2 * h)
+    costs = np.array([_levels(grey[near], arc[near], np.array([*before, e]), blur, beyond=False)[1] for e in tries])
+    variance = image.noise_in(CREST_VOXELS) ** 2 * 4.0 * INDEPENDENT_VOXELS
+    likely = tries[costs - costs.min() < END_SIGMAS**2 * variance]
+    return max(0.0, end - float(likely[0])), max(0.0, float(likely[-1]) - end)
 
 
 def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:

@@ -26,6 +26,10 @@ TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
 """End weights of the fourth-order Gregory rule: the tip's position hangs on the quadrature of the last samples."""
+START_VOXELS = 8.0
+"""How far from its point the start plane reaches: what the blurred wire before it lights up."""
+DIM_END = 0.5
+"""Brightness of the wire's end, over that of its brightest part, below which the fit has no offset."""
 BLUR_HELD = 2
 """First iterations in which the blur is held: before the curve lies on the wire it would grow."""
 SLIDING, POLISHED = 3e-2, 1e-6
@@ -157,13 +161,15 @@ def _prior(tube: Tube, image: Subtraction) -> Array:
 
 
 def _claim(image: Subtraction, tube: Tube, curve: Array, slot: NDArray[np.int32]) -> Claim:
-    """The voxels near the tube's curve (n, 3); those before its start plane have no weight."""
+    """The voxels near the tube's curve (n, 3); those at its start that lie before its start plane have no weight."""
     voxels = kernels.active_voxels(slot, image.spacing, curve, tube.blob(image.voxel).radius)
     if tube.start_plane is None:
         return Claim(voxels, slot, np.ones(len(voxels)))
     point, direction = tube.start_plane
     index = np.stack(np.unravel_index(voxels, image.grey.shape), axis=1) * image.spacing
-    return Claim(voxels, slot, np.where((index - point) @ direction > 0, 1.0, 0.0))
+    # a wire may come back past the plane elsewhere
+    at_start = np.sum((index - point) ** 2, axis=1) < (START_VOXELS * image.voxel) ** 2
+    return Claim(voxels, slot, np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0))
 
 
 def _equations(
@@ -192,6 +198,13 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
     diagonal = np.arange(3 * k)
     out[diagonal, diagonal] += 1e-4 * level
     return out
+
+
+def _hold(normal: Array, right: Array, columns: list[int]) -> None:
+    """Leave some unknowns as they are."""
+    for column in columns:
+        normal[column], normal[:, column], right[column] = 0.0, 0.0, 0.0
+        normal[column, column] = 1.0
 
 
 def _factors(normal: Array) -> tuple[Array, NDArray[np.int64]]:
@@ -236,19 +249,21 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
     """
     samples, prior = sampling(tube, image.voxel), _prior(tube, image)
     slot = sparse_zeros(image.grey.shape, np.int32)
+    # a bright piece is no Gaussian to a few hundredths, which its offset takes up; a dim one drowned in that
+    stepped = [-1] if tube.steps.levels[-1] < DIM_END * tube.steps.levels.max() else []
     done = 0
     for done in range(1, iterations + 1):
         found, _, line = _equations(image, tube, samples, prior, slot)
         normal, right = _damped(found.normal, tube, SLIDING), found.right
-        if done <= BLUR_HELD:
-            normal[-2], normal[:, -2], right[-2] = 0.0, 0.0, 0.0
-            normal[-2, -2] = 1.0
+        _hold(normal, right, [-2] * (done <= BLUR_HELD) + stepped)
         tube, size = _moved(tube, substitute(*_factors(normal), right), image.voxel, line)
         if size < tolerance * image.voxel and done > BLUR_HELD:
             break
     found, claim, _ = _equations(image, tube, samples, prior, slot)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
-    factors = _factors(_damped(found.normal, tube, POLISHED))
+    normal = _damped(found.normal, tube, POLISHED)
+    _hold(normal, found.right, stepped)
+    factors = _factors(normal)
     covariance = np.stack([substitute(*factors, unit) for unit in np.eye(len(found.normal))]) * image.noise**2
     return replace(
         tube, covariance=covariance, residual_rms=rms, iterations=done, voxels=claim.voxels, rest=found.residual

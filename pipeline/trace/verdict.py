@@ -7,22 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import Attempt
+from pipeline.trace.attempt import Attempt, tube_length
+from pipeline.trace.ends import Objection, beside_itself, of_the_ends
 from pipeline.trace.link import extended, resampled
-from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import LEAST_LEVEL, Steps
-from pipeline.trace.section import fills_vessel, out_of_round
+from pipeline.trace.section import out_of_round
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.tube import Tube
 
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
 LEAST_WITH_PRIOR = 1.5
 """and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
+NARROWEST = 0.7
+"""Share of the scanner's blur that a faint line is wide at the least: nothing is sharper, but noise."""
 LEAST_SEEN = 2.0
 """The same over what noise does to the fit: noise correlated over 0.8 voxel counts 2.4-fold. Below it the wire is
 followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
@@ -45,14 +47,8 @@ IN_CONTACT = 0.035
 beside it, is below 0.03."""
 OBLONG = 0.12
 """and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
-EDGE_VOXELS = 2.0
-"""Distance from the scan's end within which a tip is none: wires that leave end 1.0 inside at the most (100 traces at
-5 to 90 degrees, CNR 4 to 30; nearly all lie outside), tips within the scan where they are, to 0.4."""
 BESIDE_VOXELS = 2.2
 """Two strands of one curve nearer than this share their crest."""
-MOST_APART = 3.0
-"""Slice distance over pixel size from which a curve needs its length confirmed: of 12 wires in slices of 2 mm and
-pixels of 0.5 mm, 8 were more than a pixel off or short."""
 MOST_DOUBLE_MM = 2.0
 """Length of line that may be two strands (a crossing is 1 mm) from which a frame alone does not decide."""
 MOST_OUTSIDE = 0.03
@@ -89,18 +85,26 @@ def _averaged(values: Array, width: int) -> Array:
     return np.asarray(np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same"))
 
 
-def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, float]:
+def _shares(tube: Tube, points: Array) -> Array:
+    """Shares (n,) of the tube's length at which points (n, 3) lie, the last at its end."""
+    arc = arc_length(points)
+    return np.asarray(1.0 - (arc[-1] - arc) / max(tube_length(tube), arc[-1]))
+
+
+def _crest_share(image: Subtraction, attempt: Attempt, points: Array, step_mm: float) -> tuple[Array, Array]:
     """Grey on the curve (n,) over its usual height along the wire, averaged over MEAN_OVER_MM, and its noise (sd).
 
-    The blur in which grey is read leaves 0.36 of the noise, the mean the rest.
+    The usual height is the stated one, where one is stated. The blur in which grey is read leaves 0.36 of the noise,
+    the mean the rest.
     """
-    grey = image.along(points)
-    usual = _usual(grey, attempt.tube.steps)
-    share = _averaged(grey, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
+    grey, steps = image.along(points), attempt.tube.steps
+    height = steps.at(_shares(attempt.tube, points)) if steps.stated else np.ones(len(points))
+    usual = float(np.median(grey / height)) if steps.stated else _usual(grey, steps)
+    share = _averaged(grey / height, max(1, round(MEAN_OVER_MM / step_mm))) / max(usual, 1e-9)
     count = max(1.0, MEAN_OVER_MM / max(step_mm, 1.5 * image.voxel))
     gain = 1.0 + (CREST_VOXELS * image.voxel / attempt.tube.sigma) ** 2
     cnr = attempt.cnr(image)
-    return share, 0.4 * gain / cnr / float(np.sqrt(count)) if cnr > 0.0 else float("inf")
+    return share, 0.4 * gain / cnr / float(np.sqrt(count)) / height if cnr > 0.0 else np.full(len(points), np.inf)
 
 
 def _usual(grey: Array, steps: Steps) -> float:
@@ -142,7 +146,7 @@ def seen_steps(steps: Steps, share: Array) -> NDArray[np.bool_]:
     dim = (levels > 0.6 * LEAST_LEVEL) & (levels < 2.0 * FAINT)
     last = len(dim) - 1
     from_start, to_end = np.logical_and.accumulate(dim), np.logical_and.accumulate(dim[::-1])[::-1]
-    return np.asarray((from_start | to_end)[piece] & (last > 0))
+    return np.asarray((from_start | to_end)[piece] & (last > 0) & (not steps.stated))
 
 
 def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[np.bool_], length_mm: float) -> Verdict:
@@ -150,21 +154,21 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     step = length_mm / max(1, len(points) - 1)
     share, noise = _crest_share(image, attempt, points, step)
     ends = np.minimum(np.arange(len(points)), np.arange(len(points))[::-1]) * step
-    known = seen_steps(attempt.tube.steps, np.linspace(0.0, 1.0, len(points)))
+    known = seen_steps(attempt.tube.steps, _shares(attempt.tube, points))
     faint = (share < FAINT + noise) & (ends > MEAN_OVER_MM) & ~known
     oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
-    double = _beside_itself(points, step, image.voxel)
+    double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
-        double |= _doubled(share, oblong, max(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+        double |= _doubled(share, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
-    objections += _of_the_ends(image, attempt, points, length_mm)
+    objections += of_the_ends(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
 
 
-def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArray[np.bool_]:
+def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:
     """Points (n,) where two strands may lie on one crest: not round, or too bright where nobody can tell.
 
     The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
@@ -176,61 +180,11 @@ def _doubled(share: Array, oblong: Array, bright: float, noise: float) -> NDArra
     return np.asarray(hidden | (oblong > least + 3.0 * own))
 
 
-def _beside_itself(points: Array, step: float, voxel: float) -> NDArray[np.bool_]:
-    """Points (n,) within BESIDE_VOXELS of a stretch of the curve that is further along it than that can be."""
-    apart = round(3.0 * BESIDE_VOXELS * voxel / max(step, 1e-9))
-    pairs = cKDTree(points).query_pairs(BESIDE_VOXELS * voxel, output_type="ndarray")
-    out = np.zeros(len(points), bool)
-    out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
-    return out
-
-
-def _named(image: Subtraction, point: Array) -> str:
-    """A place in LPS mm, for a message."""
-    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
-
-
-def _at_edge(image: Subtraction, point: Array) -> bool:
-    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
-    index = point / image.spacing + image.region.corner
-    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
-
-
-Objection = tuple[bool, FrameStatus, str, str, str]
-"""Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
-
-
-def _of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
-    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
-    return (
-        (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
-         "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it",
-         "look whether the wire's end is fainter than the rest"),
-        (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
-         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
-         "a lumen that holds the tip",
-         "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
-        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
-         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
-         "turn entry_direction round, or state insertion_mm if this is right"),
-        (image.slices_apart >= MOST_APART and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
-         f"slices {image.slices_apart:.1f} times as far apart as pixels",
-         f"less than {MOST_APART} times, or insertion_mm",
-         "state insertion_mm: in such slices a wire's ends are lost by more than its uncertainty says"),
-        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
-         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
-         "leave this frame out, or scan a larger field"),
-        (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
-         "a line as thick as its vessel", "a wire, which is thinner",
-         "check that the frame shows a wire, and that the reference has the frame's contrast"),
-    )  # fmt: skip
-
-
 def _of_the_line(
     image: Subtraction,
     attempt: Attempt,
     points: Array,
-    seen: tuple[Array, float, NDArray[np.bool_]],
+    seen: tuple[Array, Array, NDArray[np.bool_]],
     lengths: tuple[float, float, float],
 ) -> tuple[Objection, ...]:
     """What may be wrong along a curve (n, 3)."""
@@ -239,7 +193,12 @@ def _of_the_line(
     most_mm = LEFTOVER_MM if cnr > SURE_CNR else max(FAINT_LEFTOVER_MM, 0.1 * length_mm)
     # a previous curve is confirmed where the crest along it stands 3 sd above nothing, nearly everywhere
     confirmed = prior and cnr > LEAST_WITH_PRIOR and not np.mean(share < 3.0 * noise) > 0.05
+    thin = attempt.tube.sigma < NARROWEST * image.wall_blur_mm and not image.thick_slices
     return (
+        (thin and cnr < SURE_CNR, FrameStatus.TRACE_LOW_CONTRAST,
+         f"a line of blur {attempt.tube.sigma:.2f} mm, {cnr:.1f} noises bright",
+         f"no less than {NARROWEST:g} of the scanner's own blur, {image.wall_blur_mm:.2f} mm",
+         "check that the frame shows a wire; scan with more dose or give the frame before"),
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
          f"a wire {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
          "scan with more dose or give the frame before"),

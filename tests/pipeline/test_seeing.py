@@ -28,9 +28,16 @@ from tests.studies.seeing.table import look
         ("correlated noise, CNR 4 to 6", 2),
         ("wire, contrast x 0.7 to 1.4", 2),
         ("platinum coil tip, x 3 to 10", 4),
+        ("platinum coil tip, x 3 to 10", 450),  # 2 voxels too long: a last piece of no brightness
         ("marker band before the tip", 2),
         ("dim distal part, x 0.15 to 0.2", 12),
-        ("dim distal part, x 0.15 to 0.2", 16),
+        ("dim distal part, x 0.15 to 0.2", 343),  # 2.4 voxels too long and ok, by an offset common to bright and dim
+        ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 341),  # its tip behind the plane of entry was not fitted
+        ("plain, no reference", 347),  # once cut by 7.5 mm, and ok
+        ("plain", 300),  # the blur of its end was a dimmer part
+        ("stenosis", 1),
+        ("stenosis, no reference", 2),
+        ("0.9 mm wire, 0.1 mm voxels", 300),
         ("gap of 5 to 8 mm", 5),
         ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 0),
         ("layered filling", 1),
@@ -51,9 +58,10 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("wire out of the scan", 0, "TRACE_LEFT_SCAN"),
         ("wire out of the scan at a shallow angle", 1, "TRACE_LEFT_SCAN"),
         ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
-        ("stenosis", 1, "TRACE_LEFT_LUMEN"),
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
-        ("plain, no reference", 347, "TRACE_AMBIGUOUS"),  # once cut by 7.5 mm and ok
+        ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
+        ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
+        ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
     ],
 )
 def test_what_cannot_be_told_is_refused(case, seed, status):

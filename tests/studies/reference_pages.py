@@ -75,6 +75,8 @@ KEYS = {
     "rest_curvature_per_mm": "Curvature of the wire when nothing touches it, towards material axis 1 where positive.",
     "torsional_stiffness_N_mm2": "GJ. Default: inf, the tip turns with the hand.",
     "weight_N_per_mm": "Weight per length; needs `down`.",
+    "opacity": "Brightness per length in X-rays, over the distance from the tip, in any unit: "
+    "`[[0, 3.0], [20, 3.0], [20, 1.0]]` for a coil of platinum. Left out: found in the scans.",
     "stiffness_N_mm2": "Force per mm of wire and mm of way into the wall.",
     "friction": "Coulomb's coefficient.",
     "insertion_mm of OverWire": "Depth of the catheter's own tip, one for all frames or one per frame.",

@@ -16,8 +16,10 @@ from pipeline.run.helpers import Earlier, nothing
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
+from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.straightened import straightened
+from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
@@ -38,12 +40,17 @@ def trace_frames(run: Context, known: Known) -> Known:
     parts = run.share("trace", work.part, len(known.frames), wall)
     for part in parts:
         run.log.add(part.log)
-    frames = [part.frame for part in parts]
+    voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
+    frames = in_step([part.frame for part in parts], voxel_mm)
+    run.log.warnings += shrinking(frames, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
-    return replace(known, frames=tuple(frames))
+    curves = [curve.points_mm for frame in frames if (curve := frame.trusted_curve) is not None]
+    lumen = opened(known.lumen, curves, run.case.wire.radius_mm)
+    run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
+    return replace(known, frames=tuple(frames), lumen=lumen)
 
 
 class _Part(NamedTuple):
@@ -116,6 +123,7 @@ class _Tracing:
             reference=self.reference,
             previous=Before(lambda: _last_curve(frame.index, earlier)),
             expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
+            opacity=run.case.wire.opacity,
             config=settings,
         )
         return _along(_traced(done, curve), shown, window), window

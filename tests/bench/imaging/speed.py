@@ -69,7 +69,7 @@ def report(quick):
         r = json.loads(done.stdout.splitlines()[-1])
         others = rivals(folder, s, RIVAL_FRAMES)
     parts, total = r["seconds"], sum(r["seconds"].values())
-    print(f"\n## {frames} frames of {side}^3 as int16 .mha, warm files, registration skipped; one process, wall s")
+    print(f"\n## {frames} frames of {side}^3 as int16 .mha, warm files, registration skipped; one process, processor s")
     good, share = r["status"].count("OK"), 100 * r["crop"]
     print(f"   {good} of {frames} frames OK; read on the lumen's box, {share:.0f} % of them")
     spent = " + ".join(f"{stage} {seconds:.2f}" for stage, seconds in parts.items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -27,7 +27,8 @@ class Scene:
     """Scans, the true wire from entry to tip (None: there is none), what the manifest says, and the true vessel.
 
     voxel : smallest edge, mm.  tip_cnr : of the
-    wire's last piece.  gaps : arcs (mm from the entry) that the scan does not show.
+    wire's last piece.  gaps : arcs (mm from the entry) that the scan does not show.  stated : more that the manifest
+    says, as arguments of ``trace``.
     """
 
     frame: Volume
@@ -41,6 +42,7 @@ class Scene:
     cnr: float
     tip_cnr: float
     gaps: tuple = ()
+    stated: dict = field(default_factory=dict)
 
 
 class Draft:
@@ -60,7 +62,7 @@ class Draft:
         self.opacity = np.ones(len(self.path))
         self.lattice = r.Lattice.around(self.axis, radius + 2.5, spacing, rng, rng.uniform(0.7, 0.9))
         self.gain, self.correlation, self.direction = 1.0, 0.0, None
-        self.more, self.others, self.shown = [], [], True
+        self.more, self.others, self.shown, self.stated = [], [], True, {}
 
     @property
     def from_tip(self):
@@ -91,7 +93,7 @@ class Draft:
         return Scene(
             frame, still if reference else None, self.path[n:] if self.shown else None, self.path[n] + shift,
             towards / np.linalg.norm(towards), self.axis, self.radius, float(lattice.spacing.min()), cnr,
-            cnr * min(1.0, float(self.opacity[-1])), gaps,
+            cnr * min(1.0, float(self.opacity[-1])), gaps, self.stated,
         )  # fmt: skip
 
 
@@ -365,4 +367,32 @@ def leaves_slowly(rng, seed):
 @case("tip 2 to 5 voxels from the scan's side")
 def tip_at_side(rng, seed):
     d = at_a_side(rng, rng.uniform(0.0, 1.0), 1, rng.uniform(0.9, 1.5))
+    return d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)
+
+
+def with_profile(rng, length, level):
+    """A wire whose last ``length`` mm have ``level`` times the brightness, and a manifest that says so, nearly."""
+    d = Draft(rng, length=48.0)
+    d.opacity = np.where(d.from_tip < length, level, 1.0)
+    told = length + rng.normal(scale=0.2)
+    d.stated["opacity"] = [(0.0, level * rng.uniform(0.8, 1.25)), (told, level), (told, 1.0)]
+    return d
+
+
+@case("platinum coil tip, opacity stated")
+def platinum_stated(rng, seed):
+    d = with_profile(rng, 20.0, rng.uniform(3, 10))
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 2 == 0)
+
+
+@case("dim distal part, opacity stated")
+def dim_stated(rng, seed):
+    d = with_profile(rng, rng.uniform(3, 18), rng.uniform(0.15, 0.2))
+    return d.scan((10, 16)[seed // 2 % 2], reference=seed % 4 < 3)
+
+
+@case("slices of 2 mm, insertion_mm stated")
+def slices_stated(rng, seed):
+    d = Draft(rng, length=60.0, spacing=(0.5, 0.5, 2.0), radius=3.5, wire_radius=0.3)
+    d.stated["expected_mm"] = float(r.arc_of(d.path[d.entry_at :])[-1] + rng.normal(scale=0.5))
     return d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)

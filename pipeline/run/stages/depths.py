@@ -1,0 +1,62 @@
+"""What the frames' traced lengths say of each other: a trace that was cut or led astray is out of step.
+
+Stated depths are off by what the hand's scale and the entry are, the same in neighbouring frames.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.arrays.grids import spread
+from pipeline.run.stages.known import Frame
+from pipeline.status import FrameStatus
+
+AROUND = 5
+"""Frames over which the usual difference of traced length and stated depth is taken."""
+FEWEST = 4
+"""Frames below which there is none."""
+SURE = 5.0
+"""Standard deviations of these differences, about the usual one, from which a length is out of step."""
+SURE_TIP = 4.0
+"""The same in those of the frame's own tip."""
+LEAST_VOXELS = 3.0
+"""and the least difference."""
+
+
+def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
+    """The frames; one whose length is out of step with insertion_mm and the frames around it is not to be trusted."""
+    known = [i for i, f in enumerate(frames) if f.trusted_curve is not None and np.isfinite(f.expected_mm)]
+    out = list(frames)
+    if len(known) < FEWEST:
+        return out
+    curves = [curve for i in known if (curve := frames[i].trusted_curve) is not None]
+    apart = np.array([curve.length_mm - frames[i].expected_mm for i, curve in zip(known, curves, strict=True)])
+    first = np.clip(np.arange(len(apart)) - AROUND // 2, 0, max(0, len(apart) - AROUND))
+    usual = np.array([np.median(apart[n : n + AROUND]) for n in first])
+    tips = np.nan_to_num([curve.tip_sigma_mm for curve in curves])
+    limit = np.maximum(max(LEAST_VOXELS * voxel_mm, SURE * spread(apart - usual)), SURE_TIP * tips)
+    for n in np.flatnonzero(np.abs(apart - usual) > limit):
+        note = (
+            f"trace: length: got {curves[n].length_mm:.2f} mm, {apart[n]:+.2f} mm off insertion_mm; expected "
+            f"{usual[n]:+.2f} mm to within {limit[n]:.2f} mm, as in the frames around it; look at the picture: the "
+            "trace may be cut short or lead astray; or correct insertion_mm"
+        )
+        out[known[n]] = frames[known[n]].failed("trace", FrameStatus.LENGTH_MISMATCH, note)
+    return out
+
+
+def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
+    """A warning where a traced wire gets shorter from one frame to the next and no depths are stated."""
+    seen = [(f.index, c.length_mm) for f in frames if (c := f.trusted_curve) is not None and np.isnan(f.expected_mm)]
+    odd = [
+        f"{b} ({after - before:+.1f} mm)"
+        for (_, before), (b, after) in pairwise(seen)
+        if after - before < -LEAST_VOXELS * voxel_mm
+    ]
+    if not odd:
+        return []
+    return [
+        f"frames {', '.join(odd)}: the traced wire is shorter than in the frame before, allowed where it was pulled "
+        "back; look at the picture whether the trace is cut short, or state insertion_mm"
+    ]

@@ -1,0 +1,60 @@
+"""What is brighter than the vessel and lies at its wall: calcification or bone, where the half level is not the wall's.
+
+Between two classes of tissue the wall is half way; beside a third, brighter one it lies too far out, or is not there.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
+from solver.grid import Grid
+
+SEEN_VOXELS = 5.0
+"""How far outside the wall is looked."""
+AT_WALL_VOXELS = 1.5
+"""Distance from the wall within which something touches it: blurred, it lifts the half level there."""
+SIGMAS = 3.0
+"""Standard deviations of a voxel's noise by which the mean of 3^3 must be above BRIGHTER of the contrast."""
+THICK = 2
+"""Layers that are taken off: what is left of bone and plaque is nothing of a wire, which is three voxels across."""
+MOST_NAMED = 4
+"""Places that the warning names; the largest."""
+
+
+def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
+    """One sentence for the report with the places where something brighter touches the wall, or none.
+
+    distance : signed distance on the vessel's box, which begins at ``corner`` of the scan.
+    """
+    h = float(np.min(distance.spacing_mm))
+    limit = levels.outside + BRIGHTER * levels.contrast
+    box = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
+    bright = (distance.values < SEEN_VOXELS * h) & (scan.values[box] > limit)
+    near = np.argwhere(bright)
+    if len(near) == 0:
+        return ()
+    bright[tuple(near.T)] = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
+    places = _places(bright, distance.values < AT_WALL_VOXELS * h)
+    if not places:
+        return ()
+    face = float(np.prod(distance.spacing_mm) ** (2 / 3))
+    named = ", ".join(
+        f"{[float(round(x, 1)) for x in distance.to_mm(place)]} ({count * face:.1f} mm^2)"
+        for count, place in sorted(places, key=lambda p: -p[0])[:MOST_NAMED]
+    )
+    return (
+        f"segment: something more than {BRIGHTER:g} times as bright as the vessel (bone, calcification, metal) touches "
+        f"its wall in {len(places)} place(s); largest at {named} mm; there the wall may lie too far out: look at the "
+        "picture, subtract the bone, or give the lumen as a file (manifest key lumen)",
+    )
+
+
+def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple[int, NDArray[np.float64]]]:
+    """Voxels at the wall, and their middle, of each bright thing that is thick enough."""
+    numbers, _ = ndimage.label(bright, np.ones((3, 3, 3)))
+    thick = np.unique(numbers[ndimage.binary_erosion(bright, iterations=THICK, border_value=1)])
+    touched = np.argwhere(bright & at_wall)
+    of = numbers[tuple(touched.T)]
+    groups = [touched[of == n] for n in thick if n]
+    return [(len(g), g.mean(axis=0)) for g in groups if len(g)]

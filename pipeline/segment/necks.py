@@ -1,0 +1,193 @@
+"""A vessel that goes on behind a neck too narrow to reach half the contrast: found by its axis, and opened.
+
+A stenosis of one voxel radius peaks at a third of the contrast: connectedness ends there, and with it the lumen. What
+is as bright as the vessel, hangs together with it at a lower grey and lies straight ahead of its end is its other part;
+a vessel or a bone that touches its flank is not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
+from pipeline.segment._kernels.connect import Affinity
+from pipeline.segment._kernels.solids import cones
+from pipeline.segment.config import SegmentConfig
+from pipeline.segment.connect import connect, neighbours
+from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, Region
+from pipeline.segment.thin import CREST_VOXELS, FULL, LEAST_RADIUS, beyond_skirt
+from solver.grid import Array, Grid
+
+REACH = 14.0
+"""Longest neck, voxels from end to end."""
+WINDOW = 18.0
+"""Voxels of either end within which its direction is seen: longer than vessels are thick."""
+ROOT = 4.0
+"""and within which its middle is."""
+MOST_NECKS, MOST_TRIED = 4, 8
+"""Necks that are passed, and ends that are tried for each."""
+MOST_BEYOND = 200_000
+"""Bright voxels beyond the vessel from which they are other tissue."""
+SIDE_VOXELS = 2.0
+"""How far off the straight way between two ends the neck's axis is looked for."""
+
+
+def _points(flat: Index, grid: Grid) -> Array:
+    """Voxels (n, 3) as floats."""
+    return np.stack(np.unravel_index(flat, grid.shape), axis=1).astype(float)
+
+
+def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
+    """Distance (n,) from points (n, 3) to a tree, infinite beyond REACH, and to which of its points."""
+    away, at = tree.query(points, distance_upper_bound=REACH)
+    return np.asarray(away, float), np.asarray(at, np.int64)
+
+
+def _runs_along(points: Array, end: Array, heading: Array) -> bool:
+    """Whether an end of a vessel, voxels (n, 3) near it, is longer along a heading (3,) than it is wide."""
+    near = points[np.linalg.norm(points - end, axis=1) < WINDOW]
+    spread = np.cov(near.T)
+    side = np.eye(3) - np.outer(heading, heading)
+    return bool(heading @ spread @ heading > np.linalg.eigvalsh(side @ spread @ side)[-1])
+
+
+def _middle(points: Array, end: Array) -> Array:
+    """The middle (3,) of a vessel's end."""
+    return np.asarray(points[np.linalg.norm(points - end, axis=1) < ROOT].mean(axis=0))
+
+
+def _axis(grid: Grid, start: Array, stop: Array) -> Array:
+    """The crest (n, 3), voxels, along which a neck leads from one middle to the other."""
+    way = stop - start
+    share = np.linspace(0.0, 1.0, int(np.ceil(2.0 * np.linalg.norm(way))) + 1)
+    u = np.cross(way, np.eye(3)[int(np.argmin(np.abs(way)))])
+    u, v = u / np.linalg.norm(u), np.cross(way, u) / np.linalg.norm(np.cross(way, u))
+    steps = np.arange(-SIDE_VOXELS, SIDE_VOXELS + 0.1, 0.5)
+    beside = (steps[:, None, None] * u + steps[None, :, None] * v).reshape(-1, 3)
+    places = start + share[:, None, None] * way + beside
+    seen = values_at(Blurred(grid.values, np.ones(3), CREST_VOXELS), places.reshape(-1, 3)).reshape(len(share), -1)
+    # a voxel off the straight way costs what noise may gain there
+    seen = seen - 0.02 * np.ptp(seen) * np.sum(beside**2, axis=1)
+    best = places[np.arange(len(share)), np.argmax(seen, axis=1)]
+    window = np.ones(3) / 3.0
+    inner = np.stack([np.convolve(best[:, a], window, "valid") for a in range(3)], axis=1)
+    return np.concatenate([best[:1], inner, best[-1:]])
+
+
+def _next(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region | None:
+    """The region with what lies behind one neck; None where there is none."""
+    levels, taps = region.levels, affinity.taps
+    bright = smooth_voxels(grid.values, taps, region.voxels)
+    found, _ = beyond_skirt(grid, region.voxels[bright >= levels.outside + FULL * levels.contrast], low)
+    share = (smooth_voxels(grid.values, taps, found) - levels.outside) / levels.contrast
+    left = found[share >= FULL]
+    if not config.least_voxels <= len(left) <= MOST_BEYOND:
+        return None
+    own = _points(region.voxels, grid)
+    tree = cKDTree(own)
+    gap = _nearest(tree, _points(left, grid))[0]
+    for _ in range(MOST_TRIED):
+        n = int(np.argmin(gap))
+        if not np.isfinite(gap[n]):
+            break
+        seed = np.array(np.unravel_index(left[n : n + 1], grid.shape)).T
+        more, read = connect(grid, seed, affinity, config.threshold, neighbours(config.adjacency))
+        gap[np.isin(left, more)] = np.inf
+        gap[n] = np.inf
+        neck = _neck(grid, own, tree, more, levels, taps) if len(more) >= config.least_voxels else None
+        if neck is not None:
+            counters = {**region.counters, "voxels_read_again": region.counters["voxels_read_again"] + read}
+            both = np.concatenate([region.voxels, more])
+            return replace(region, voxels=both, necks=(*region.necks, neck), counters=counters)
+    return None
+
+
+def _neck(
+    grid: Grid, own: Array, tree: cKDTree, more: Index, levels: GreyLevels, taps: NDArray[np.float32]
+) -> Array | None:
+    """The axis of the neck from the vessel to what is beyond; None where that is no other part of it."""
+    beyond = _points(more, grid)
+    gap, at = _nearest(tree, beyond)
+    n = int(np.argmin(gap))
+    if not np.isfinite(gap[n]):
+        return None
+    start, stop = _middle(own, own[at[n]]), _middle(beyond, beyond[n])
+    heading = (stop - start) / np.linalg.norm(stop - start)
+    core = smooth_voxels(grid.values, taps, more[:: max(1, len(more) // 2000)])
+    bone = np.quantile(core, 0.75) > levels.outside + BRIGHTER * levels.contrast
+    ahead = _runs_along(own, start, heading) and _runs_along(beyond, stop, heading)
+    return _axis(grid, start, stop) if ahead and not bone else None
+
+
+def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region:
+    """The region with all that lies behind its necks. low : flat indices of what hangs together at a lower grey."""
+    while len(region.necks) < MOST_NECKS:
+        grown = _next(grid, low, region, affinity, config)
+        if grown is None:
+            break
+        region = grown
+    return region
+
+
+def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least: int) -> list[Array]:
+    """The axes of necks that connectedness passes and the wall does not.
+
+    Grey is smoothed before the wall is looked for: between a radius of 1.0 and 1.4 voxels half the contrast is reached
+    before, and not after. distance : signed distance on the box that begins at ``corner``; least : voxels of a
+    part.
+    """
+    numbers, count = ndimage.label(distance < 0)
+    sizes = np.bincount(numbers.ravel())[1:] if count > 1 else np.zeros(0, np.int64)
+    large = 1 + np.flatnonzero(sizes >= least)
+    if len(large) < 2:
+        return []
+    necks: list[Array] = []
+    pieces = sorted((np.argwhere(numbers == n) + corner for n in large), key=len, reverse=True)
+    whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]
+    while left:
+        tree = cKDTree(whole)
+        found = [_nearest(tree, piece) for piece in left]
+        n = int(np.argmin([gap.min() for gap, _ in found]))
+        gap, at = found[n]
+        first = int(np.argmin(gap))
+        if not np.isfinite(gap[first]):
+            break
+        piece = left.pop(n)
+        necks.append(_axis(grid, _middle(whole, whole[at[first]]), _middle(piece, piece[first])))
+        whole = np.concatenate([whole, piece])
+    return necks
+
+
+def add_necks(
+    necks: Sequence[Array], box: tuple[NDArray[np.float32], Index], grid: Grid, levels: GreyLevels, blur_mm: float
+) -> tuple[str, ...]:
+    """Lower the signed distance to that of the union with the necks; a sentence for each.
+
+    box : signed distance, and the voxel of the grid at which it begins.  blur_mm : the scanner's.
+    """
+    (distance, corner), spacing = box, np.asarray(grid.spacing_mm)
+    sigma, said = CREST_VOXELS * float(spacing.min()), []
+    whole = float(np.hypot(blur_mm, sigma))
+    for neck in necks:
+        peak = values_at(Blurred(grid.values, spacing, sigma), neck * spacing)
+        share = np.clip((peak - levels.outside) / levels.contrast, 0.0, 0.75)
+        radius = np.maximum(whole * np.sqrt(-2.0 * np.log1p(-share)), LEAST_RADIUS * float(spacing.min()))
+        at = (neck - corner) * spacing
+        cones(at[:-1], at[1:], radius[:-1], radius[1:], spacing, float(distance.max()), distance)
+        n = int(np.argmin(radius))
+        said.append(_said(grid.to_mm(neck[n]), float(radius[n])))
+    return tuple(said)
+
+
+def _said(place_mm: Array, radius_mm: float) -> str:
+    """What the report says of a neck."""
+    where = ", ".join(f"{x:.1f}" for x in place_mm)
+    return (
+        f"segment: the vessel narrows to a radius of about {radius_mm:.2f} mm at {where} mm, too thin for a wall; it "
+        "was followed to what lies straight behind: look whether this is one vessel, or give the lumen as a file "
+        "(manifest key lumen)"
+    )

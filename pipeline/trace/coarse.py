@@ -1,0 +1,44 @@
+"""Scans in larger voxels: a wire nine voxels thick is no crest to a blur of one, and has nine times the noise."""
+
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from pipeline.model import Lumen, Volume
+from solver.grid import Grid, read_only
+
+COARSE_MM = 0.3
+"""Largest voxel that is made: guide wires are 0.3 to 1 mm thick."""
+
+_of_lumen: WeakKeyDictionary[Lumen, tuple[int, Lumen]] = WeakKeyDictionary()
+_of_scan: WeakKeyDictionary[Volume, tuple[int, Volume]] = WeakKeyDictionary()
+"""The last of each, which frames share."""
+
+
+def times(voxel_mm: float) -> int:
+    """How many voxels of this size go into one along an edge; 1 where they are large enough."""
+    return max(1, int(COARSE_MM / voxel_mm + 1e-6))
+
+
+def _means(grid: Grid, n: int) -> Grid:
+    """Means of n^3 voxels; what is left over at the far sides is dropped."""
+    a, b, c = (s // n for s in grid.shape)
+    values = grid.values[: a * n, : b * n, : c * n].reshape(a, n, b, n, c, n).mean(axis=(1, 3, 5), dtype=np.float32)
+    middle = np.full(3, 0.5 * (n - 1))
+    return Grid(read_only(values), n * np.asarray(grid.spacing_mm), grid.to_mm(middle), grid.direction)
+
+
+def coarse_scan(scan: Volume, n: int) -> Volume:
+    """The scan in voxels n times as large."""
+    if scan not in _of_scan or _of_scan[scan][0] != n:
+        grid = _means(scan, n)
+        _of_scan[scan] = n, Volume(grid.values, grid.spacing_mm, grid.origin_mm, grid.direction)
+    return _of_scan[scan][1]
+
+
+def coarse_lumen(lumen: Lumen, n: int) -> Lumen:
+    """The lumen on voxels n times as large."""
+    if lumen not in _of_lumen or _of_lumen[lumen][0] != n:
+        _of_lumen[lumen] = n, replace(lumen, distance=_means(lumen.distance, n))
+    return _of_lumen[lumen][1]

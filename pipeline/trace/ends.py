@@ -1,0 +1,94 @@
+"""May a curve begin and end where it does? Lines that go on, folds, the ends of the lumen and of the scan."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline.model import Array
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import Attempt, dense
+from pipeline.trace.onward import seen_outside
+from pipeline.trace.profile import end_range
+from pipeline.trace.section import fills_vessel
+from pipeline.trace.subtraction import Subtraction
+
+EDGE_VOXELS = 2.0
+"""Distance from the scan's end within which a tip is none: wires that leave end 1.0 inside at the most (100 traces at
+5 to 90 degrees, CNR 4 to 30; nearly all lie outside), tips within the scan where they are, to 0.4."""
+MOST_APART = 3.0
+"""Slice distance over pixel size from which no curve stands: of 22 wires in slices of 2 mm and pixels of 0.5 mm, with
+insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
+END_VOXELS = 3.0
+"""How far off a faint end may be possible: three standard deviations where it is 2 noises bright."""
+TIP_BESIDE = 3.5
+"""Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
+
+
+def beside_itself(points: Array, step: float, near: float) -> NDArray[np.bool_]:
+    """Points (n,) within ``near`` mm of a stretch of the curve that is further along it than that can be."""
+    apart = round(3.0 * near / max(step, 1e-9))
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    out = np.zeros(len(points), bool)
+    out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
+    return out
+
+
+def _named(image: Subtraction, point: Array) -> str:
+    """A place in LPS mm, for a message."""
+    return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
+
+
+def _at_edge(image: Subtraction, point: Array) -> bool:
+    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
+    index = point / image.spacing + image.region.corner
+    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
+
+
+def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float]:
+    """How much further back and on (mm) a wire may end whose brightness has steps, or in correlated noise."""
+    tube = attempt.tube
+    if not len(tube.steps.edges) and not image.correlated:
+        return 0.0, 0.0
+    return end_range(image, dense(tube, 0.25 * image.voxel), tube.steps, tube.sigma)
+
+
+Objection = tuple[bool, FrameStatus, str, str, str]
+"""Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
+
+
+def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
+    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
+    missing_mm = attempt.tube.steps.missing_mm
+    back_mm, on_mm = _end_range(image, attempt)
+    folded = beside_itself(points, length_mm / max(1, len(points) - 1), TIP_BESIDE * image.voxel)
+    return (
+        (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
+         f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
+         "look whether the picture shows more of it, or correct opacity in the manifest"),
+        (max(back_mm, on_mm) > END_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
+         f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
+         f"{END_VOXELS * image.voxel:.1f} mm", "state the wire's opacity or insertion_mm, or scan with more dose"),
+        (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
+         "a line beyond the tip that could not be followed", "a tip with nothing beyond it",
+         "look whether the wire's end is fainter than the rest"),
+        (seen_outside(image, points), FrameStatus.TRACE_LEFT_LUMEN,
+         f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
+         "a lumen that holds the tip",
+         "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
+        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
+         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
+         "turn entry_direction round, or state insertion_mm if this is right"),
+        (image.slices_apart >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
+         f"slices {image.slices_apart:.1f} times as far apart as pixels",
+         f"less than {MOST_APART} times",
+         "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
+        (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
+         "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
+         "give the curve of the frame before, or look where the wire ends"),
+        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
+         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
+         "leave this frame out, or scan a larger field"),
+        (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
+         "a line as thick as its vessel", "a wire, which is thinner",
+         "check that the frame shows a wire, and that the reference has the frame's contrast"),
+    )  # fmt: skip

@@ -1,0 +1,48 @@
+"""Traced lengths of a sequence against each other: a frame cut short shows, a scale that is off does not matter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.model import Curve
+from pipeline.run.stages.depths import in_step, shrinking
+from pipeline.run.stages.known import Frame
+
+
+def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
+    curves = [
+        Curve(np.stack([np.zeros(9), np.zeros(9), np.linspace(0, n, 9)], 1), np.full(9, 0.02), 0.05) for n in lengths
+    ]
+    return [Frame(i, expected_mm=e, curve=c) for i, (e, c) in enumerate(zip(expected, curves, strict=True))]
+
+
+DEPTHS = [10.0, 14.0, 18.0, 22.0, 26.0, 30.0]
+
+
+@pytest.mark.parametrize("cut", [0, 3, 5])
+def test_a_wire_cut_short_by_less_than_the_tolerance_is_out_of_step(cut: int) -> None:
+    lengths = [d - 0.4 for d in DEPTHS]
+    lengths[cut] -= 1.5
+    status = [f.status for f in in_step(frames(lengths, DEPTHS), 0.3)]
+    assert status == ["length_mismatch" if n == cut else "ok" for n in range(len(DEPTHS))]
+
+
+def test_a_scale_that_is_off_or_read_by_hand_is_no_fault() -> None:
+    rng = np.random.default_rng(0)
+    drift = [1.03 * d + 0.5 for d in DEPTHS]
+    by_hand = [d + rng.normal(scale=0.4) for d in DEPTHS]
+    for lengths in (drift, by_hand):
+        assert all(f.ok for f in in_step(frames(lengths, DEPTHS), 0.3))
+
+
+def test_too_few_frames_or_no_depths_say_nothing() -> None:
+    assert all(f.ok for f in in_step(frames([10.0, 12.0, 18.0], DEPTHS[:3]), 0.3))
+    assert all(f.ok for f in in_step(frames([10.0, 12.0, 11.0, 12.0], [float("nan")] * 4), 0.3))
+
+
+def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:
+    nan = [float("nan")] * 3
+    assert "frames 2 (-3.0 mm)" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
+    assert shrinking(frames([10.0, 14.0, 13.9], nan), 0.3) == []
+    assert shrinking(frames([10.0, 14.0, 11.0], [10.0, 14.0, 11.0]), 0.3) == []

@@ -1,0 +1,45 @@
+"""A lumen that a traced wire runs out of is opened there, and says where; one that holds it is left as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.model import Lumen
+from pipeline.segment.opened import opened
+from solver.grid import Grid
+
+H = 0.3
+
+
+def tube(order: str) -> Lumen:
+    """A tube of 1.5 mm along z that is closed between 8 and 10 mm, 3 mm exact outside."""
+    x, y, z = np.meshgrid(*(H * np.arange(n) for n in (40, 40, 60)), indexing="ij")
+    radial = np.hypot(x - 6.0, y - 6.0) - 1.5
+    gap = 1.0 - np.abs(z - 9.0)
+    values = np.minimum(np.maximum(radial, gap), 3.0).astype(np.float32)
+    return Lumen(Grid(np.asarray(values, order=order), np.full(3, H), np.array([1.0, -2.0, 3.0])), warnings=("before",))
+
+
+def wire(x: float, low: float, high: float) -> np.ndarray:
+    z = np.arange(low, high, 0.3)
+    return np.stack([np.full(len(z), x), np.full(len(z), 6.0), z], axis=1) + [1.0, -2.0, 3.0]
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_wire_through_a_closed_place_opens_it(order: str) -> None:
+    lumen, curve = tube(order), wire(6.4, 2.0, 16.0)
+    found = opened(lumen, [wire(6.0, 2.0, 7.0), curve], 0.2)
+    index = np.rint(found.distance.to_index(curve)).astype(int)
+    assert np.all(found.distance.values[tuple(index.T)] < -0.1)
+    assert found.warnings[0] == "before"
+    assert "opened" in found.warnings[1]
+    assert "[7.4, 4.0, 12.2]" in found.warnings[1] or "[7.4, 4.0, 11.9]" in found.warnings[1]
+    far = np.abs(H * np.arange(60) - 9.0) > 4.5
+    np.testing.assert_array_equal(found.distance.values[:, :, far], lumen.distance.values[:, :, far])
+
+
+def test_a_wire_within_the_lumen_or_pressed_into_its_wall_changes_nothing() -> None:
+    lumen = tube("C")
+    assert opened(lumen, [wire(6.0, 2.0, 7.5), wire(7.6, 2.0, 7.0)], 0.2) is lumen
+    assert opened(lumen, [], 0.2) is lumen

@@ -1,0 +1,53 @@
+"""Bone or plaque at the wall is flagged with its place; a wire in the lumen and bone at a distance are not."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.model import Volume
+from pipeline.segment import segment
+from tests.studies.seeing import render
+from tests.studies.seeing.scenes import Draft
+
+H = 0.3
+
+
+def flags(vessels, wires=(), seed=0):
+    """Warnings of bone for a vessel along z with more beside it: (axis, radius, level)."""
+    rng = np.random.default_rng(seed)
+    z = np.arange(0.0, 30.0, 0.05)
+    axis = np.stack([0.0 * z, 0.0 * z, z], axis=1)
+    lattice = render.Lattice((50, 50, 90), np.full(3, H), np.array([-7.0, -7.0, 1.5]))
+    grey = 100.0 + 900.0 * np.max(
+        [level * render.vessel(lattice, a, r) for a, r, level in [(axis, 1.8, 1.0), *vessels]], axis=0
+    )
+    for curve in wires:
+        grey = grey + render.METAL * render.wire(lattice, curve, 0.2)
+    lumen = segment(Volume(render.noisy(grey, 60.0, rng), lattice.spacing, lattice.origin), [[0.0, 0.0, 5.0]])
+    return [text for text in lumen.warnings if "touches its wall" in text]
+
+
+def lump(x, size, level):
+    return np.stack([np.full(21, x), np.zeros(21), np.linspace(14.0, 16.0, 21)], axis=1), size, level
+
+
+@pytest.mark.parametrize(("x", "size", "level"), [(4.2, 2.5, 1.6), (2.2, 1.2, 2.0)], ids=["bone", "plaque"])
+def test_what_touches_the_wall_is_flagged_with_its_place(x, size, level):
+    said = flags([lump(x, size, level)])
+    assert len(said) == 1
+    place = np.array(json.loads(said[0].split("largest at ")[1].split(" (")[0]))
+    assert abs(place[2] - 15.0) < 1.5
+    assert 0.5 < place[0] < 3.5
+
+
+def test_bone_at_a_distance_a_wire_and_a_plain_vessel_are_not():
+    z = np.arange(2.0, 25.0, 0.05)
+    wire = np.stack([1.2 * np.sin(0.2 * z), 1.2 * np.cos(0.2 * z), z], axis=1)
+    assert flags([]) == []
+    assert flags([lump(5.5, 2.5, 1.6)]) == []
+    assert flags([], [wire]) == []
+    scene = Draft(np.random.default_rng(3)).scan(16, reference=False)
+    assert not any("touches its wall" in text for text in segment(scene.frame, scene.entry[None]).warnings)
