@@ -149,8 +149,6 @@ def many_cases(given: argparse.Namespace) -> None:
                     times = read(root / "out" / TIMINGS.file, TIMINGS)
                     again.append(said([*words, str(root / "out")]) / took[1])
                     stages = sum(times[f"{s}_s"].sum() for s in TIMED)
-                        times[f"{s}_s"].sum() for s in ("load", "segment", "trace", "clamp", "simulate", "compare")
-                    )
                     beside.append(1.0 - stages / times["total_s"].sum())
             gains.append(took[1] / took[2])
         loop = [one / two for one, two in zip(loops[::2], loops[1::2], strict=True)]
