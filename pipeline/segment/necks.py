@@ -115,12 +115,9 @@ def _neck(
     n = int(np.argmin(gap))
     if not np.isfinite(gap[n]):
         return None
-    start, stop = _middle(own, own[at[n]]), _middle(beyond, beyond[n])
-    heading = (stop - start) / np.linalg.norm(stop - start)
     core = smooth_voxels(grid.values, taps, more[:: max(1, len(more) // 2000)])
     bone = np.quantile(core, 0.75) > levels.outside + BRIGHTER * levels.contrast
-    ahead = _runs_along(own, start, heading) and _runs_along(beyond, stop, heading)
-    return _axis(grid, start, stop) if ahead and not bone else None
+    return None if bone else _ahead(grid, (own, own[at[n]]), (beyond, beyond[n]))
 
 
 def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region:
@@ -157,9 +154,19 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
         if not np.isfinite(gap[first]):
             break
         piece = left.pop(n)
-        necks.append(_axis(grid, _middle(whole, whole[at[first]]), _middle(piece, piece[first])))
-        whole = np.concatenate([whole, piece])
+        axis = _ahead(grid, (whole, whole[at[first]]), (piece, piece[first]))
+        if axis is not None:
+            necks.append(axis)
+            whole = np.concatenate([whole, piece])
     return necks
+
+
+def _ahead(grid: Grid, here: tuple[Array, Array], there: tuple[Array, Array]) -> Array | None:
+    """The axis between two parts, each voxels (n, 3) and its end (3,); None where one does not go on as the other."""
+    start, stop = _middle(*here), _middle(*there)
+    heading = (stop - start) / np.linalg.norm(stop - start)
+    on = _runs_along(*here, heading) and _runs_along(*there, heading)
+    return _axis(grid, start, stop) if on else None
 
 
 def add_necks(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -306,9 +307,10 @@ def test_the_fit_of_the_clamp_has_a_time_of_its_own(
     monkeypatch.setattr(simulating, "clamp_of", slowly)
     run(study, tmp_path / "out", "--until", "simulate")
     times = read(tmp_path / "out" / "cases" / "bifurcation" / TIMINGS.file, TIMINGS)["clamp_s"]
-    replayed = times.iloc[1:].sum()
-    assert times.iloc[0] > replayed + 0.2
-    assert f"simulate {1000.0 * replayed / FRAMES:.1f} ms/frame" in capsys.readouterr().out
+    assert times.max() > 0.2
+    said = re.search(r"simulate ([\d.]+) ms/frame", capsys.readouterr().out)
+    assert said is not None
+    assert float(said[1]) < 50.0, "the fit, 0.2 s over four frames, is none of theirs"
 
 
 def plan_of(workers: int, **more: Any) -> Plan:

