@@ -290,7 +290,7 @@ def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(
     run(study, tmp_path / "out", "-j", "2", "--until", "trace")
     first = other / "frames" / "frame_000.mha"
     image = sitk.ReadImage(str(first))
-    sitk.WriteImage(image + 30, str(first))
+    sitk.WriteImage(image + 1, str(first))
     assert run(other, tmp_path / "other", "-j", "2", "--until", "trace") == {"segment": 1, "trace": FRAMES - 2}
 
 
