@@ -53,7 +53,7 @@ class Attempt:
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, beyond the entry.  goes_on : past its tip, faintly.
-    confirmed : by the length that the manifest states.
+    confirmed : by the length that the manifest states.  late_mm : of wire that is missing at the entry.
     """
 
     tube: Tube
@@ -65,6 +65,7 @@ class Attempt:
     behind_mm: float = 0.0
     goes_on: bool = False
     confirmed: bool = False
+    late_mm: float = 0.0
 
     @property
     def cut(self) -> bool:

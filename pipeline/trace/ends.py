@@ -18,6 +18,8 @@ EDGE_VOXELS = 2.0
 MOST_APART = 3.0
 """Slice distance over pixel size from which no curve stands: of 22 wires in slices of 2 mm and pixels of 0.5 mm, with
 insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
+LATE_MM, LATE_VOXELS = 1.0, 2.0
+"""A curve that begins so much beyond the plane of entry, in all, is shorter than the wire: 3 mm in correlated noise."""
 END_VOXELS = 3.0
 """How far off a faint end may be possible: three standard deviations where it is 2 noises bright."""
 TIP_BESIDE = 3.5
@@ -68,6 +70,10 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
         (max(back_mm, on_mm) > END_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
          f"{END_VOXELS * image.voxel:.1f} mm", "state the wire's opacity or insertion_mm, or scan with more dose"),
+        (attempt.late_mm > LATE_MM + LATE_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
+         f"a line that begins {attempt.late_mm:.1f} mm beyond the entry",
+         f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
+         "look whether the wire is hidden there, or move entry_mm to where it begins"),
         (attempt.goes_on, FrameStatus.TRACE_AMBIGUOUS,
          "a line beyond the tip that could not be followed", "a tip with nothing beyond it",
          "look whether the wire's end is fainter than the rest"),

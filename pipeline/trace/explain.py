@@ -89,7 +89,8 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     u = _even_parameters(attempt.tube, _entry_parameter(attempt.tube, entry), SAMPLE_VOXELS * image.voxel)
     points = attempt.tube.at(u)
     length = float(arc_length(image.world(points))[-1])
-    attempt = replace(attempt, confirmed=entry.expected_mm is not None)
+    late = float((points[0] - entry.point) @ entry.direction)
+    attempt = replace(attempt, confirmed=entry.expected_mm is not None, late_mm=late)
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
 

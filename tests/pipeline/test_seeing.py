@@ -61,6 +61,7 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
         ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
+        ("correlated noise, CNR 4 to 6", 470, "TRACE_AMBIGUOUS"),  # began 3.0 mm beyond its entry, and ok
         ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
     ],
 )
