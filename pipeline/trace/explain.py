@@ -34,8 +34,9 @@ BEND_SHARE = 0.0125
 """Error per axis over the fourth differences of the control points (0.010 to 0.016 on tuning seeds)."""
 WALL_ERROR, WALL_REACH = 0.13, 5.0
 """Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
-PLAIN_TIP, STEP_TIP = 0.08, 0.25
-"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one with a dim end."""
+PLAIN_TIP, BRIGHT_TIP, DIM_TIP = 0.08, 0.16, 0.25
+"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one with a bright coil or band, of one with
+a dim end. With 0.08 a platinum tip was 2.5 times its sigma off, with 0.25 a fifth of it."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
 BRIDGE_SIGMA_VOXELS = 0.5
@@ -187,13 +188,20 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
     return np.asarray(np.hypot(bends, wall))
 
 
+def _own_tip(tube: Tube) -> float:
+    """What the tip's error is besides the noise, voxels."""
+    if not len(tube.steps.edges):
+        return PLAIN_TIP
+    return DIM_TIP if tube.steps.levels[-1] < DIM_END else BRIGHT_TIP
+
+
 def _curve(image: Subtraction, best: Candidate) -> Curve:
     """The curve in LPS mm with its uncertainty: the fit's, scaled by the noise met, wider where it was bridged."""
     attempt, verdict, tube = best.attempt, best.verdict, best.attempt.tube
     across, along = inflation(image, best.points, tube)
     bias = _model_error(image, best)
     sigma = np.hypot(across * best.sigma, bias)
-    own_tip = (STEP_TIP if tube.steps.levels[-1] < DIM_END else PLAIN_TIP) * image.voxel
+    own_tip = _own_tip(tube) * image.voxel
     tip_sigma = float(np.hypot(along[-1] * best.tip_sigma, own_tip))
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {
