@@ -80,8 +80,30 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def find_cases(out_dir: Path) -> list[Path]:
-    """Folders of the cases of a run, by name."""
-    return sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
+    """Folders of the cases of a run, by name; those that no run into the folder names belong to another study."""
+    return _folders(out_dir, named=True)
+
+
+def left_over(out_dir: Path) -> list[Path]:
+    """Folders of finished cases that no run into the folder names any more, by name."""
+    return [folder for folder in _folders(out_dir, named=False) if (folder / "result.json").exists()]
+
+
+def left_over_sentence(out_dir: Path) -> str:
+    """What is not counted, and how to be rid of it; empty where everything is."""
+    names = ", ".join(folder.name for folder in left_over(out_dir))
+    return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
+
+
+def _folders(out_dir: Path, named: bool) -> list[Path]:
+    """Runs name all cases of their manifest. What does not (golden tables, an older run) is taken to name every one."""
+    try:
+        planned = [read_json(path).get("planned") for path in out_dir.glob("run*.json")]
+    except ValueError:
+        planned = []
+    names = None if not planned or None in planned else set().union(*planned)
+    found = sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
+    return [p for p in found if (names is None or p.name in names) == named]
 
 
 def thinned(count: int, most: int) -> NDArray[np.int_]:

@@ -78,7 +78,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, guard_stages
     from pipeline.run.log import STAGES
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
@@ -96,12 +96,16 @@ def _plan(args: argparse.Namespace) -> "Plan":
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
+    picked = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used)
+    manifest = manifest.without({case.id for case in picked} - {case.id for case in cases})
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
     for note in notes:
         say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
+    if not args.fresh:
+        guard_stages(args.out, args.until)
     return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 

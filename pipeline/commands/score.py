@@ -72,7 +72,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError
     from pipeline.run.simulators import OURS
-    from pipeline.study.manifest import read_manifest
+    from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
@@ -81,6 +81,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
+    manifest = Manifest(manifest.path, calibrated)
     plans: dict[str, Plan] = {}
     alone = len(manifest.cases) == 1
     stated = {"space": args.space, "unit": args.unit}

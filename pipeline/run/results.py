@@ -20,6 +20,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest, file_hash
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
+from reports.case_files import find_cases
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -29,6 +30,8 @@ LOST = {
 }
 """What may have become of a case that has no result of its own, and the sentences that say so."""
 
+COMPLETE = (ledger.RESULT, ledger.FILE)
+"""Either says that a case is no more at work; the second without the first, that this was taken away since."""
 
 Row = dict[str, Any]
 
@@ -88,12 +91,11 @@ def read_result(path: Path) -> Result:
 
 def found_results(out: Path) -> list[Result]:
     """The result of every case below an output folder, by id; one that is damaged says so and hides no other."""
-    return [_found(path) for path in sorted((out / "cases").glob("*/result.json"))]
+    return [_found(folder) for folder in find_cases(out) if any((folder / name).exists() for name in COMPLETE)]
 
 
-def _found(path: Path) -> Result:
-    folder = path.parent
-    written = ledger.read(folder)
+def _found(folder: Path) -> Result:
+    path, written = folder / ledger.RESULT, ledger.read(folder)
     wrong = written.amiss(folder, ledger.TABLES) if written else ""
     if wrong:
         return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")

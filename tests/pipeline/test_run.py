@@ -148,6 +148,38 @@ def test_another_manifest_into_the_same_folder_is_refused(
     assert "--resume" in capsys.readouterr().err
 
 
+def test_fresh_removes_the_cases_of_the_manifest_before(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One that is resumed leaves them aside, says so, and what anybody else has put into the folder stays."""
+    out, other = tmp_path / "out", tmp_path / "study"
+    shutil.copytree(finished, out)
+    shutil.copytree(study, other)
+    manifest = other / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8").replace('id = "bifurcation"', 'id = "renamed"')
+    manifest.write_text(text, encoding="utf-8")
+    (out / "cases" / "mine").mkdir()
+    assert run(other, out, "--resume") == 0
+    said = capsys.readouterr()
+    assert "1 case, 4 frames" in said.out
+    assert "no manifest of this folder names them any more: bifurcation" in said.err
+    assert run(other, out, "--fresh") == 0
+    assert "any more" not in capsys.readouterr().err
+    assert {path.name for path in (out / "cases").iterdir()} == {"renamed", "mine"}
+
+
+def test_fewer_stages_do_not_wipe_what_is_finished(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    for more in ((), ("--resume",)):
+        assert run(study, out, "--until", "trace", *more) == 2
+        assert "say --fresh" in capsys.readouterr().err
+    assert len(found_results(out)) == 1
+    assert run(study, out) == 0
+
+
 def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(study, tmp_path / "out", "--dry-run", "--sweep", "simulate.wall_scale=0.5,2") == 0
     assert "sweep simulate.wall_scale = 0.5" in capsys.readouterr().out
