@@ -95,12 +95,24 @@ def left_over_sentence(out_dir: Path) -> str:
     return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
 
 
+def not_reached(out_dir: Path) -> str:
+    """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
+    ends = [str(run.get("until", "")) for run in _runs(out_dir)]
+    early = bool(ends) and all(end in ("load", "segment", "trace", "simulate") for end in ends)
+    return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""
+
+
+def _runs(out_dir: Path) -> list[dict[str, Any]]:
+    """What the runs into a folder say of themselves; nothing where that is damaged, which ``wireval run`` refuses."""
+    try:
+        return [read_json(path) for path in sorted(out_dir.glob("run*.json"))]
+    except ValueError:
+        return []
+
+
 def _folders(out_dir: Path, named: bool) -> list[Path]:
     """Runs name all cases of their manifest. What does not (golden tables, an older run) is taken to name every one."""
-    try:
-        planned = [read_json(path).get("planned") for path in out_dir.glob("run*.json")]
-    except ValueError:
-        planned = []
+    planned = [run.get("planned") for run in _runs(out_dir)]
     names = None if not planned or None in planned else set().union(*planned)
     found = sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
     return [p for p in found if (names is None or p.name in names) == named]

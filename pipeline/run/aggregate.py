@@ -18,6 +18,7 @@ from pipeline.run.overall import found_cases, frames_of, overall, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.atomic import write_bytes
+from reports.case_files import not_reached
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
 
@@ -73,7 +74,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         float(np.percentile(points, 95)) if points.size else float("nan"),
         replayed_s,
         whole,
-        unscored((result.role, result.status) for result in found),
+        unscored((result.role, result.status) for result in found) or not_reached(out),
     )
 
 

@@ -303,8 +303,12 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     """Traced only, a case has no errors: those of the run before must not come back in the last line."""
     out = tmp_path / "out"
     shutil.copytree(finished, out)
-    assert run(study, out, "--until", "trace") == 0
-    assert "median point error" not in capsys.readouterr().out
+    assert run(study, out, "--until", "trace", "--fresh") == 0
+    last = capsys.readouterr().out
+    assert "median point error" not in last
+    assert "Nothing is scored: the run was to end before frames are compared (--until trace)" in last
+    assert "Nothing is scored: the run was" in (out / "index.html").read_text(encoding="utf-8")
+    assert pd.read_csv(out / "summary.csv")["within_1mm"].isna().all(), "it was 1"
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))["overall"] == {}
     left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
     assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
@@ -382,6 +386,12 @@ def test_a_folder_that_is_not_there_is_no_regression(
 ) -> None:
     assert main(["diff", str(finished), str(tmp_path / "nothere")]) == 2
     assert "nothere: no such folder" in capsys.readouterr().err
+
+
+def named_by_a_shard(out: Path, case: str) -> None:
+    """As if another shard of the same manifest had this case."""
+    info = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    (out / "run.2-2.json").write_text(json.dumps(info | {"planned": [case]}), encoding="utf-8")
 
 
 def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
@@ -532,6 +542,7 @@ def test_a_damaged_result_hides_no_other(
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     (out / "cases" / "other").mkdir()
+    named_by_a_shard(out, "other")
     damaged = out / "cases" / "other" / "result.json"
     damaged.write_text("{", encoding="utf-8")
     for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
@@ -576,6 +587,7 @@ def test_points_cut_short_hide_no_other_case(
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
+    named_by_a_shard(out, "other")
     result = out / "cases" / "other" / "result.json"
     result.write_text(result.read_text(encoding="utf-8").replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
