@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.run.aggregate import Totals, aggregate, write_junit
+from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
@@ -104,7 +104,7 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
 
 def _shard(text: str) -> tuple[int, int]:
     parts = text.split("/")
-    if len(parts) == 2 and all(p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
+    if len(parts) == 2 and all(p.isascii() and p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
         return int(parts[0]), int(parts[1])
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
@@ -142,7 +142,7 @@ def guard_stages(out: Path, until: Stage) -> None:
             raise UsageError([f"{lost}; name another folder, or say --fresh (compute again)"])
 
 
-def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
+def launch(plan: Plan) -> tuple[Totals, Path]:
     """Run everything and write what is about the whole; the totals and the path of the page.
 
     Raises UsageError where nothing can be written to begin with, WriteError where that shows later.
@@ -167,8 +167,6 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     info |= {"provenance": code_state(), "assumptions": plan.assumptions, "config": settings.as_dict()}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
-    if junit:
-        write_junit(junit, found_results(out))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
 
 

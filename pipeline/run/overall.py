@@ -33,6 +33,11 @@ def found_cases(out: Path) -> list[Found]:
     return [_found(out, result) for result in found_results(out)]
 
 
+def damaged(found: Sequence[Found]) -> dict[str, str]:
+    """The cases whose files are not as they were written, and which one and why."""
+    return {c.result.case: str(c.result.failures[0]["message"]) for c in found if c.result.status == "damaged"}
+
+
 def _found(out: Path, result: Result) -> Found:
     folder = out / "cases" / result.case
     try:
@@ -94,15 +99,16 @@ class Ratio:
         known = f"95 %: {self.low:.3f} to {self.high:.3f}, " if np.isfinite(self.low) else ""
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
-    @property
-    def verdict(self) -> str:
-        """The sentence, and what may be concluded from it."""
+    def verdict(self, allowed: float = 1.0) -> str:
+        """The sentence, and what may be concluded from it. allowed : the ratio up to which nobody calls it worse."""
         if self.value == 1.0 and not self.low < self.high:
             meaning = "no frame's error changed"
         elif not np.isfinite(self.low):
             meaning = "too few insertions to say whether another study would show the same"
         elif self.low <= 1.0 <= self.high:
             meaning = "no difference is shown"
+        elif 1.0 < self.low <= allowed:
+            meaning = f"the second's errors are larger, by no more than is allowed (ratio {allowed:g})"
         else:
             meaning = "the second is worse" if self.low > 1.0 else "the second is better"
         return f"{self.sentence}: {meaning}"

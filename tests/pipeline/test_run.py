@@ -377,6 +377,7 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     table = pd.read_csv(path)
     table["rms_mm"] += 1.0
     table.to_csv(path, index=False)
+    (path.parent / "ledger.json").unlink()
     assert main(["diff", str(finished), str(worse)]) == 1
     assert main(["diff", str(worse), str(finished)]) == 0
 
@@ -605,6 +606,7 @@ def test_points_cut_short_hide_no_other_case(
         (["--set", "solver.segmnt_mm=1"], "1 problem in the settings; nothing was run"),
         (["--only", "bifurcatoin"], "did you mean 'bifurcation'"),
         (["--shard", "3/2"], "expected I/N"),
+        (["--shard", "\u00b2/3"], "expected I/N"),
         (["--until", "simulat"], "did you mean 'simulate'"),
         (["-j", "0"], "expected 1 or more"),
         (["--sweep", "simulate.wall_scale"], "write table.key=value1,value2"),
