@@ -113,7 +113,7 @@ def _runs(out_dir: Path) -> list[dict[str, Any]]:
 def _folders(out_dir: Path, named: bool) -> list[Path]:
     """Runs name all cases of their manifest. What does not (golden tables, an older run) is taken to name every one."""
     planned = [run.get("planned") for run in _runs(out_dir)]
-    names = None if not planned or None in planned else set().union(*planned)
+    names = None if not planned or None in planned else {name for ids in planned for name in ids or ()}
     found = sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
     return [p for p in found if (names is None or p.name in names) == named]
 

@@ -191,9 +191,9 @@ def test_a_reader_that_has_gone_does_not_change_the_exit_code(study: Path, tmp_p
     read, write = os.pipe()
     os.close(read)
     with os.fdopen(write, "wb") as gone:
-        others = {name: subprocess.DEVNULL for name in ("stdout", "stderr")}
+        others = dict.fromkeys(("stdout", "stderr"), subprocess.DEVNULL)
         run = [sys.executable, "-m", "pipeline", "run", str(study), "-o", str(tmp_path / "out"), "--until", "load"]
-        done = subprocess.run([*run, "--fail-if", "rms_mm>0.5"], **{**others, closed: gone}, check=False)
+        done = subprocess.run([*run, "--fail-if", "rms_mm>0.5"], **(others | {closed: gone}), check=False)
     assert done.returncode == 1
     assert (tmp_path / "out" / "index.html").exists()
 
