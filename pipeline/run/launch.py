@@ -24,6 +24,7 @@ from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.log import STAGES, Stage, last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
+from pipeline.run.overall import shared_scans
 from pipeline.run.provenance import code_state, this_run
 from pipeline.run.results import found_results, lost, write_json
 from pipeline.run.store import file_hash
@@ -244,8 +245,9 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 
     then : that, where it is not the run's own command for these cases.
     """
-    lines, cases = [], []
-    for result in found_results(plan.out):
+    found, cases = found_results(plan.out), []
+    lines = shared_scans(found)
+    for result in found:
         for row in result.failures:
             cases.append(row["case"])
             frame = f" frame {row['frame']}" if row.get("frame") is not None else ""

@@ -3,7 +3,7 @@
 Two runs are compared by the ratio of their errors on the frames that count in both, insertion by insertion.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,34 @@ class Found:
 
 def found_cases(out: Path) -> list[Found]:
     """Every case below an output folder; one whose tables cannot be read is damaged, and hides no other."""
-    return [_found(out, result) for result in found_results(out)]
+    results = found_results(out)
+    insertions = insertions_of(results)
+    return [_found(out, result, insertions[result.case]) for result in results]
+
+
+def insertions_of(results: Iterable[Result]) -> dict[str, str]:
+    """The insertion of each case: that of its group; cases with a scan in common are one, whatever groups they state."""
+    found: dict[str, str] = {}
+    seen: dict[str, str] = {}
+    for result in results:
+        mine = found[result.case] = result.group or result.case
+        for scan in result.scans:
+            other = found[seen.setdefault(scan, result.case)]
+            found = {case: other if name == mine else name for case, name in found.items()} if other != mine else found
+            mine = other
+    return found
+
+
+def shared_scans(results: Sequence[Result]) -> list[str]:
+    """Sentences on cases that state several insertions and show the same scans."""
+    insertions, stated = insertions_of(results), dict[str, dict[str, str]]()
+    for result in results:
+        stated.setdefault(insertions[result.case], {})[result.case] = result.group or result.case
+    return [
+        f"cases {', '.join(groups)} have scans in common and count as one insertion"
+        for groups in stated.values()
+        if len(set(groups.values())) > 1
+    ]
 
 
 def damaged(found: Sequence[Found]) -> dict[str, str]:
@@ -38,10 +65,10 @@ def damaged(found: Sequence[Found]) -> dict[str, str]:
     return {c.result.case: str(c.result.failures[0]["message"]) for c in found if c.result.status == "damaged"}
 
 
-def _found(out: Path, result: Result) -> Found:
+def _found(out: Path, result: Result, insertion: str) -> Found:
     folder = out / "cases" / result.case
     try:
-        return Found(result, _scored(folder, result.group or result.case))
+        return Found(result, _scored(folder, insertion))
     except (OSError, EOFError, ValueError, KeyError) as error:
         return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}"), {})
 

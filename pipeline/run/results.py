@@ -13,6 +13,7 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
+from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
@@ -54,7 +55,8 @@ class Result:
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
     key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
-    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     details :
+    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     scans :
+    of the contents of each frame or trace.     details :
     settings, inputs, counters, assumptions and what else the pages show.
     """
 
@@ -68,6 +70,7 @@ class Result:
     summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
     phantom: str = ""
+    scans: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -119,7 +122,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     head = (case.id, case.role, case.group, summary["status"], sentence)
     source = case.lumen or case.reference
     phantom = "" if source is None else digest(source)
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, details)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, data_of(case), details)
 
 
 def lost(name: str, status: str, reason: str, case: Case | None = None, stage: str = "") -> Result:

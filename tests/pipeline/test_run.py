@@ -408,6 +408,25 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
     return folder
 
 
+def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = two_cases(study, tmp_path / "study")
+    assert main(["check", str(both)]) == 0
+    assert "warning: cases 'bifurcation' and 'second' share" in capsys.readouterr().out
+    assert run(both, tmp_path / "out", "--until", "compare") == 0
+    assert "cases bifurcation, second have scans in common and count as one insertion" in capsys.readouterr().err
+    assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
+    manifest = both / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8")
+    frames = sorted(f"frames/{path.name}" for path in (both / "frames").iterdir())
+    for listed, said in (
+        ([*frames[:-1], frames[0]], "listed 2 times"),
+        (["reference.mha", *frames[1:]], "reference and frame"),
+    ):
+        manifest.write_text(text.replace('"frames/*.mha"', json.dumps(listed)), encoding="utf-8")
+        assert main(["check", str(both)]) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
     """Shards are merged by copying folders together; their tables are those of a run of all cases, byte by byte."""
     both, sweep = two_cases(study, tmp_path / "study"), ("--sweep", "simulate.wall_scale=2")
