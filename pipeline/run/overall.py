@@ -36,7 +36,7 @@ def found_cases(out: Path) -> list[Found]:
 
 
 def insertions_of(results: Iterable[Result]) -> dict[str, str]:
-    """The insertion of each case: that of its group; cases with a scan in common are one, whatever groups they state."""
+    """The insertion of each case: that of its group; cases with a scan in common are one, whatever they state."""
     found: dict[str, str] = {}
     seen: dict[str, str] = {}
     for result in results:
