@@ -2,7 +2,6 @@
 
 import argparse
 import importlib
-import os
 import signal
 import sys
 import threading
@@ -15,6 +14,7 @@ import shtab
 from pipeline import one_thread
 from pipeline.commands import VERBS, complain, unwritable
 from pipeline.status import InputError, StageError, did_you_mean
+from pipeline.streams import lasting
 from reports.atomic import WriteError
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -98,7 +98,12 @@ def _ended_by_signal() -> Iterator[None]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
+    """Run one command; returns the exit code, which a reader of its output that has gone does not change."""
+    with lasting():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     args = argparse.Namespace()
     if argv is None:  # a process of our own, in which nothing has computed yet
         one_thread()
@@ -114,7 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _ended_by_signal():
             return carried_out(args)
     except InputError as error:
-        return complain(error.problems, error.place or str(getattr(args, "manifest", COMMAND_LINE)))
+        then = {"then": ""} if getattr(args, "command", "") == "check" else {}  # it runs nothing in any case
+        return complain(error.problems, error.place or str(getattr(args, "manifest", COMMAND_LINE)), **then)
     except StageError as error:
         return complain([str(error)], COMMAND_LINE)
     except KeyboardInterrupt as why:
@@ -124,10 +130,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except WriteError as error:
         print(error, file=sys.stderr)
         return FAILED
-    except BrokenPipeError:
-        # the reader of a pipe (head, less) has gone: not an error of ours
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
 
 
 if __name__ == "__main__":

@@ -80,8 +80,42 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def find_cases(out_dir: Path) -> list[Path]:
-    """Folders of the cases of a run, by name."""
-    return sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
+    """Folders of the cases of a run, by name; those that no run into the folder names belong to another study."""
+    return _folders(out_dir, named=True)
+
+
+def left_over(out_dir: Path) -> list[Path]:
+    """Folders of finished cases that no run into the folder names any more, by name."""
+    return [folder for folder in _folders(out_dir, named=False) if (folder / "result.json").exists()]
+
+
+def left_over_sentence(out_dir: Path) -> str:
+    """What is not counted, and how to be rid of it; empty where everything is."""
+    names = ", ".join(folder.name for folder in left_over(out_dir))
+    return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
+
+
+def not_reached(out_dir: Path) -> str:
+    """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
+    ends = [str(run.get("until", "")) for run in _runs(out_dir)]
+    early = bool(ends) and all(end in ("load", "segment", "trace", "simulate") for end in ends)
+    return f"Nothing is scored: the run was to end before frames are compared (--until {ends[0]})." if early else ""
+
+
+def _runs(out_dir: Path) -> list[dict[str, Any]]:
+    """What the runs into a folder say of themselves; nothing where that is damaged, which ``wireval run`` refuses."""
+    try:
+        return [read_json(path) for path in sorted(out_dir.glob("run*.json"))]
+    except ValueError:
+        return []
+
+
+def _folders(out_dir: Path, named: bool) -> list[Path]:
+    """Runs name all cases of their manifest. What does not (golden tables, an older run) is taken to name every one."""
+    planned = [run.get("planned") for run in _runs(out_dir)]
+    names = None if not planned or None in planned else {name for ids in planned for name in ids or ()}
+    found = sorted(p for p in (out_dir / "cases").glob("*") if p.is_dir())
+    return [p for p in found if (names is None or p.name in names) == named]
 
 
 def thinned(count: int, most: int) -> NDArray[np.int_]:

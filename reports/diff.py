@@ -6,8 +6,9 @@ Reads errors.csv of every case of both folders and nothing else, so a folder of 
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -28,10 +29,11 @@ class Difference:
     """rows: case, frame, column, before, after, change, allowed, verdict.
 
     verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed), or new
-    (only the second run has it).
+    (only the second run has it).     empty : cases of which the first run has no number to hold against.
     """
 
     rows: pd.DataFrame
+    empty: tuple[str, ...] = ()
 
     @property
     def regressions(self) -> pd.DataFrame:
@@ -71,6 +73,8 @@ class Difference:
         n_bad = len(self.regressions)
         names = ", ".join(self.moved["column"].unique())
         moved = f"; {len(self.moved)} values have moved: {names}" if names else ""
+        if self.empty:
+            moved += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
         if not n_bad:
             return f"{n_cases} cases compared: no regression{moved}"
         first = self.regressions.iloc[0]
@@ -84,39 +88,68 @@ class Difference:
 
 
 def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
-    """Read column = allowed change. Raises ValueError for an unknown column or a negative or absent number."""
+    """Read column = allowed change, with the shipped one of the ratio over all frames where the file has none.
+
+    Raises ValueError for a file without columns, an unknown column, and a negative, infinite or absent number.
+    """
     table = tomllib.loads(path.read_text(encoding="utf-8"))
+    if not table:
+        raise ValueError(f"{path}: it names no column, so that every change would be allowed")
     ERRORS.check(table.keys() - {RATIO}, str(path))
     for name, value in table.items():
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not value >= 0:
+        if not number or not 0 <= value < math.inf:
             raise ValueError(f"{path}: {name} = {value!r}; give the allowed change, a number from 0 up")
-    return {name: float(value) for name, value in table.items()}
+    shipped = {} if RATIO in table else {RATIO: load_tolerance()[RATIO]}
+    return {name: float(value) for name, value in table.items()} | shipped
 
 
-def diff_folders(out_a: Path, out_b: Path, tolerance: Mapping[str, float]) -> Difference:
+def diff_folders(
+    out_a: Path, out_b: Path, tolerance: Mapping[str, float], damaged: Mapping[str, str] = MappingProxyType({})
+) -> Difference:
     """Compare the errors.csv of every case of two output folders, ``out_a`` being the one to hold against.
 
-    A case without errors.csv has no frames. Raises ValueError where ``out_a`` has no case: a gate without a
-    reference would always be open.
+    A case without errors.csv has no frames. damaged : cases of ``out_b`` whose results cannot be relied on, and why:
+    each is a regression. Raises ValueError where ``out_a`` has no case, or no number: a gate without a reference would
+    always be open.
     """
     before, after = (
-        {folder.name: read_if_there(folder / ERRORS.file, ERRORS) for folder in find_cases(out)}
-        for out in (out_a, out_b)
+        {
+            folder.name: read_if_there(folder / ERRORS.file, ERRORS)
+            for folder in find_cases(out)
+            if folder.name not in bad
+        }
+        for out, bad in ((out_a, {}), (out_b, damaged))
     )
     if not before:
         raise ValueError(f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote")
-    return diff_tables(before, after, tolerance)
+    empty = tuple(name for name, table in before.items() if not _has_numbers(table, tolerance))
+    if len(empty) == len(before):
+        raise ValueError(f"{out_a}: nothing to hold against: no frame of it is ok and has a number of the tolerance")
+    return replace(diff_tables(before, after, tolerance, damaged), empty=empty)
+
+
+def _has_numbers(table: pd.DataFrame, tolerance: Mapping[str, float]) -> bool:
+    """Whether a frame is ok and has a value that could become worse; a depth is told, not found."""
+    names = [name for name in tolerance if name != RATIO]
+    names = [name for name in names if ERRORS[name].better] or names
+    good = table[table["status"].isin(GOOD)]
+    return bool(good[names].notna().to_numpy().any() if names else len(good))
 
 
 def diff_tables(
-    before: Mapping[str, pd.DataFrame], after: Mapping[str, pd.DataFrame], tolerance: Mapping[str, float]
+    before: Mapping[str, pd.DataFrame],
+    after: Mapping[str, pd.DataFrame],
+    tolerance: Mapping[str, float],
+    damaged: Mapping[str, str] = MappingProxyType({}),
 ) -> Difference:
-    """Compare errors tables by case. A missing case or frame, and a status that is no longer ok, regress."""
+    """Compare errors tables by case. A missing or damaged case, a missing frame, and a status less than ok regress."""
     rows: list[Row] = []
     tolerance = {name: allowed for name, allowed in tolerance.items() if name != RATIO}
-    for case in dict.fromkeys([*before, *after]):
-        if case in before and case in after:
+    for case in dict.fromkeys([*before, *after, *damaged]):
+        if case in damaged:
+            rows.append((case, pd.NA, "status", "whole", damaged[case], math.nan, math.nan, "regression"))
+        elif case in before and case in after:
             rows += [(case, *row) for row in _case_rows(before[case], after[case], tolerance)]
         else:
             rows.append((case, pd.NA, *_one_sided("case", case in before)))

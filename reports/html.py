@@ -12,7 +12,7 @@ from markupsafe import Markup
 from reports import _content, colours
 from reports._content import flatten, settings, size
 from reports.atomic import write_text
-from reports.case_files import GOOD, CaseFiles, find_cases, read_case, read_json
+from reports.case_files import GOOD, CaseFiles, find_cases, left_over_sentence, not_reached, read_case, read_json
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
@@ -151,15 +151,17 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
+    why_none = unscored(zip(summary["role"], summary["status"], strict=True)) or not_reached(out_dir)
     page = {
         "title": "wireval",
         **_headline(cases, bool(failures), row),
-        "verdict": verdict(row) or unscored(zip(summary["role"], summary["status"], strict=True)),
+        "verdict": verdict(row) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
         "failures": failures,
         "simulators": (out_dir / "simulators").is_dir(),
+        "left_over": left_over_sentence(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen

@@ -13,9 +13,10 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports._content import Grid, grid
-from reports.atomic import write_bytes, write_text
+from reports.atomic import write_text
 from reports.diff import Difference
 from reports.html import write_page
+from reports.junit import write_junit
 from reports.schema import ERRORS, SUMMARY, Column
 
 SHOWN, ON_PAGE = 30, 1000
@@ -71,7 +72,7 @@ class Verdict:
     def sentence(self) -> str:
         """The verdict in a line."""
         pooled = "; over all frames it is worse" * (self.judged == "worse")
-        return f"{self.word.upper() if self.closed else self.word}: {self.frames.sentence}{pooled}"
+        return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
 
     def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:
         """What a reader is shown, by heading: first what differs, then pooled, then frame by frame.
@@ -105,7 +106,7 @@ class Verdict:
         writers: dict[str, Callable[[Path], object]] = {
             "json": lambda path: write_text(path, json.dumps(self._plain(), indent=1, ensure_ascii=False) + "\n"),
             "markdown": lambda path: write_text(path, self._markdown()),
-            "junit": lambda path: write_bytes(path, ET.tostring(self._junit(), encoding="utf-8", xml_declaration=True)),
+            "junit": lambda path: write_junit(path, self._junit()),
             "html": lambda path: write_page("diff.html.j2", {**self._page(path), "verdict": self}, path),
         }
         for kind, path in places.items():

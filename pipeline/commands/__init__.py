@@ -52,11 +52,11 @@ def resolved_settings(args: argparse.Namespace) -> "Resolved":
     return resolve(settings_of(args))
 
 
-def complain(problems: Sequence[str], what: str) -> int:
-    """List problems on stderr; returns exit code 2."""
+def complain(problems: Sequence[str], what: str, then: str = "; nothing was run") -> int:
+    """List problems on stderr, with their number and what follows; returns exit code 2."""
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
-    sys.stderr.write(f"{len(problems)} problem{'s' * (len(problems) != 1)} in {what}; nothing was run\n")
+    sys.stderr.write(f"{len(problems)} problem{'s' * (len(problems) != 1)} in {what}{then}\n")
     return 2
 
 

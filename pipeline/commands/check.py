@@ -18,6 +18,7 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.same_scans import shared
 
     manifest, settings = given(args), resolved_settings(args)
     problems = check(manifest.cases, settings.config)
@@ -25,6 +26,8 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
+    for note in shared(manifest.cases):
+        say(f"warning: {note}")
     frames = sum(case.frame_count for case in manifest.cases)
     say(f"{args.manifest}: {len(manifest.cases)} case(s), {frames} frames: no problem found")
     return 0

@@ -51,18 +51,27 @@ def _verdict(args: argparse.Namespace) -> Any:
     import pandas as pd
 
     import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
-    from pipeline.run.overall import found_cases, overall, ratio
+    from pipeline.run.ledger import RESULT
+    from pipeline.run.overall import damaged, found_cases, overall, ratio
+    from reports.case_files import find_cases
     from reports.diff import DEFAULT_TOLERANCE, RATIO, diff_folders, load_tolerance
     from reports.origin import what_differs
     from reports.schema import SUMMARY
     from reports.two_runs import Judged, Verdict
 
-    if not args.second.is_dir():
-        raise ValueError(f"{args.second}: no such folder; give one that `wireval run` wrote")
+    for out in (args.first, args.second):
+        if not out.is_dir():
+            raise ValueError(f"{out}: no such folder; give one that `wireval run` wrote")
     tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
-    allowed = 1.0 + tolerance.get(RATIO, float("inf"))
-    frames = diff_folders(args.first, args.second, tolerance)
+    allowed = 1.0 + tolerance[RATIO]
     before, after = found_cases(args.first), found_cases(args.second)
+    if bad := damaged(before):
+        case, why = next(iter(bad.items()))
+        raise ValueError(f"case {case!r} of the first run cannot be held against: {why}")
+    there = {case.result.case for case in before}
+    unread = {folder.name for folder in find_cases(args.second)} & there - {case.result.case for case in after}
+    lost = dict.fromkeys(sorted(unread), f"{RESULT} is missing") | damaged(after)
+    frames = diff_folders(args.first, args.second, tolerance, lost)
     old, new = overall(before), overall(after)
     names = [column.name for column in SUMMARY if column.better and column.name in old and column.name in new]
     rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
@@ -75,4 +84,4 @@ def _verdict(args: argparse.Namespace) -> Any:
         judged = "worse"
     differs = what_differs(args.first, args.second)
     runs = args.first, args.second
-    return Verdict(runs, differs, pooled, paired.verdict if paired else "", judged, frames)
+    return Verdict(runs, differs, pooled, paired.verdict(allowed) if paired else "", judged, frames)

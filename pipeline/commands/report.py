@@ -35,6 +35,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
+    from reports.case_files import left_over_sentence
     from reports.inside import links_out
 
     found = found_results(args.out)
@@ -52,6 +53,9 @@ def main(args: argparse.Namespace) -> int:
         from reports.pdf import write_pdf
 
         say(f"summary: {write_pdf(args.out)}")
+    aside = left_over_sentence(args.out)
+    if aside:
+        sys.stderr.write(f"{aside}\n")
     say(last_line(totals, page))
     return 0 if totals.all_ok and drawn else 1
 

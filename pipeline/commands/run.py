@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
-    add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame")
+    add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame and gate")
     add_calibrated(parser)
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
@@ -50,8 +50,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
+    from pipeline.run.aggregate import write_tests
     from pipeline.run.gate import gate
     from pipeline.run.launch import failure_lines, intention, last_line, launch
+    from pipeline.run.results import found_results
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.inside import links_out
@@ -65,8 +67,11 @@ def main(args: argparse.Namespace) -> int:
         for line in intention(plan):
             say(line)
         return 0
-    totals, index = launch(plan, junit=args.junit)
-    closed = [sentence for one in gates if (sentence := one.closed(totals.pooled))]
+    totals, index = launch(plan)
+    held = {one.asked: one.closed(totals.pooled) for one in gates}
+    closed = [why for why in held.values() if why]
+    if args.junit:
+        write_tests(args.junit, found_results(plan.out), held)
     for line in [*failure_lines(plan), *closed]:
         sys.stderr.write(f"{line}\n")
     say(last_line(totals, index))
@@ -78,7 +83,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out
+    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, guard_stages
     from pipeline.run.log import STAGES
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
@@ -96,12 +101,16 @@ def _plan(args: argparse.Namespace) -> "Plan":
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    cases, notes = as_calibrated(chosen(manifest.cases, args.only, args.shard), args.parameters, own=args.score_used)
+    picked = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used)
+    manifest = manifest.without({case.id for case in picked} - {case.id for case in cases})
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
     for note in notes:
         say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
+    if not args.fresh:
+        guard_stages(args.out, args.until)
     return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
 
 

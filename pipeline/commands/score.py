@@ -38,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 all ok, 1 some case of the first simulator failed, 2 input wrong."""
+    """Exit 0 all ok, 1 some case of any simulator failed, 2 input wrong."""
     from pipeline.run.launch import failure_lines, last_line, launch
-    from pipeline.run.simulators import write_comparison
+    from pipeline.run.simulators import write_comparison, write_failures
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.simulators import render_simulators
@@ -59,10 +59,12 @@ def main(args: argparse.Namespace) -> int:
         for line in failure_lines(plan, "do what the message says, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")
-    for line in write_comparison(args.out, {name: plan.out for name, plan in plans.items()}):
+    folders = {name: plan.out for name, plan in plans.items()}
+    write_failures(args.out, folders.values())
+    for line in write_comparison(args.out, folders):
         say(line)
     say(f"side by side: {render_simulators(args.out, embed=args.embed)}")
-    return 0 if next(iter(done.values()))[0].all_ok else 1
+    return 0 if all(totals.all_ok for totals, _ in done.values()) else 1
 
 
 def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
@@ -72,7 +74,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError
     from pipeline.run.simulators import OURS
-    from pipeline.study.manifest import read_manifest
+    from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
@@ -81,6 +83,7 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     if args.out.exists() and any(args.out.iterdir()) and not (args.out / "simulators").is_dir():
         raise UsageError([f"-o {args.out}: it is not empty and holds no score; name another folder"])
     calibrated, notes = as_calibrated(manifest.cases, args.parameters, own=args.score_used)
+    manifest = Manifest(manifest.path, calibrated)
     plans: dict[str, Plan] = {}
     alone = len(manifest.cases) == 1
     stated = {"space": args.space, "unit": args.unit}

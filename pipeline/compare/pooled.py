@@ -79,11 +79,15 @@ WITHIN_MM = 1.0
 
 
 def within(rows: Iterable[Row], planned: int) -> float:
-    """Share of ``planned`` frames with a result and a 95th percentile of at most 1 mm: a frame that fails adds none."""
-    good = [
-        row for row in rows if row["status"] == FrameStatus.OK.identifier and (row.get("p95_mm") or 0.0) <= WITHIN_MM
-    ]
-    return len(good) / planned if planned else float("nan")
+    """Share of ``planned`` frames with a result and a 95th percentile of at most 1 mm: a frame that fails adds none.
+
+    NaN where frames have a result and none was compared.
+    """
+    found = [row.get("p95_mm") for row in rows if row["status"] == FrameStatus.OK.identifier]
+    known = [float(mm) for mm in found if mm is not None]
+    if not planned or (found and not known):
+        return float("nan")
+    return sum(mm <= WITHIN_MM for mm in known) / planned
 
 
 def numbers(frames: Sequence[Scored], name: str) -> Array:

@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 
 from pipeline.run.another import with_another
-from pipeline.run.overall import found_cases, frames_of, overall, validation
+from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.atomic import write_bytes
+from reports.case_files import not_reached
+from reports.junit import write_junit
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
 
@@ -62,7 +63,9 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         tables.write(out / file, table, known)
     tables.write(out / TIMINGS.file, TIMINGS, times)
     if run_info is not None:
-        write_json(out / name, run_info | {"cases": [result.case for result in found], "overall": whole})
+        assumed = [*run_info.get("assumptions", ()), *shared_scans(found)]
+        cases_of = {"assumptions": assumed, "cases": [result.case for result in found]}
+        write_json(out / name, run_info | cases_of | {"overall": whole})
     points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in frames_of(validation(cases)))])
     return Totals(
         len(rows),
@@ -73,7 +76,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         float(np.percentile(points, 95)) if points.size else float("nan"),
         replayed_s,
         whole,
-        unscored((result.role, result.status) for result in found),
+        unscored((result.role, result.status) for result in found) or not_reached(out),
     )
 
 
@@ -91,19 +94,30 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
     return pd.concat(parts, ignore_index=True) if parts else tables.read_if_there(None, TIMINGS), replayed_s
 
 
-def write_junit(path: Path, found: Sequence[Result]) -> None:
-    """Write one test suite a case, one test a frame (or one for a case that has no frames to show)."""
+def write_tests(path: Path, found: Sequence[Result], gates: Mapping[str, str]) -> None:
+    """Write a JUnit summary: a suite a case, a test a frame (or one for a case without frames to show); one for gates.
+
+    gates : what was asked, and why it does not hold, empty where it does.
+    """
     root = ET.Element("testsuites", name="wireval")
     for result in found:
         whole = {"frame": "case", "status": result.status, "sentence": result.sentence, "message": result.sentence}
         frames = result.frames or [whole]
         bad = [f for f in frames if f["status"] not in ("ok", "simulated", "roll_fitted")]
-        suite = ET.SubElement(root, "testsuite", name=result.case, errors="0")
-        suite.set("tests", str(len(frames)))
-        suite.set("failures", str(len(bad)))
+        suite = _suite(root, result.case, len(frames), len(bad))
         for frame in frames:
             test = ET.SubElement(suite, "testcase", classname=result.case, name=f"frame {frame['frame']}")
             if frame in bad:
                 failure = ET.SubElement(test, "failure", type=frame["status"], message=frame["sentence"])
                 failure.text = frame["message"]
-    write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True))
+    if gates:
+        suite = _suite(root, "gates", len(gates), sum(map(bool, gates.values())))
+        for asked, why in gates.items():
+            test = ET.SubElement(suite, "testcase", classname="gates", name=asked)
+            if why:
+                ET.SubElement(test, "failure", type="gate", message=why)
+    write_junit(path, root)
+
+
+def _suite(root: ET.Element, name: str, tests: int, failures: int) -> ET.Element:
+    return ET.SubElement(root, "testsuite", name=name, errors="0", tests=str(tests), failures=str(failures))

@@ -49,7 +49,11 @@ def _traces(out: Path, case: Found) -> Traces:
 
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces]) -> Found:
     """The case; each frame's guess is the mean over other insertions of what theirs at the nearest depth leaves."""
-    kin = [c for c in shared if c.result.phantom == case.result.phantom and c.result.group != case.result.group]
+    mine = {frame.insertion for frame in case.frames.values()}
+    same_phantom = [
+        c for c in shared if c.result.phantom == case.result.phantom and c.result.group != case.result.group
+    ]
+    kin = [c for c in same_phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
     others, frames = [list(traces[c.result.case].values()) for c in kin], dict(case.frames)
     for number, (depth, curve, start) in traces[case.result.case].items():
         near = [at_arc(wire, arcs(depth, start)) for wire in _nearest(others, depth, curve)]

@@ -23,13 +23,22 @@ class Gate:
     relation: str
     limit: float
 
+    @property
+    def asked(self) -> str:
+        """What was typed."""
+        return f"--fail-if {self.column}{self.relation}{self.limit:g}"
+
     def closed(self, overall: Mapping[str, Any]) -> str:
         """Why a run with this row of overall.csv must not pass; empty where it may."""
-        asked, found = f"--fail-if {self.column}{self.relation}{self.limit:g}", overall.get(self.column)
+        found = overall.get(self.column)
         value = float("nan") if found is None else float(found)
         if math.isnan(value):
-            return f"{asked}: {OVERALL_FILE} has no {self.column}, so that it cannot be shown to hold"
-        return f"{asked}: {self.column} is {value:.4g}" if RELATIONS[self.relation](value, self.limit) else ""
+            interval = str(overall.get("interval", ""))
+            withheld = self.column.endswith(("_low_mm", "_high_mm", "_low", "_high")) and "withheld" in interval
+            why = f": {interval}" * withheld
+            return f"gate closed: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
+        passed = not RELATIONS[self.relation](value, self.limit)
+        return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"
 
 
 def gate(text: str) -> Gate:
@@ -40,7 +49,7 @@ def gate(text: str) -> Gate:
         number = float(limit)
     except ValueError:
         number = math.nan
-    if math.isnan(number):
+    if not math.isfinite(number):
         raise UsageError([f'--fail-if {text!r}: write a column of {OVERALL_FILE} and a limit, as in "rms_mm>0.5"'])
     names = [one.name for one in SUMMARY if one.kind != "text"]
     if column not in names:

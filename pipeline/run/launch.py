@@ -9,20 +9,22 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
+from glob import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipeline.run.aggregate import Totals, aggregate, write_junit
+from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
-from pipeline.run.log import last_stage
+from pipeline.run.log import STAGES, Stage, last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
+from pipeline.run.overall import shared_scans
 from pipeline.run.provenance import code_state, this_run
 from pipeline.run.results import found_results, lost, write_json
 from pipeline.run.store import file_hash
@@ -33,6 +35,7 @@ from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import Resolved, differing, to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
+from reports.case_files import left_over, left_over_sentence, read_json
 from reports.html import render_index
 from reports.schema import SWEEP
 from reports.verdict import next_command, typed
@@ -102,7 +105,7 @@ def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case
 
 def _shard(text: str) -> tuple[int, int]:
     parts = text.split("/")
-    if len(parts) == 2 and all(p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
+    if len(parts) == 2 and all(p.isascii() and p.isdigit() for p in parts) and 1 <= int(parts[0]) <= int(parts[1]):
         return int(parts[0]), int(parts[1])
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
@@ -130,7 +133,17 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
         raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
 
 
-def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
+def guard_stages(out: Path, until: Stage) -> None:
+    """Refuse to put results of fewer stages in the place of finished ones."""
+    with suppress(ValueError):  # a damaged file is for guard_out to say
+        ends = [read_json(path).get("until", STAGES[-1]) for path in out.glob("run*.json")]
+        later = [end for end in ends if end in STAGES and STAGES.index(end) > STAGES.index(until)]
+        if later and any(out.glob("cases/*/result.json")):
+            lost = f"{out} was run until {later[0]}, and --until {until} would take that away"
+            raise UsageError([f"{lost}; name another folder, or say --fresh (compute again)"])
+
+
+def launch(plan: Plan) -> tuple[Totals, Path]:
     """Run everything and write what is about the whole; the totals and the path of the page.
 
     Raises UsageError where nothing can be written to begin with, WriteError where that shows later.
@@ -138,7 +151,7 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
-    info["sweep"] = heads
+    info |= {"sweep": heads, "until": plan.template.until, "planned": [case.id for case in plan.manifest.cases]}
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     try:
         write_json(out / name, info | {"cases": []})
@@ -147,15 +160,32 @@ def launch(plan: Plan, *, junit: Path | None = None) -> tuple[Totals, Path]:
     except WriteError as error:
         raise UsageError([str(error)]) from error
     remove_leftovers(out)
+    if plan.template.fresh:
+        _remove_others(out, info["manifest_sha256"])
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if heads:
         write_sweep(out, found_heads(out))  # what other shards have done so far is among them
     info |= {"provenance": code_state(), "assumptions": plan.assumptions, "config": settings.as_dict()}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
-    if junit:
-        write_junit(junit, found_results(out))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
+
+
+def _remove_others(out: Path, manifest: str) -> None:
+    """Remove what runs of other manifests have left in an output folder: their records, and cases that they alone had.
+
+    manifest : SHA-256 of the one whose runs stay.
+    """
+    for path in out.glob("run*.json"):
+        with suppress(ValueError):
+            if read_json(path).get("manifest_sha256") != manifest:
+                path.unlink()
+    for folder in left_over(out):
+        for place in (folder, *out.glob(f"sweep/*/cases/{escape(folder.name)}")):
+            clear(place)
+            (place / "log.txt").unlink(missing_ok=True)
+            with suppress(OSError):  # something of the user's own lies in it
+                place.rmdir()
 
 
 def cores_each(plan: Plan, jobs: int) -> int:
@@ -215,8 +245,9 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 
     then : that, where it is not the run's own command for these cases.
     """
-    lines, cases = [], []
-    for result in found_results(plan.out):
+    found, cases = found_results(plan.out), []
+    lines = shared_scans(found)
+    for result in found:
         for row in result.failures:
             cases.append(row["case"])
             frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
@@ -226,7 +257,8 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
     then = then or f"do what the message says, then {next_command(cases, typed(plan.out))}"
-    return [*lines, f"next: {then}"] if cases else lines
+    aside = [text] if (text := left_over_sentence(plan.out)) else []
+    return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
 
 
 def last_line(totals: Totals, index: Path) -> str:

@@ -3,7 +3,7 @@
 Two runs are compared by the ratio of their errors on the frames that count in both, insertion by insertion.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,13 +30,45 @@ class Found:
 
 def found_cases(out: Path) -> list[Found]:
     """Every case below an output folder; one whose tables cannot be read is damaged, and hides no other."""
-    return [_found(out, result) for result in found_results(out)]
+    results = found_results(out)
+    insertions = insertions_of(results)
+    return [_found(out, result, insertions[result.case]) for result in results]
 
 
-def _found(out: Path, result: Result) -> Found:
+def insertions_of(results: Iterable[Result]) -> dict[str, str]:
+    """The insertion of each case: that of its group; cases with a scan in common are one, whatever they state."""
+    found: dict[str, str] = {}
+    seen: dict[str, str] = {}
+    for result in results:
+        mine = found[result.case] = result.group or result.case
+        for scan in result.scans:
+            other = found[seen.setdefault(scan, result.case)]
+            found = {case: other if name == mine else name for case, name in found.items()} if other != mine else found
+            mine = other
+    return found
+
+
+def shared_scans(results: Sequence[Result]) -> list[str]:
+    """Sentences on cases that state several insertions and show the same scans."""
+    insertions, stated = insertions_of(results), dict[str, dict[str, str]]()
+    for result in results:
+        stated.setdefault(insertions[result.case], {})[result.case] = result.group or result.case
+    return [
+        f"cases {', '.join(groups)} have scans in common and count as one insertion"
+        for groups in stated.values()
+        if len(set(groups.values())) > 1
+    ]
+
+
+def damaged(found: Sequence[Found]) -> dict[str, str]:
+    """The cases whose files are not as they were written, and which one and why."""
+    return {c.result.case: str(c.result.failures[0]["message"]) for c in found if c.result.status == "damaged"}
+
+
+def _found(out: Path, result: Result, insertion: str) -> Found:
     folder = out / "cases" / result.case
     try:
-        return Found(result, _scored(folder, result.group or result.case))
+        return Found(result, _scored(folder, insertion))
     except (OSError, EOFError, ValueError, KeyError) as error:
         return Found(lost(result.case, "damaged", f"{folder / POINTS.file}: {error}"), {})
 
@@ -94,15 +126,16 @@ class Ratio:
         known = f"95 %: {self.low:.3f} to {self.high:.3f}, " if np.isfinite(self.low) else ""
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
-    @property
-    def verdict(self) -> str:
-        """The sentence, and what may be concluded from it."""
+    def verdict(self, allowed: float = 1.0) -> str:
+        """The sentence, and what may be concluded from it. allowed : the ratio up to which nobody calls it worse."""
         if self.value == 1.0 and not self.low < self.high:
             meaning = "no frame's error changed"
         elif not np.isfinite(self.low):
             meaning = "too few insertions to say whether another study would show the same"
         elif self.low <= 1.0 <= self.high:
             meaning = "no difference is shown"
+        elif 1.0 < self.low <= allowed:
+            meaning = f"the second's errors are larger, by no more than is allowed (ratio {allowed:g})"
         else:
             meaning = "the second is worse" if self.low > 1.0 else "the second is better"
         return f"{self.sentence}: {meaning}"

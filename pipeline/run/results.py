@@ -13,6 +13,7 @@ from pydantic import AfterValidator, TypeAdapter, ValidationError
 from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
+from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
@@ -20,6 +21,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest, file_hash
 from pipeline.study.manifest import Case
 from reports.atomic import write_text
+from reports.case_files import find_cases
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -29,6 +31,8 @@ LOST = {
 }
 """What may have become of a case that has no result of its own, and the sentences that say so."""
 
+COMPLETE = (ledger.RESULT, ledger.FILE)
+"""Either says that a case is no more at work; the second without the first, that this was taken away since."""
 
 Row = dict[str, Any]
 
@@ -51,7 +55,8 @@ class Result:
 
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
     key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
-    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     details :
+    vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     scans :
+    of the contents of each frame or trace.     details :
     settings, inputs, counters, assumptions and what else the pages show.
     """
 
@@ -65,6 +70,7 @@ class Result:
     summary: Annotated[Row, has("case", "frames", "frames_ok", "status")]
     key: str = ""
     phantom: str = ""
+    scans: tuple[str, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -88,12 +94,11 @@ def read_result(path: Path) -> Result:
 
 def found_results(out: Path) -> list[Result]:
     """The result of every case below an output folder, by id; one that is damaged says so and hides no other."""
-    return [_found(path) for path in sorted((out / "cases").glob("*/result.json"))]
+    return [_found(folder) for folder in find_cases(out) if any((folder / name).exists() for name in COMPLETE)]
 
 
-def _found(path: Path) -> Result:
-    folder = path.parent
-    written = ledger.read(folder)
+def _found(folder: Path) -> Result:
+    path, written = folder / ledger.RESULT, ledger.read(folder)
     wrong = written.amiss(folder, ledger.TABLES) if written else ""
     if wrong:
         return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")
@@ -117,7 +122,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     head = (case.id, case.role, case.group, summary["status"], sentence)
     source = case.lumen or case.reference
     phantom = "" if source is None else digest(source)
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, details)
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, data_of(case), details)
 
 
 def lost(name: str, status: str, reason: str, case: Case | None = None, stage: str = "") -> Result:

@@ -5,7 +5,7 @@ over depth, over those that count in all. A simulator's failed frames stand besi
 none of its shares of the planned frames.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,8 +15,9 @@ from pipeline.compare import intervals
 from pipeline.model import Array
 from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, validation
+from pipeline.run.results import found_results
 from reports import tables
-from reports.schema import POINTS, SIMULATORS, WHERE
+from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
 
 OURS = "wireval"
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -48,6 +49,18 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
     tables.write(out / WHERE.file, WHERE, list(_where(folders, studies)))
     return sentences
+
+
+def write_failures(out: Path, folders: Iterable[Path]) -> None:
+    """simulators/failures.csv: what failed of every simulator; the logs, below ``out``, tell whose it is."""
+    rows = [
+        row | {"log": (folder / row["log"]).relative_to(out).as_posix()}
+        for folder in folders
+        for result in found_results(folder)
+        for row in result.failures
+    ]
+    known = [{name: row[name] for name in row.keys() & FAILURES.names} for row in rows]
+    tables.write(out / "simulators" / FAILURES.file, FAILURES, known)
 
 
 def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:

@@ -11,11 +11,11 @@ from typing import Any
 
 from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
-from pipeline.run.results import LOST, Result, found_results
+from pipeline.run.results import LOST, Result
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
-from reports.case_files import read_json
+from reports.case_files import find_cases, read_json
 from reports.schema import SWEEP
 
 PLAIN = "(plain)"
@@ -81,9 +81,15 @@ def found_heads(out: Path) -> list[Head]:
     return list(found.values())
 
 
+def _at(out: Path, head: Head) -> list[Found]:
+    """The cases at a point that the plain run has."""
+    named = {folder.name for folder in find_cases(out)}
+    return [case for case in found_cases(out / _folder(head)) if case.result.case in named]
+
+
 def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
     """Cases of which a sweep has no result, and at which point."""
-    return [(_folder(h), r) for h in heads for r in found_results(out / _folder(h)) if r.status in LOST]
+    return [(_folder(h), case.result) for h in heads for case in _at(out, h) if case.result.status in LOST]
 
 
 def write_sweep(out: Path, heads: Sequence[Head]) -> None:
@@ -93,7 +99,7 @@ def write_sweep(out: Path, heads: Sequence[Head]) -> None:
     before = with_another(out, found_cases(out))
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))
     for head in heads:
-        rows += _rows(head, before, found_cases(out / _folder(head)))
+        rows += _rows(head, before, _at(out, head))
     tables.write(out / SWEEP.file, SWEEP, rows)
 
 

@@ -19,6 +19,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from pipeline import THREADS, one_thread
 from pipeline.run.outcome import LOST, Outcome, guarded
+from pipeline.streams import lasting
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -146,7 +147,7 @@ def _serve(pipe: Any, work: Callable[[J], R]) -> None:
     # Ctrl-C reaches every process of a terminal; this one is ended by its parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
-    with suppress(EOFError, OSError):
+    with lasting(), suppress(EOFError, OSError):
         while True:
             pipe.send(guarded(work, pipe.recv()))
 

@@ -26,6 +26,7 @@ from pipeline.model import Branches, Shapes
 from pipeline.simulate.others import oddity
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
+from pipeline.study.same_scans import repeated
 from pipeline.study.settings import Config
 
 NEAR_MM = 20.0
@@ -53,6 +54,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
 
     for path in inputs_of(case):
         found(lambda path=path: _require_there(path))  # type: ignore[misc]
+    problems += repeated(case)
     if problems:
         return problems
     headers: list[Header] = []

@@ -5,7 +5,7 @@ Everything that is wrong with it is listed at once.
 
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -203,6 +203,10 @@ class Manifest:
 
     path: Path
     cases: tuple[Case, ...]
+
+    def without(self, ids: Set[str]) -> "Manifest":
+        """The same study less some of its cases."""
+        return Manifest(self.path, tuple(case for case in self.cases if case.id not in ids))
 
 
 def read_manifest(path: Path) -> Manifest:

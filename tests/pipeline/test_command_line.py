@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
 import tomllib
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,7 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y --fail-if rms>1", "did you mean 'rms_mm'?"),
         ("run STUDY -o y --fail-if rms_mm", "write a column"),
         ("run STUDY -o y --fail-if rms_mm>nan", "write a column"),
+        ("run STUDY -o y --fail-if rms_mm>inf", "write a column"),
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
@@ -63,7 +66,7 @@ def test_what_is_wrong_is_said(
     assert main(typed) == 2
     heard = capsys.readouterr().err.strip().splitlines()
     assert said in heard[0]
-    assert len(heard) == 2, "the problem, and that nothing was run"
+    assert len(heard) == 2, "the problem, and how many there are"
     assert not (tmp_path / "y").exists(), "nothing is left behind"
 
 
@@ -153,6 +156,8 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
     assert not gate("rms_mm>0.5").closed({"rms_mm": 0.5})
     assert gate("rms_mm>=0.5").closed({"rms_mm": 0.5})
     assert gate("frames_ok<3").closed({"frames_ok": 2})
+    withheld = {"rms_low_mm": float("nan"), "interval": "interval withheld: 1 insertion, at least 3 needed"}
+    assert "no rms_low_mm: interval withheld: 1 insertion" in gate("rms_low_mm>0.5").closed(withheld)
     for nothing in ({}, {"rms_mm": None}, {"rms_mm": float("nan")}):
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 
@@ -178,3 +183,30 @@ def test_the_package_runs_and_completes() -> None:
         [sys.executable, "-m", "pipeline", "--print-completion", "bash"], capture_output=True, text=True, check=True
     )
     assert "--fail-if" in done.stdout
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_reader_that_has_gone_does_not_change_the_exit_code(study: Path, tmp_path: Path, closed: str) -> None:
+    """A gate in a pipe, ``wireval run | head -1``, said that all was well; and the verb has to finish."""
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "wb") as gone:
+        others = dict.fromkeys(("stdout", "stderr"), subprocess.DEVNULL)
+        run = [sys.executable, "-m", "pipeline", "run", str(study), "-o", str(tmp_path / "out"), "--until", "load"]
+        done = subprocess.run([*run, "--fail-if", "rms_mm>0.5"], **(others | {closed: gone}), check=False)
+    assert done.returncode == 1
+    assert (tmp_path / "out" / "index.html").exists()
+
+
+def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["run", str(study), "-o", str(tmp_path / "out"), "--until", "load", "--junit", str(tmp_path / "x.xml")]
+    assert main([*words, "--fail-if", "rms_mm>0.5"]) == 1
+    assert "gate closed: --fail-if rms_mm>0.5" in capsys.readouterr().err
+    suite = ET.parse(tmp_path / "x.xml").getroot().findall("testsuite")[-1]
+    assert (suite.get("name"), suite.get("tests"), suite.get("failures")) == ("gates", "1", "1")
+    assert "gate closed" in str(suite[0][0].get("message"))
+
+
+def test_check_does_not_say_that_nothing_was_run(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(study / "none.toml")]) == 2
+    assert "nothing was run" not in capsys.readouterr().err

@@ -125,3 +125,29 @@ def test_runs_without_a_frame_in_common_have_no_ratio(tmp_path: Path) -> None:
     write_case(tmp_path / "a", "one", [0.1])
     write_case(tmp_path / "b", "two", [0.1])
     assert ratio(found_cases(tmp_path / "a"), found_cases(tmp_path / "b")) is None
+
+
+def test_cases_with_a_scan_in_common_are_one_insertion(tmp_path: Path) -> None:
+    """The same scans under three ids gave an interval over three insertions; chains count, too."""
+    for name, scans in (("a", ["1"]), ("b", ["2", "3"]), ("c", ["3", "1"]), ("d", ["4"])):
+        write_case(tmp_path, name, [GOOD, BAD], scans=scans)
+    assert overall(found_cases(tmp_path))["insertions"] == 2
+    aggregate(tmp_path, {})
+    assert "cases a, b, c have scans in common and count as one insertion" in render_index(tmp_path).read_text("utf-8")
+
+
+def test_cases_that_the_manifest_names_no_more_count_nowhere(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ids that were changed doubled the insertions, and narrowed the interval. Shards add up; older runs keep all."""
+    everything = [c.result.case for c in found_cases(study)]
+    assert everything == ["a", "b", "c", "d", "tuned"]
+    for number, names in ((1, ["a", "b"]), (2, ["b", "d"])):
+        (study / f"run.{number}-2.json").write_text(json.dumps({"planned": names}), encoding="utf-8")
+    assert [c.result.case for c in found_cases(study)] == ["a", "b", "d"]
+    assert overall(found_cases(study))["insertions"] == 3
+    said = "no manifest of this folder names them any more: c, tuned"
+    assert said in render_index(study).read_text(encoding="utf-8")
+    assert main(["report", str(study), "--overview"]) == 1
+    assert said in capsys.readouterr().err
+    assert list(pd.read_csv(study / "summary.csv")["case"]) == ["a", "b", "d"]
+    (study / "run.json").write_text("{}", encoding="utf-8")
+    assert [c.result.case for c in found_cases(study)] == everything

@@ -148,6 +148,38 @@ def test_another_manifest_into_the_same_folder_is_refused(
     assert "--resume" in capsys.readouterr().err
 
 
+def test_fresh_removes_the_cases_of_the_manifest_before(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One that is resumed leaves them aside, says so, and what anybody else has put into the folder stays."""
+    out, other = tmp_path / "out", tmp_path / "study"
+    shutil.copytree(finished, out)
+    shutil.copytree(study, other)
+    manifest = other / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8").replace('id = "bifurcation"', 'id = "renamed"')
+    manifest.write_text(text, encoding="utf-8")
+    (out / "cases" / "mine").mkdir()
+    assert run(other, out, "--resume") == 0
+    said = capsys.readouterr()
+    assert "1 case, 4 frames" in said.out
+    assert "no manifest of this folder names them any more: bifurcation" in said.err
+    assert run(other, out, "--fresh") == 0
+    assert "any more" not in capsys.readouterr().err
+    assert {path.name for path in (out / "cases").iterdir()} == {"renamed", "mine"}
+
+
+def test_fewer_stages_do_not_wipe_what_is_finished(
+    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    for more in ((), ("--resume",)):
+        assert run(study, out, "--until", "trace", *more) == 2
+        assert "say --fresh" in capsys.readouterr().err
+    assert len(found_results(out)) == 1
+    assert run(study, out) == 0
+
+
 def test_dry_run_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(study, tmp_path / "out", "--dry-run", "--sweep", "simulate.wall_scale=0.5,2") == 0
     assert "sweep simulate.wall_scale = 0.5" in capsys.readouterr().out
@@ -271,8 +303,12 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     """Traced only, a case has no errors: those of the run before must not come back in the last line."""
     out = tmp_path / "out"
     shutil.copytree(finished, out)
-    assert run(study, out, "--until", "trace") == 0
-    assert "median point error" not in capsys.readouterr().out
+    assert run(study, out, "--until", "trace", "--fresh") == 0
+    last = capsys.readouterr().out
+    assert "median point error" not in last
+    assert "Nothing is scored: the run was to end before frames are compared (--until trace)" in last
+    assert "Nothing is scored: the run was" in (out / "index.html").read_text(encoding="utf-8")
+    assert pd.read_csv(out / "summary.csv")["within_1mm"].isna().all(), "it was 1"
     assert json.loads((out / "run.json").read_text(encoding="utf-8"))["overall"] == {}
     left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
     assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
@@ -341,6 +377,7 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     table = pd.read_csv(path)
     table["rms_mm"] += 1.0
     table.to_csv(path, index=False)
+    (path.parent / "ledger.json").unlink()
     assert main(["diff", str(finished), str(worse)]) == 1
     assert main(["diff", str(worse), str(finished)]) == 0
 
@@ -350,6 +387,12 @@ def test_a_folder_that_is_not_there_is_no_regression(
 ) -> None:
     assert main(["diff", str(finished), str(tmp_path / "nothere")]) == 2
     assert "nothere: no such folder" in capsys.readouterr().err
+
+
+def named_by_a_shard(out: Path, case: str) -> None:
+    """As if another shard of the same manifest had this case."""
+    info = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    (out / "run.2-2.json").write_text(json.dumps(info | {"planned": [case]}), encoding="utf-8")
 
 
 def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
@@ -363,6 +406,25 @@ def two_cases(study: Path, folder: Path, broken: bool = False) -> Path:
         damaged.write_bytes(damaged.read_bytes()[:-5000])
     (folder / "manifest.toml").write_text(text + "\n" + second, encoding="utf-8")
     return folder
+
+
+def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = two_cases(study, tmp_path / "study")
+    assert main(["check", str(both)]) == 0
+    assert "warning: cases 'bifurcation' and 'second' share" in capsys.readouterr().out
+    assert run(both, tmp_path / "out", "--until", "compare") == 0
+    assert "cases bifurcation, second have scans in common and count as one insertion" in capsys.readouterr().err
+    assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
+    manifest = both / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8")
+    frames = sorted(f"frames/{path.name}" for path in (both / "frames").iterdir())
+    for listed, said in (
+        ([*frames[:-1], frames[0]], "listed 2 times"),
+        (["reference.mha", *frames[1:]], "reference and frame"),
+    ):
+        manifest.write_text(text.replace('"frames/*.mha"', json.dumps(listed)), encoding="utf-8")
+        assert main(["check", str(both)]) == 2
+        assert said in capsys.readouterr().err
 
 
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
@@ -500,6 +562,7 @@ def test_a_damaged_result_hides_no_other(
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     (out / "cases" / "other").mkdir()
+    named_by_a_shard(out, "other")
     damaged = out / "cases" / "other" / "result.json"
     damaged.write_text("{", encoding="utf-8")
     for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
@@ -544,6 +607,7 @@ def test_points_cut_short_hide_no_other_case(
     out = tmp_path / "out"
     shutil.copytree(finished, out)
     shutil.copytree(out / "cases" / "bifurcation", out / "cases" / "other")
+    named_by_a_shard(out, "other")
     result = out / "cases" / "other" / "result.json"
     result.write_text(result.read_text(encoding="utf-8").replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
@@ -561,6 +625,7 @@ def test_points_cut_short_hide_no_other_case(
         (["--set", "solver.segmnt_mm=1"], "1 problem in the settings; nothing was run"),
         (["--only", "bifurcatoin"], "did you mean 'bifurcation'"),
         (["--shard", "3/2"], "expected I/N"),
+        (["--shard", "\u00b2/3"], "expected I/N"),
         (["--until", "simulat"], "did you mean 'simulate'"),
         (["-j", "0"], "expected 1 or more"),
         (["--sweep", "simulate.wall_scale"], "write table.key=value1,value2"),

@@ -115,6 +115,20 @@ def test_a_third_party_in_a_bifurcation(tmp_path: Path) -> None:
     assert errors_of(out, "bifurcation")["branch_ok"].all()
 
 
+def test_any_simulator_s_failure_is_the_exit_code(tmp_path: Path) -> None:
+    """That of a later one was exit 0, and stood in no failures.csv but its own."""
+    manifest, good = synth("bend", tmp_path / "study"), PEERS / "bend"
+    bad = write_csv(tmp_path / "bad", peers("bend"))
+    sorted(bad.iterdir())[1].unlink()
+    for number, words in enumerate(([f"good={good}", f"bad={bad}"], [f"bad={bad}", f"good={good}"])):
+        out = tmp_path / str(number)
+        curves = [x for word in words for x in ("--curves", word)]
+        assert main(["score", str(manifest), *curves, "-o", str(out), *QUICK]) == 1
+        table = pd.read_csv(out / "simulators" / "failures.csv")
+        assert list(table["status"]) == ["curve_missing"]
+        assert (out / table["log"].item()).exists()
+
+
 ENTRY, ALONG = np.array([10.0, -40.0, 7.0]), np.array([0.0, 0.6, 0.8])
 
 

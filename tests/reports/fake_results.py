@@ -201,7 +201,9 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "status": _status(case),
         "sentence": "two frames have no result" if case.failed else "every frame is ok",
         "frames": [_frame_status(case, row) for row in rows],
-        "summary": {k: v for k, v in statistics.items() if v is not None and v == v},
+        "failures": [_failure(case, frame) for frame in case.failed],
+        "summary": {"case": case.name, "group": "g1", "role": case.role, "status": _status(case)}
+        | {k: v for k, v in statistics.items() if v is not None and v == v},
         "assumptions": ["voxel spacing taken as 0.5 mm: the file gives none"] if case.simulated_only else [],
         "warnings": ["roll is unknown and was taken as 0"] if case.failed else [],
         "wire": {"name": "micro014", "radius_mm": 0.18, "bending_stiffness_N_mm2": [[0, 0.5], [30, 5.0]]},

@@ -113,7 +113,14 @@ def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"), [("rmse_mm = 1", "did you mean"), ("rms_mm = -1", "from 0 up"), ("rms_mm = 'x'", "from 0 up")]
+    ("text", "hint"),
+    [
+        ("rmse_mm = 1", "did you mean"),
+        ("rms_mm = -1", "from 0 up"),
+        ("rms_mm = 'x'", "from 0 up"),
+        ("rms_mm = inf", "from 0 up"),
+        ("# nothing", "names no column"),
+    ],
 )
 def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> None:
     path = tmp_path / "t.toml"

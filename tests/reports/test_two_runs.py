@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.cli import main
+from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
+from reports.junit import write_junit
 from reports.schema import ERRORS, POINTS
 from reports.two_runs import Verdict
 from tests.reports.fake_results import FakeCase, write_run
@@ -159,7 +161,8 @@ def test_golden_tables_alone_are_enough(first: Path, tmp_path: Path) -> None:
     ],
 )
 def test_the_words_follow_the_interval(ratio: Ratio, meaning: str) -> None:
-    assert meaning in ratio.verdict
+    assert meaning in ratio.verdict()
+    assert "is worse" not in ratio.verdict(1.15), "as the gate has it"
 
 
 def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
@@ -169,3 +172,66 @@ def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
     verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
     assert "a\\|b &lt;c&gt;" in verdict._markdown()
     assert replace(verdict, judged="worse").closed
+
+
+def test_a_baseline_without_numbers_leaves_no_gate_open(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A gate that nothing can close is refused; a case of many that has none is named."""
+    for number, name in enumerate(GROUPS):
+        path = second / "cases" / name / ERRORS.file
+        rows = tables.read(path, ERRORS)
+        if number:
+            rows["status"] = "no_wire"
+        else:  # as of a run until the trace
+            rows = rows[["frame", "status", "insertion_mm"]]
+        tables.write(path, ERRORS, rows)
+    assert main(["diff", str(second), str(first)]) == 2
+    assert "nothing to hold against" in capsys.readouterr().err
+    shutil.copy(first / "cases" / "a" / ERRORS.file, second / "cases" / "a" / ERRORS.file)
+    assert main(["diff", str(second), str(first)]) == 0
+    assert "the first run has nothing to hold against in b, c" in capsys.readouterr().out
+    assert main(["diff", str(tmp_path / "nope"), str(first)]) == 2
+    assert "nope: no such folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("spoil", ["half", POINTS.file, "result.json"])
+def test_a_damaged_candidate_closes_the_gate_and_no_baseline_is(
+    first: Path, second: Path, spoil: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = second / "cases" / "b"
+    ledger.write(folder, "key")
+    assert main(["diff", str(first), str(second)]) == 0
+    if spoil == "half":
+        points = (folder / POINTS.file).read_bytes()
+        (folder / POINTS.file).write_bytes(points[: len(points) // 2])
+    else:
+        (folder / spoil).unlink()
+    capsys.readouterr()
+    assert main(["diff", str(first), str(second)]) == 1
+    assert (POINTS.file if spoil == "half" else spoil) in capsys.readouterr().out
+    assert main(["diff", str(second), str(first)]) == 2
+    assert "case 'b' of the first run cannot be held against" in capsys.readouterr().err
+
+
+def test_a_result_and_ledger_taken_away_are_missed(first: Path, second: Path) -> None:
+    (second / "cases" / "b" / "result.json").unlink()
+    assert main(["diff", str(first), str(second)]) == 1
+
+
+def test_a_tolerance_without_the_ratio_keeps_the_shipped_one(first: Path, second: Path, tmp_path: Path) -> None:
+    """The pooled gate was off without a word."""
+    times(second, 1.1)
+    path = tmp_path / "own.toml"
+    path.write_text("rms_mm = 1.0", encoding="utf-8")
+    assert main(["diff", str(first), str(second), "--tolerance", str(path)]) == 1
+    path.write_text("rms_mm = 1.0\nrms_ratio = 0.2", encoding="utf-8")
+    assert main(["diff", str(first), str(second), "--tolerance", str(path)]) == 0
+
+
+def test_a_message_with_control_characters_is_still_xml(tmp_path: Path) -> None:
+    root = ET.Element("testsuites", name="a\x00b\x1b[0m")
+    ET.SubElement(root, "failure", message="\ufffe\x08ok").text = "line\n\x0cnext\ud800"
+    write_junit(tmp_path / "x.xml", root)
+    read = ET.parse(tmp_path / "x.xml").getroot()
+    assert (read.get("name"), read[0].get("message"), read[0].text) == ("ab[0m", "ok", "line\nnext")
