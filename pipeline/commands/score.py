@@ -44,6 +44,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.simulators import render_simulators
+    from reports.verdict import remarks
 
     try:
         plans = _plans(args)
@@ -59,6 +60,8 @@ def main(args: argparse.Namespace) -> int:
         for line in failure_lines(plan, "do what the message says, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")
+        for text in remarks(done[name][0].pooled):
+            say(f"{name}: warning: {text}")
     for line in write_comparison(args.out, {name: plan.out for name, plan in plans.items()}):
         say(line)
     say(f"side by side: {render_simulators(args.out, embed=args.embed)}")
