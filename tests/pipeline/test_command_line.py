@@ -53,6 +53,10 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
+        ("init STUDY --to /proc/none/m.toml", "cannot be written"),
+        ("init STUDY --to y --entry 900,0,0 --direction 0,0,1", "lies outside the scan"),
+        ("init STUDY --to y --wire-radius -1", "radius_mm"),
+        ("init STUDY --to y --reference STUDY/none.mha", "no such scan"),
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
     ],
 )
@@ -97,8 +101,9 @@ def test_init_leaves_what_run_infers_and_names_scans_from_there(
         "material_axis",
         "entry_mm and entry_direction",
     }
+    assert any(note.startswith("wall: 2.0 N/mm2, friction 0") for note in case["assumed"])
     assert case["frames"] == ["frames/frame_000.mha", "frames/frame_001.mha"]
-    capsys.readouterr()
+    assert f"wireval check '{scans}/manifest.toml' && " in capsys.readouterr().out, "to be pasted as it stands"
     assert main(["check", str(scans.rename(tmp_path / "moved"))]) == 0, "the folder may be moved"
     assert "assumed, not confirmed" in capsys.readouterr().out
 
@@ -118,6 +123,16 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     told = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
     assert (told["entry_mm"], told["entry_direction"]) == ([1, 2, 3], [0, 0, 1])
     assert not [text for text in told["assumed"] if text.startswith("entry")]
+
+
+def test_init_takes_what_is_said_of_the_scans(scans: Path, tmp_path: Path) -> None:
+    next(scans.glob("reference.*")).rename(scans / "empty_phantom.mha")
+    words = ["--reference", str(scans / "empty_phantom.mha"), "--to", str(tmp_path / "m.toml"), "--entry", "1,2,3"]
+    assert main(["init", str(scans), *words]) == 0
+    case = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
+    assert case["reference"] == str(scans / "empty_phantom.mha")
+    assert len(case["frames"]) == 2
+    assert [text.partition(":")[0] for text in case["assumed"] if text.startswith("entry")] == ["entry_direction"]
 
 
 def test_settings_are_a_file_that_reads_back_as_the_defaults(
