@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import WORST, read_json
+from reports.case_files import WORST, find_cases, read_json
 from reports.schema import SUMMARY
 
 _MANY = 5
@@ -79,6 +79,12 @@ def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, s
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
 
 
+OF_CALIBRATION = (
+    "It is a calibration case and not scored: parameters are learnt from it, so its errors say nothing about the "
+    "simulator and stand in no score of the run."
+)
+
+
 def unscored(cases: Iterable[tuple[str, str]]) -> str:
     """Why no error stands over a whole run, from role and status of its cases; empty where a case was to be scored."""
     known = [(str(role), str(status)) for role, status in cases]
@@ -139,6 +145,14 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
         {"case": case, "frame": frame, "text": number(value), "link": links.get(case, "")}
         for value, case, frame in rows[:_MANY]
     ]
+
+
+def warned(out_dir: Path) -> list[str]:
+    """What was warned of in the cases of a run, a line each, no more than a few."""
+    found = ((case.name, read_json(case / "result.json").get("warnings", ())) for case in find_cases(out_dir))
+    lines = [f"warning: {name}: {text}" for name, texts in found for text in texts]
+    rest = len(lines) - _MANY
+    return [*lines[:_MANY], *[f"{rest} more warnings stand on the pages of the cases"] * (rest > 0)]
 
 
 def typed(folder: Path) -> Sequence[str]:

@@ -78,7 +78,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
 
 def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:
     """What nobody has confirmed of these cases, a sentence each."""
-    return tuple(f"case {case.id!r}: {text}" for case in cases for text in case.assumed)
+    return tuple(f"case {case.id!r}: {text}" for case in cases for text in case.unconfirmed)
 
 
 def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of the first simulator failed; raises InputError where the input is wrong."""
     from pipeline.run.launch import failure_lines, last_line, launch
-    from pipeline.run.simulators import write_comparison
+    from pipeline.run.simulators import OURS, write_comparison
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.simulators import render_simulators
@@ -54,7 +55,9 @@ def main(args: argparse.Namespace) -> int:
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     done = {}
     for name, plan in plans.items():
-        done[name] = launch(plan)
+        totals, page = launch(plan)
+        # of wires that were handed in there is no time of a simulation
+        done[name] = (totals if name == OURS else replace(totals, solver_s=0.0)), page
         for line in failure_lines(plan, "do what the message says, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")

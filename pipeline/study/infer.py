@@ -105,6 +105,12 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
     return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis))
 
 
+def _seen_entry(frame: Path, reference: Path | None, config: LoadConfig) -> tuple[Array, Array]:
+    """Entry and direction as the first frame shows them."""
+    empty = load(read_header(reference, config), config=config) if reference else None
+    return infer_entry(load(read_header(frame, config), config=config), empty)
+
+
 def infer_manifest(
     folder: Path,
     entry: Array | None,
@@ -127,12 +133,12 @@ def infer_manifest(
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
     )
-    where, guessed = "", [name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None]
+    where = ""
     if entry is None or direction is None:
-        empty = load(read_header(reference, config), config=config) if reference else None
-        at, towards = infer_entry(load(read_header(frames[0], config), config=config), empty)
+        where = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
+        where += f": {AT_EDGE}{'' if reference else UNSUBTRACTED}"
+        at, towards = _seen_entry(frames[0], reference, config)
         entry, direction = at if entry is None else entry, towards if direction is None else direction
-        where = f"{' and '.join(guessed)}: {AT_EDGE}{'' if reference else UNSUBTRACTED}"
     notes = _assumed(radius_mm, where)
     text = MANIFEST.format(
         radius=radius_mm or DEFAULT_RADIUS_MM,

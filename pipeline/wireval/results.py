@@ -10,7 +10,6 @@ from reports import tables
 from reports.case_files import CaseFiles, find_cases, read_case
 from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
-
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
 

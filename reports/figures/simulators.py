@@ -40,7 +40,8 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
         for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
             middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
             # dashes show the line below where two lie on each other
-            axes.plot(middle, mine["rms_mm"], ("o-", "o--")[number % 2], color=shown[str(name)], label=str(name), markersize=4)
+            style = ("o-", "o--")[number % 2]
+            axes.plot(middle, mine["rms_mm"], style, color=shown[str(name)], label=str(name), markersize=4)
         plain(axes)
         _nearest(strip, rows, shown)
         strip.set_xlabel(f"{along}, mm")

@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run.gate import Gate, gate
@@ -123,6 +124,23 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     told = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
     assert (told["entry_mm"], told["entry_direction"]) == ([1, 2, 3], [0, 0, 1])
     assert not [text for text in told["assumed"] if text.startswith("entry")]
+
+
+def test_a_wire_thinner_than_half_a_voxel_is_warned_of_and_a_fitted_roll_not_assumed(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manifest = scans / "manifest.toml"
+    voxel = sitk.ReadImage(str(next(scans.glob("reference.*")))).GetSpacing()[0]
+    for radius, warned in ((str(0.24 * voxel), True), (str(0.26 * voxel), False)):
+        manifest.unlink(missing_ok=True)
+        assert main(["init", str(scans), "--wire-radius", radius]) == 0
+        text = manifest.read_text(encoding="utf-8").replace('wire = "assumed"', 'wire = "assumed"\nroll_deg = "fit"')
+        manifest.write_text(text, encoding="utf-8")
+        main(["run", str(scans), "-o", str(tmp_path / radius), "--until", "load"])
+        told = json.loads(next((tmp_path / radius).glob("cases/*/result.json")).read_text(encoding="utf-8"))
+        assert any("less than half a voxel" in line for line in told["warnings"]) == warned
+        assert ("less than half a voxel" in capsys.readouterr().out) == warned
+        assert not [line for line in told["assumptions"] if line.startswith("roll_deg: 0")]
 
 
 def test_init_takes_what_is_said_of_the_scans(scans: Path, tmp_path: Path) -> None:
