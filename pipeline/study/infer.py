@@ -105,10 +105,17 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
     return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis))
 
 
-def _seen_entry(frame: Path, reference: Path | None, config: LoadConfig) -> tuple[Array, Array]:
-    """Entry and direction as the first frame shows them."""
+def _stated_or_seen(
+    entry: Array | None, direction: Array | None, frame: Path, reference: Path | None, config: LoadConfig
+) -> tuple[Array, Array, str]:
+    """Entry and direction, each as the first frame shows it where it is not stated; a sentence on what is not."""
+    if entry is not None and direction is not None:
+        return entry, direction, ""
     empty = load(read_header(reference, config), config=config) if reference else None
-    return infer_entry(load(read_header(frame, config), config=config), empty)
+    at, towards = infer_entry(load(read_header(frame, config), config=config), empty)
+    guessed = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
+    where = f"{guessed}: {AT_EDGE}{'' if reference else UNSUBTRACTED}"
+    return at if entry is None else entry, towards if direction is None else direction, where
 
 
 def infer_manifest(
@@ -133,12 +140,7 @@ def infer_manifest(
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
     )
-    where = ""
-    if entry is None or direction is None:
-        where = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
-        where += f": {AT_EDGE}{'' if reference else UNSUBTRACTED}"
-        at, towards = _seen_entry(frames[0], reference, config)
-        entry, direction = at if entry is None else entry, towards if direction is None else direction
+    entry, direction, where = _stated_or_seen(entry, direction, frames[0], reference, config)
     notes = _assumed(radius_mm, where)
     text = MANIFEST.format(
         radius=radius_mm or DEFAULT_RADIUS_MM,
