@@ -17,7 +17,7 @@ from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
-from reports.verdict import badge, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
 
 R = TypeVar("R")
@@ -101,7 +101,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     page = {
         "title": f"{case.name} - wireval",
         "name": case.name,
-        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, case.statistics),
+        "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case)),
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
@@ -189,13 +189,20 @@ def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
     return [dict.fromkeys(FAILURES.names, "") | {"case": case.name} | row for row in rows]
 
 
+def _scored(case: CaseFiles) -> Mapping[str, Any]:
+    """The case's row of summary.csv; empty where its errors are no score."""
+    return {} if case.result.get("role") == "calibration" else case.statistics
+
+
 def _case_verdict(case: CaseFiles) -> str:
     """What became of the case, how many frames have a result, and how good they are."""
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     counts = f"{good} of {planned} frames have a result." if planned and good != planned else ""
-    return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", verdict(case.statistics))))
+    scored = _scored(case)
+    how = verdict(scored) if scored or not case.statistics else OF_CALIBRATION
+    return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", how)))
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:

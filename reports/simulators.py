@@ -13,7 +13,7 @@ from reports.figures.simulators import OURS, SimulatorFiles
 from reports.html import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import badge, verdict
+from reports.verdict import badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -23,7 +23,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     """Draw the figure and write simulators.html; returns its path. embed : pictures and numbers into the page."""
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
     table, columns = _one_table(files.simulators)
-    grid = _content.grid(table, columns, bad=table["frames_ok"] < table["frames"], nothing=_content.NOTHING)
+    grid = _content.grid(table, columns, bad=_doubtful(table), nothing=_content.NOTHING)
     folders = {name: _folder_of(out_dir, name) for name in table["simulator"]}
     links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
@@ -54,9 +54,10 @@ def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
     rest = len(lines) - _MOST_WARNINGS
+    counts = f"On {row.get('frames_ok')} of {row.get('frames')} frames: " if row.get("frames_failed") else ""
     return {
         "badge": badge("ok" if row.get("frames_failed") == 0 else "frames failed", row.get("frames_failed") == 0, row),
-        "verdict": verdict(row) or "No frame of it has a result.",
+        "verdict": counts + said if (said := verdict(row)) else "No frame of it has a result.",
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{rest} more warnings stand on the pages of its cases"] * (rest > 0)],
     }
 
@@ -67,8 +68,13 @@ def _warnings(folder: Path) -> dict[str, list[str]]:
 
 
 def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:
-    """A row for each simulator: its own numbers, then the ratio of its error to that of every other one."""
-    table = rows[rows["against"].isna()].reset_index(drop=True)
+    """A row for each simulator: its own numbers, then the ratio of its error to that of every other one.
+
+    In order of rms_mm; below those, who has failed frames, which rms_mm leaves out, or tips that it does not see.
+    """
+    table = rows[rows["against"].isna()]
+    table = table.assign(doubtful=_doubtful(table)).sort_values(["doubtful", "rms_mm"], kind="stable")
+    table = table.drop(columns="doubtful").reset_index(drop=True)
     columns = list(SIMULATORS.shown("cases"))
     pairs = rows[rows["against"].notna()]
     for other in table["simulator"][table["simulator"].isin(pairs["against"])]:
@@ -79,6 +85,12 @@ def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:
         meaning = f"rms_mm over that of {other}, on the frames that count in both; below 1: nearer than {other}"
         columns.append(Column(name, "1", meaning))
     return table, columns
+
+
+def _doubtful(table: pd.DataFrame) -> "pd.Series[bool]":
+    """Whether a simulator has failed frames, or tips that rms_mm does not see."""
+    off = [bool(tips_off(dict(row))) for _, row in table.iterrows()]
+    return table["frames_ok"].lt(table["frames"]) | pd.Series(off, table.index, dtype=bool)
 
 
 def _where(rows: pd.DataFrame) -> _content.Grid | None:

@@ -2,13 +2,14 @@
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import WORST, read_json
+from reports.case_files import WORST, find_cases, read_json
 from reports.schema import SUMMARY
 
 _MANY = 5
@@ -27,16 +28,46 @@ def verdict(statistics: Mapping[str, Any]) -> str:
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
-    return " ".join(filter(None, (sentence, _against(statistics))))
+    return " ".join(filter(None, (sentence, *remarks(statistics), _against(statistics))))
 
 
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
+TIPS_OFF = "the tips lie off"
+TIPS_OFF_RATIO, TIPS_OFF_MM = 3.0, 0.5
+"""From which tip_median_mm on, over rms_mm and in mm, the tips contradict it. The 27 scenes of the catalogue, replayed
+to the traced length, have ratios up to 2.4."""
+
+
+FAR_BELOW = 0.7
+
+
+def remarks(statistics: Mapping[str, Any]) -> list[str]:
+    """What rms_mm and skill alone do not tell, a sentence each."""
+    return [text for text in (tips_off(statistics), _unknown_roll(statistics)) if text]
+
+
+def _unknown_roll(statistics: Mapping[str, Any]) -> str:
+    """That a roll which is stated does worse than none, where the wire is no better than a guess."""
+    rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
+    if standing(statistics) != NO_BETTER or not unknown < FAR_BELOW * rms:
+        return ""
+    return f'It is worse than with an unknown roll ({number(unknown)} mm): try roll_deg = "fit".'
+
+
+def tips_off(statistics: Mapping[str, Any]) -> str:
+    """What rms_mm does not see, as it goes from the simulated wire to the traced one: a wire that ends elsewhere."""
+    tip, rms, along = (_number(statistics.get(key)) for key in ("tip_median_mm", "rms_mm", "tip_along_median_mm"))
+    if not tip > max(TIPS_OFF_MM, TIPS_OFF_RATIO * rms):
+        return ""
+    where = f"ends {number(abs(along))} mm {'short' if along < 0 else 'beyond'}" if abs(along) > 0.5 * tip else ""
+    where = where or f"has its tip {number(tip)} mm off"
+    return f"It {where} (median): rms_mm does not see that, judge by tip_median_mm and back_rms_mm."
 
 
 def standing(statistics: Mapping[str, Any]) -> str:
-    """NO_BETTER or NOT_SHOWN; empty where the wire beats the strongest predictor, or nothing is known of that."""
+    """NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or no more is known."""
     _, skill, least = _skill(statistics)
-    return NO_BETTER if skill <= 0.0 else NOT_SHOWN if least <= 0.0 else ""
+    return NO_BETTER if skill <= 0.0 else TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
 
 
 def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, str]:
@@ -46,6 +77,12 @@ def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, s
     """
     poor = standing(statistics) if good else ""
     return {"text": poor or status, "look": "poor" if poor else "good" if good else "bad"}
+
+
+OF_CALIBRATION = (
+    "It is a calibration case and not scored: parameters are learnt from it, so its errors say nothing about the "
+    "simulator and stand in no score of the run."
+)
 
 
 def unscored(cases: Iterable[tuple[str, str]]) -> str:
@@ -62,14 +99,17 @@ def unscored(cases: Iterable[tuple[str, str]]) -> str:
     return ""
 
 
+def _number(value: Any) -> float:
+    """A field as a number, NaN where it is empty."""
+    return nan if number(value) == NOTHING else float(value)
+
+
 def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float]:
     """A rival in words, the skill against it and the lower end of its interval; NaN for what is not known."""
-    nan = float("nan")
     for column, name in (("skill_strongest", statistics.get("strongest_null")), ("skill", "centreline")):
-        skill, least = (statistics.get(key) for key in (column, f"{column}_low"))
-        if number(skill) != NOTHING and name:
-            rival = _rival(str(name)) if column != "skill" else "the lumen's centreline"
-            return rival, float(skill or 0.0), nan if number(least) == NOTHING else float(least or 0.0)
+        skill, least = (_number(statistics.get(key)) for key in (column, f"{column}_low"))
+        if not isnan(skill) and name:
+            return _rival(str(name)) if column != "skill" else "the lumen's centreline", skill, least
     return "", nan, nan
 
 
@@ -79,6 +119,7 @@ def _against(statistics: Mapping[str, Any]) -> str:
     if not rival:
         return ""
     said = {
+        TIPS_OFF: f"By rms_mm alone it would be better (skill {number(skill)})",
         NO_BETTER: f"That is no better (skill {number(skill)})",
         NOT_SHOWN: f"It is not shown to be better (the skill's interval reaches {number(least)})",
     }
@@ -106,6 +147,14 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
     ]
 
 
+def warned(out_dir: Path) -> list[str]:
+    """What was warned of in the cases of a run, a line each, no more than a few."""
+    found = ((case.name, read_json(case / "result.json").get("warnings", ())) for case in find_cases(out_dir))
+    lines = [f"warning: {name}: {text}" for name, texts in found for text in texts]
+    rest = len(lines) - _MANY
+    return [*lines[:_MANY], *[f"{rest} more warnings stand on the pages of the cases"] * (rest > 0)]
+
+
 def typed(folder: Path) -> Sequence[str]:
     """The command that wrote a run's or a case's folder; none where nothing tells."""
     words = read_json(folder / "provenance.json").get("argv", ())
@@ -113,7 +162,7 @@ def typed(folder: Path) -> Sequence[str]:
 
 
 def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
-    """The command that computes these cases again.
+    """The command that computes these cases again, also after what the message says was done to the manifest.
 
     typed : the command of this run, where it is known; MANIFEST and OUT stand where it is not. More than a few cases
     are not named: what is finished is kept anyway.
@@ -125,6 +174,6 @@ def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
     for word in words:
         if word == "--only":
             next(words, None)
-        elif word != "--fresh" and not word.startswith("--only="):
+        elif word not in ("--fresh", "--resume") and not word.startswith("--only="):
             kept.append(word)
-    return shlex.join([*kept, *only])
+    return shlex.join([*kept, *only, "--resume"])

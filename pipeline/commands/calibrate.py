@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.commands import add_settings, complain, resolved_settings, say
+from pipeline.commands import add_settings, resolved_settings, say
 from pipeline.commands.given import file_of
 
 if TYPE_CHECKING:
@@ -33,24 +33,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0; 1 where some case was left out; 2 on wrong input."""
+    """Exit 0; 1 where some case was left out; raises InputError where the input is wrong."""
     from pipeline.run.cache import Store, default_root
     from pipeline.run.calibration import chosen
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.manifest import read_manifest
 
-    try:
-        manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
-        cases, store = chosen(manifest.cases), Store(None if args.no_cache else default_root())
-        problems = [] if args.design else check(cases, settings.config)
-        if problems:
-            return complain(problems, str(args.manifest))
-        if args.out.is_file():
-            return complain([f"-o {args.out}: this is a file; name a folder"], "the command line")
-        return (_design if args.design else _fit)(args, cases, settings.config, store)
-    except InputError as error:
-        return complain(error.problems, error.place or str(args.manifest))
+    manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
+    cases, store = chosen(manifest.cases), Store(None if args.no_cache else default_root())
+    problems = [] if args.design else check(cases, settings.config)
+    if problems:
+        raise InputError(problems)
+    return (_design if args.design else _fit)(args, cases, settings.config, store)
 
 
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:

@@ -45,6 +45,7 @@ def add_what_is_seen(parser: argparse.ArgumentParser) -> None:
     folder = parser.add_argument_group("of a folder of scans").add_argument
     folder("--entry", metavar="X,Y,Z", help="LPS mm, where the wire enters the lumen")
     folder("--direction", metavar="X,Y,Z", help="where the wire points at the entry")
+    folder("--reference", type=Path, metavar="FILE", help="the scan without wire (default: a file named reference.*)")
     folder("--wire-radius", type=float, metavar="MM", help="outer radius of the wire")
 
 
@@ -77,16 +78,19 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
 
 def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:
     """What nobody has confirmed of these cases, a sentence each."""
-    return tuple(f"case {case.id!r}: {text}" for case in cases for text in case.assumed)
+    return tuple(f"case {case.id!r}: {text}" for case in cases for text in case.unconfirmed)
 
 
 def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:
     """A manifest for a folder of scans. beside : it will lie there, and names the scans from there."""
+    from pipeline.run.launch import UsageError
     from pipeline.study.infer import infer_manifest
 
     seen = _vector(args.entry, "--entry"), _vector(args.direction, "--direction"), args.wire_radius
+    if args.reference is not None and not args.reference.exists():
+        raise UsageError([f"--reference {args.reference}: no such scan"])
     load = resolved_settings(args).config.load
-    return infer_manifest(args.manifest, *seen, load, args.manifest if beside else None)
+    return infer_manifest(args.manifest, *seen, load, args.manifest if beside else None, args.reference)
 
 
 def _vector(text: str | None, name: str) -> Any:

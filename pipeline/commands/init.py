@@ -1,9 +1,10 @@
 """``wireval init FOLDER``: the manifest that run would infer, as a file to correct."""
 
 import argparse
+import shlex
 from pathlib import Path
 
-from pipeline.commands import add_settings, say
+from pipeline.commands import add_settings, resolved_settings, say, unwritable
 from pipeline.commands.given import NAME, add_what_is_seen, inferred
 
 HELP = "write the manifest that is inferred from a folder of scans, to be corrected"
@@ -19,14 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; raises InputError or StageError where there is nothing to go by, or a manifest is there already."""
+    from pipeline.load import read_headers
     from pipeline.run.launch import UsageError
-    from pipeline.status import InputError
+    from pipeline.status import InputError, StageError
+    from pipeline.study.check import entry_problems
     from pipeline.study.manifest import read_manifest
     from reports.atomic import write_text
 
     if not args.manifest.is_dir():
         raise InputError([f"{args.manifest}: no such folder; give one that holds scans"])
     path: Path = args.to or args.manifest / NAME
+    if problems := unwritable(path, "--to"):
+        raise UsageError(problems)
     if path.exists():
         raise UsageError([f"{path}: is there already; correct it, or write another with --to FILE"])
     text, seen, assumed = inferred(args, beside=args.to is None)
@@ -34,9 +39,16 @@ def main(args: argparse.Namespace) -> int:
         "# correct what is `assumed` below, and take each line out that you have confirmed: pages repeat what is left"
     )
     write_text(path, f"{head}\n\n{text}")
-    read_manifest(path)
+    try:
+        case = read_manifest(path).cases[0]
+        problems = entry_problems(case, read_headers(None, case.frames[:1], resolved_settings(args).config.load))
+        if problems:
+            raise InputError(problems)
+    except (InputError, StageError):
+        path.unlink()
+        raise
     say(f"written: {path}")
     for note in (*seen, *(f"assumed: {text}" for text in assumed)):
         say(note)
-    say(f"correct it, then: wireval check {path} && wireval run {path} -o OUT")
+    say(f"correct it, then: wireval check {shlex.quote(str(path))} && wireval run {shlex.quote(str(path))} -o OUT")
     return 0

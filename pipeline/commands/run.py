@@ -57,6 +57,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.inside import links_out
+    from reports.verdict import remarks, warned
 
     gates = [gate(text) for text in args.fail_if]
     plan = _plan(args)
@@ -74,6 +75,8 @@ def main(args: argparse.Namespace) -> int:
         write_tests(args.junit, found_results(plan.out), held)
     for line in [*failure_lines(plan), *closed]:
         sys.stderr.write(f"{line}\n")
+    for text in [*([] if args.quiet else warned(plan.out)), *(f"warning: {text}" for text in remarks(totals.pooled))]:
+        say(text)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1
 

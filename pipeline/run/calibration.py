@@ -82,7 +82,9 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
         stated.append(np.array([frame.expected_mm for frame in frames]))
     if not trials:
-        raise CalibrationError([*left_out, *notes])
+        for note in notes:
+            say(note)
+        raise CalibrationError(left_out)
     return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(left_out), tuple(notes))
 
 

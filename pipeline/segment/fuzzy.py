@@ -20,18 +20,30 @@ LEAST_CONTRAST = 2.0
 """Contrast over the noise of one voxel below which no vessel is looked for (Dice falls below 0.97 at 2.2)."""
 
 
+def _at(grid: Grid, seeds: Index) -> str:
+    """Where the seeds lie, and the grey there: a seed beside the vessel is what most often goes wrong."""
+    said = [
+        f"{place.round(1).tolist()} mm (LPS), grey {grid.values[tuple(seed)]:.0f}"
+        for place, seed in zip(grid.to_mm(seeds), seeds, strict=True)
+    ]
+    return f"; the seed is at {' and '.join(said[:3])}"
+
+
 def _start(grid: Grid, seeds: Index) -> tuple[GreyLevels, Index]:
     """Levels at the seed of greatest contrast over noise, and all the seeds moved to typical grey beside them."""
     found = [levels_at(grid, seed) for seed in seeds]
     levels = max((f[0] for f in found), key=lambda a: a.contrast / max(a.noise, 1e-9))
     if not levels.contrast > LEAST_CONTRAST * levels.noise:
         got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
+        got += _at(grid, seeds)
         allowed = "a lumen brighter than its surroundings by twice the noise"
         raise failed(got, allowed, "move the seed (lumen_seed_mm) well into the vessel")
     return levels, np.array([f[1] for f in found], np.int64)
 
 
-def _connected(grid: Grid, seeds: Index, affinity: Affinity, config: SegmentConfig) -> tuple[Index, float]:
+def _connected(
+    grid: Grid, seeds: Index, levels: GreyLevels, affinity: Affinity, config: SegmentConfig
+) -> tuple[Index, float]:
     """Flat indices of the vessel's voxels and the number of voxels read; too few of them are no vessel."""
     offsets = neighbours(config.adjacency)
     if len(config.other_seeds_mm):
@@ -41,7 +53,7 @@ def _connected(grid: Grid, seeds: Index, affinity: Affinity, config: SegmentConf
         order, read = connect(grid, seeds, affinity, config.threshold, offsets)
     if len(order) < config.least_voxels:
         allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
-        got = f"connected voxels: got {len(order)}"
+        got = f"connected voxels: got {len(order)}{_at(grid, seeds)} (its wall would be at {levels.half:.0f})"
         raise failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
     return order, read
 
@@ -53,7 +65,7 @@ def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Regi
     """
     levels, seeds = _start(grid, seed_voxels(grid, seeds_mm))
     affinity = estimate_affinity(levels, config)
-    order, read = _connected(grid, seeds, affinity, config)
+    order, read = _connected(grid, seeds, levels, affinity, config)
     low, more = low_region(grid, seeds, levels, affinity)
     total = float(np.prod(grid.shape))
     counters = {

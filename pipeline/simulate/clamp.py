@@ -212,7 +212,8 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
     if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
             f"the traced wires start {offset} (accepted: {FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the "
-            "manifest's entry was kept: check entry_mm and entry_direction"
+            "manifest's entry was kept: check entry_mm and entry_direction; the traces say "
+            f"entry_mm = {found.entry_mm.round(2).tolist()}, entry_direction = {found.direction.round(4).tolist()}"
         )
         return replace(given, warning=warning)
     if not used:

@@ -71,7 +71,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         for header in scans.frames:
             found(lambda header=header: require_same_geometry(scans.all[0], header))  # type: ignore[misc]
         count = len(scans.frames) or case.frame_count
-        problems += _entry_problems(case, scans)
+        problems += entry_problems(case, scans)
         problems += not_one_per_frame(case.lists, count)
         problems += _told_problems(case, count)
     for source in case.traces:
@@ -152,13 +152,16 @@ def inputs_of(case: Case) -> list[Path]:
     return list(dict.fromkeys(path for path in paths if isinstance(path, Path)))
 
 
-def _entry_problems(case: Case, scans: Scans) -> list[str]:
+def entry_problems(case: Case, scans: Scans) -> list[str]:
     """Points that lie outside the scan: usually RAS for LPS, or metres for millimetres."""
     header = scans.first
     if header is None:
         return []
     problems = []
-    for name, points in (("entry_mm", [case.entry_mm]), ("lumen_seed_mm", case.lumen_seed_mm)):
+    seeds = [point for point in case.lumen_seed_mm if point != case.entry_mm]
+    for name, points in (("entry_mm", [case.entry_mm]), ("lumen_seed_mm", seeds)):
+        if not points:
+            continue
         index = header.grid.to_index(points)
         for point, voxel in zip(points, index, strict=True):
             if np.any(voxel < -0.5) or np.any(voxel > np.array(header.shape) - 0.5):

@@ -13,7 +13,7 @@ from pipeline.load.geometry import unusable
 from pipeline.load.guard import is_folder
 from pipeline.load.order import natural_key
 from pipeline.load.slices import is_dicom, is_multiframe
-from pipeline.model import Array, Volume
+from pipeline.model import Array, Volume, Wall
 
 REFERENCE_NAMES = ("reference", "ref", "wire_free", "nowire", "empty")
 DEFAULT_RADIUS_MM = 0.18
@@ -38,6 +38,9 @@ entry_mm = {entry}
 entry_direction = {direction}
 material_axis = {axis}
 wire = "assumed"
+[case.wall]
+stiffness_N_mm2 = {wall.stiffness_N_mm2}
+friction = {wall.friction}
 """
 
 
@@ -52,18 +55,21 @@ def _is_dicom(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0 and path.name != "DICOMDIR" and is_dicom(path)
 
 
-def _scans_in(folder: Path) -> tuple[Path | None, list[Path]]:
+def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path]]:
+    """The reference, stated or by its name, and the frames."""
     below = [p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p)]
     if not below and _is_scan(folder):
         return None, [folder]
     below.sort(key=lambda p: natural_key(p.relative_to(folder).as_posix()))
-    reference = next((p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES), None)
-    return reference, [p for p in below if p != reference]
+    named = (p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES)
+    reference = stated or next(named, None)
+    return reference, [p for p in below if reference is None or not p.samefile(reference)]
 
 
 def _named(path: Path, base: Path | None) -> str:
     """A path as TOML writes it: a JSON text, whatever quotes and backslashes are in it."""
-    return json.dumps((path.relative_to(base) if base else path.resolve()).as_posix(), ensure_ascii=False)
+    near = base is not None and path.is_relative_to(base)
+    return json.dumps((path.relative_to(base) if base and near else path.resolve()).as_posix(), ensure_ascii=False)
 
 
 def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
@@ -99,6 +105,19 @@ def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
     return entry, np.asarray(axis * np.sign((near.mean(axis=0) - entry) @ axis))
 
 
+def _stated_or_seen(
+    entry: Array | None, direction: Array | None, frame: Path, reference: Path | None, config: LoadConfig
+) -> tuple[Array, Array, str]:
+    """Entry and direction, each as the first frame shows it where it is not stated; a sentence on what is not."""
+    if entry is not None and direction is not None:
+        return entry, direction, ""
+    empty = load(read_header(reference, config), config=config) if reference else None
+    at, towards = infer_entry(load(read_header(frame, config), config=config), empty)
+    guessed = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
+    where = f"{guessed}: {AT_EDGE}{'' if reference else UNSUBTRACTED}"
+    return at if entry is None else entry, towards if direction is None else direction, where
+
+
 def infer_manifest(
     folder: Path,
     entry: Array | None,
@@ -106,12 +125,14 @@ def infer_manifest(
     radius_mm: float | None,
     config: LoadConfig,
     base: Path | None = None,
+    reference: Path | None = None,
 ) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """The text of a manifest for one case from a folder of scans; in sentences what was seen, and what is assumed.
 
-    base : folder from which scans are named; None names them in full. Raises LoadError where there is nothing to go by.
+    base : folder from which scans are named; None names them in full.     reference : None looks for one.
+    Raises LoadError where there is nothing to go by.
     """
-    reference, frames = _scans_in(folder)
+    reference, frames = _scans_in(folder, reference)
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         raise unusable(folder, f"found no scans; allowed: {allowed}")
@@ -119,12 +140,7 @@ def infer_manifest(
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
     )
-    where = ""
-    if entry is None or direction is None:
-        empty = load(read_header(reference, config), config=config) if reference else None
-        at, towards = infer_entry(load(read_header(frames[0], config), config=config), empty)
-        entry, direction = at if entry is None else entry, towards if direction is None else direction
-        where = AT_EDGE if reference else AT_EDGE + UNSUBTRACTED
+    entry, direction, where = _stated_or_seen(entry, direction, frames[0], reference, config)
     notes = _assumed(radius_mm, where)
     text = MANIFEST.format(
         radius=radius_mm or DEFAULT_RADIUS_MM,
@@ -135,17 +151,19 @@ def infer_manifest(
         entry=[round(float(x), 3) for x in entry],
         direction=[round(float(x), 5) for x in direction],
         axis=np.eye(3)[np.argmin(np.abs(direction))].tolist(),
+        wall=Wall(),
     )
     return text, seen, tuple(notes)
 
 
 def _assumed(radius_mm: float | None, where: str) -> list[str]:
-    """What nobody has said of a case. radius_mm : where it was said.     where : the entry was found, empty: said."""
+    """What nobody has said of a case. radius_mm : where it was said.     where : how the entry was found, if it was."""
     stiffness = "stiffness and tip curve of a common 0.014 inch wire"
     return [
         f"wire: {stiffness}" if radius_mm else f"wire: radius {DEFAULT_RADIUS_MM} mm, {stiffness}",
-        *[f"entry_mm and entry_direction: {where}"] * bool(where),
+        *[where] * bool(where),
         "material_axis: the world axis least along entry_direction, as nothing tells of it",
+        f"wall: {Wall().stiffness_N_mm2} N/mm2, friction {Wall().friction:g}",
         'roll_deg: 0, that is, a curved tip bends towards material_axis; roll_deg = "fit" where it is unknown',
         "insertion_mm: not given, so the traced lengths are not checked against anything",
     ]

@@ -91,6 +91,11 @@ class Case(Strict):
         return bool(self.frames or self.traces or self.projections)
 
     @property
+    def unconfirmed(self) -> tuple[str, ...]:
+        """What is assumed, less what another key has made void."""
+        return tuple(text for text in self.assumed if self.roll_deg != "fit" or not text.startswith("roll_deg:"))
+
+    @property
     def stated_roll_deg(self) -> float | tuple[float, ...]:
         """The roll, one for all frames or one per frame; 0 where it is to be fitted."""
         return 0.0 if self.roll_deg == "fit" else self.roll_deg

@@ -31,6 +31,8 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     """
     if any(mark in place.name for mark in "*?["):
         return _sorted(place.parent.glob(place.name)) if alone else _refuse(case, place, "a pattern serves one case")
+    if not place.exists():
+        return _refuse(case, place, "no such file or folder")
     if place.is_file():
         return [str(place)] if alone else _refuse(case, place, "one file serves one case")
     named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]

@@ -12,7 +12,9 @@ sentences of the terminal.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from pipeline.cli import BAD_INPUT, carried_out, parsed
@@ -85,12 +87,19 @@ def run(
     return read_results(out)
 
 
-def score(manifest: Place, out: Place, curves: Sequence[str], **more: bool | int | str | Settings) -> Results:
-    """Judge other simulators' wires: ``curves`` as ``["mine=DIR", ...]``; the results of the first one.
+def score(
+    manifest: Place,
+    out: Place,
+    curves: Place | Sequence[Place] | Mapping[str, Place],
+    **more: bool | int | str | Settings,
+) -> Results:
+    """Judge other simulators' wires; the results of the first one.
 
-    Those of the others: ``read_results(out / "simulators" / NAME)``.     more : options of ``wireval score``.
+    curves : ``"mine=DIR"``, several of these, or ``{"mine": DIR, ...}``.     more : options of ``wireval score``.
+    Those of the others: ``read_results(out / "simulators" / NAME)``.
     """
-    _carried_out("score", manifest, out=out, curves=list(curves), **more)
+    named = [f"{name}={place}" for name, place in curves.items()] if isinstance(curves, Mapping) else curves
+    _carried_out("score", manifest, out=out, curves=[named] if isinstance(named, (str, Path)) else list(named), **more)
     return read_results(out)
 
 
@@ -109,5 +118,17 @@ def _carried_out(verb: str, manifest: Place, settings: object = None, **options:
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one is not False:
                 words += [f"--{name.replace('_', '-')}"] + [str(one)] * (one is not True)
-    if carried_out(parsed(words)) == BAD_INPUT:
+    with _typed(words):
+        code = carried_out(parsed(words))
+    if code == BAD_INPUT:
         raise InputError([f"wireval {verb}: nothing was run; the problems stand above"])
+
+
+@contextmanager
+def _typed(words: Sequence[str]) -> Iterator[None]:
+    """Provenance of the output, also of worker processes, and the next command in it name what was called."""
+    before, sys.argv = sys.argv, ["wireval", *words]
+    try:
+        yield
+    finally:
+        sys.argv = before

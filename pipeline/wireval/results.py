@@ -10,8 +10,10 @@ from reports import tables
 from reports.case_files import CaseFiles, find_cases, read_case
 from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
+_SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Results:
     """The tables of a run; the columns are those of the files, docs/reference/columns.md explains them.
 
@@ -38,24 +40,23 @@ class Results:
         """Every compared point of all cases; read when asked for, since it is by far the largest table."""
         return _of_all({name: tables.read_if_there(c.folder / POINTS.file, POINTS) for name, c in self.cases.items()})
 
+    def __repr__(self) -> str:
+        """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""
+        rows = self.summary[_SHOWN].head(10).to_string(index=False) if len(self.summary) else "no summary.csv"
+        more = f"\n... and {len(self.summary) - 10} more cases" if len(self.summary) > 10 else ""
+        counts = f"{len(self.cases)} cases, {len(self.errors)} frames, {len(self.failures)} failures"
+        return f"Results of {self.out}: {counts}\n{rows}{more}"
+
     def _repr_html_(self) -> str:
         """What a notebook shows: a row a case."""
-        shown = [
-            "case",
-            "status",
-            "frames",
-            "frames_ok",
-            "rms_mm",
-            "tip_median_mm",
-            "skill_strongest",
-            "strongest_null",
-        ]
-        return str(self.summary[shown].to_html(index=False))
+        return str(self.summary[_SHOWN].to_html(index=False))
 
 
 def read_results(out: str | Path) -> Results:
     """Read the folder that ``wireval run`` wrote; raises InputError where it is none."""
     out = Path(out)
+    if not out.is_dir():
+        raise InputError([f"{out}: no such folder; give one that `wireval run` wrote"])
     cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])

@@ -52,9 +52,11 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     step = _step(kept)
     grid = np.full((len(frames), int(kept["arc_mm"].max() / step) + 2), np.nan)
     for frame, samples in kept.groupby("frame"):
-        at = np.arange(int(samples["arc_mm"].max() / step + 0.5) + 1) * step
+        # the clamp's reach in front is not scored: it stays blank
+        first, last = (round(float(samples["arc_mm"].agg(end)) / step) for end in ("min", "max"))
+        at = np.arange(first, last + 1) * step
         nearest = interp1d(samples["arc_mm"], samples[column], kind="nearest", fill_value="extrapolate")
-        grid[int(str(frame)) - frames[0], : len(at)] = nearest(at)
+        grid[int(str(frame)) - frames[0], first : last + 1] = nearest(at)
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5

@@ -24,8 +24,9 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure = new_figure(4.2)
     axes, rivals = figure.subplots(), list(predictors())
-    for column, label, colour, style, _ in rivals:
-        _line(axes, good, column, f"predictor: {label}", color=colour, linestyle=style, linewidth=1.2)
+    for column, label, colour, style, marker in rivals:
+        dots = {"marker": marker if len(good) == 1 else "", "linestyle": style, "linewidth": 1.2}
+        _line(axes, good, column, f"predictor: {label}", color=colour, **dots)
     shown = [*_lines(axes, good, "error_by_depth"), *(column for column, *_ in rivals)]
     positive_axis(axes, [good[column] for column in shown])
     if has(good, "trace_sigma_mm"):
@@ -119,7 +120,7 @@ def _two_panels(good: pd.DataFrame, height_inch: float, *places: str) -> tuple[F
 def _lines(axes: Axes, good: pd.DataFrame, place: str) -> list[str]:
     """Draw what the schema shows at a place; returns its columns in the order of the file."""
     for column, label, style in lines(place):
-        _line(axes, good, column, label, **style)
+        _line(axes, good, column, label, **({"marker": "_"} if len(good) == 1 else {}) | style)
     return [column.name for column in ERRORS.shown(place)]
 
 

@@ -37,9 +37,11 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     panels = figure.subplots(2, 2, sharex="col", sharey="row", height_ratios=(14, 1))
     shown = colours(where["simulator"])
     for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
-        for name, mine in rows.groupby("simulator", sort=False):
+        for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
             middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
-            axes.plot(middle, mine["rms_mm"], "o-", color=shown[str(name)], label=str(name), markersize=4)
+            # dashes show the line below where two lie on each other
+            style = ("o-", "o--")[number % 2]
+            axes.plot(middle, mine["rms_mm"], style, color=shown[str(name)], label=str(name), markersize=4)
         plain(axes)
         _nearest(strip, rows, shown)
         strip.set_xlabel(f"{along}, mm")

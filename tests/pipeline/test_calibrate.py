@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
+from pipeline.run.calibration import gathered
 from pipeline.run.calibration_files import misfit
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
@@ -29,7 +31,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.simulate.clamp import Prior, moved
 from pipeline.simulate.config import SolverConfig
-from pipeline.status import FrameStatus, StageError
+from pipeline.status import FrameStatus, InputError, StageError
 from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
@@ -337,3 +339,18 @@ def test_other_simulators_are_scored_with_parameters_too(study, capsys):
     words = ["score", str(study), "--curves", str(study), "--space", "LPS", "-o", str(study / "scored"), "--parameters"]
     assert main([*words, str(study / "none.toml")]) == 2
     assert "none.toml: no such file" in capsys.readouterr().err
+
+
+def test_what_was_assumed_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Information used to be counted among the problems where every case was left out."""
+
+    def no_wire(run: Context, until: str) -> SimpleNamespace:
+        run.log.assumptions.append("the phantom did not move")
+        return SimpleNamespace(frames=(), failure="no wire")
+
+    monkeypatch.setattr("pipeline.run.calibration.run_stages", no_wire)
+    heard: list[str] = []
+    with pytest.raises(InputError) as error:
+        gathered([SimpleNamespace(id="a")], Config(), Store(None), heard.append)  # type: ignore[list-item]
+    assert len(error.value.problems) == 1
+    assert heard == ["a: the phantom did not move"]

@@ -12,6 +12,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run.gate import Gate, gate
@@ -56,6 +57,10 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
+        ("init STUDY --to /proc/none/m.toml", "cannot be written"),
+        ("init STUDY --to y --entry 900,0,0 --direction 0,0,1", "lies outside the scan"),
+        ("init STUDY --to y --wire-radius -1", "radius_mm"),
+        ("init STUDY --to y --reference STUDY/none.mha", "no such scan"),
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
     ],
 )
@@ -100,8 +105,9 @@ def test_init_leaves_what_run_infers_and_names_scans_from_there(
         "material_axis",
         "entry_mm and entry_direction",
     }
+    assert any(note.startswith("wall: 2.0 N/mm2, friction 0") for note in case["assumed"])
     assert case["frames"] == ["frames/frame_000.mha", "frames/frame_001.mha"]
-    capsys.readouterr()
+    assert f"wireval check '{scans}/manifest.toml' && " in capsys.readouterr().out, "to be pasted as it stands"
     assert main(["check", str(scans.rename(tmp_path / "moved"))]) == 0, "the folder may be moved"
     assert "assumed, not confirmed" in capsys.readouterr().out
 
@@ -121,6 +127,33 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     told = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
     assert (told["entry_mm"], told["entry_direction"]) == ([1, 2, 3], [0, 0, 1])
     assert not [text for text in told["assumed"] if text.startswith("entry")]
+
+
+def test_a_wire_thinner_than_half_a_voxel_is_warned_of_and_a_fitted_roll_not_assumed(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manifest = scans / "manifest.toml"
+    voxel = sitk.ReadImage(str(next(scans.glob("reference.*")))).GetSpacing()[0]
+    for radius, warned in ((str(0.24 * voxel), True), (str(0.26 * voxel), False)):
+        manifest.unlink(missing_ok=True)
+        assert main(["init", str(scans), "--wire-radius", radius]) == 0
+        text = manifest.read_text(encoding="utf-8").replace('wire = "assumed"', 'wire = "assumed"\nroll_deg = "fit"')
+        manifest.write_text(text, encoding="utf-8")
+        main(["run", str(scans), "-o", str(tmp_path / radius), "--until", "load"])
+        told = json.loads(next((tmp_path / radius).glob("cases/*/result.json")).read_text(encoding="utf-8"))
+        assert any("less than half a voxel" in line for line in told["warnings"]) == warned
+        assert ("less than half a voxel" in capsys.readouterr().out) == warned
+        assert not [line for line in told["assumptions"] if line.startswith("roll_deg: 0")]
+
+
+def test_init_takes_what_is_said_of_the_scans(scans: Path, tmp_path: Path) -> None:
+    next(scans.glob("reference.*")).rename(scans / "empty_phantom.mha")
+    words = ["--reference", str(scans / "empty_phantom.mha"), "--to", str(tmp_path / "m.toml"), "--entry", "1,2,3"]
+    assert main(["init", str(scans), *words]) == 0
+    case = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
+    assert case["reference"] == str(scans / "empty_phantom.mha")
+    assert len(case["frames"]) == 2
+    assert [text.partition(":")[0] for text in case["assumed"] if text.startswith("entry")] == ["entry_direction"]
 
 
 def test_settings_are_a_file_that_reads_back_as_the_defaults(

@@ -490,8 +490,8 @@ def test_an_unexpected_error_costs_one_case(
     monkeypatch.setattr("sys.argv", ["/bin/wireval", "run", "study", "-o", "out"])
     assert run(both, tmp_path / "out") == 1
     said = capsys.readouterr().err.splitlines()
-    assert said[-1] == "next: do what the message says, then wireval run study -o out --only second"
-    assert "wireval run study -o out --only second" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert said[-1] == "next: do what the message says, then wireval run study -o out --only second --resume"
+    assert said[-1].partition("then ")[2] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert "burst pipe" in failures["message"][0]
     assert "RuntimeError" in (tmp_path / "out" / "cases" / "second" / "log.txt").read_text(encoding="utf-8")

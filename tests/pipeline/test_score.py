@@ -277,7 +277,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     full = tmp_path / "full"
     write_csv(full, known[1])
     for curves, out, said in (
-        (tmp_path / "nowhere", "o", "found neither bend/ nor bend.h5"),
+        (tmp_path / "nowhere", "o", "no such file or folder"),
         (mixed, "o", ".csv and .vtp files"),
         (f"wireval={full}", "o", "the name 'wireval'"),
         (full, "full", "holds no score"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 
 import numpy as np
@@ -101,3 +102,7 @@ def test_a_seed_in_the_background_or_outside_is_refused_by_name():
         with pytest.raises(StageError, match="expected") as error:
             segment(volume, seed[None])
         assert error.value.status is FrameStatus.SEGMENT_FAILED
+        if np.all(seed > origin):
+            place = re.search(r"the seed is at \[(.*?)\] mm \(LPS\), grey \d", str(error.value))
+            assert place is not None
+            assert np.linalg.norm(np.array(place[1].split(","), float) - seed) < 3 * VOXEL

@@ -83,6 +83,15 @@ def test_every_pair_on_the_frames_that_count_in_both(compared: Path) -> None:
     assert alone.loc["worse", "within_1mm"] == pytest.approx(21 / 24)
 
 
+def test_who_failed_frames_stands_below_who_did_not(tmp_path: Path) -> None:
+    """Of two simulators the one that fails where it is hard has the smaller rms_mm."""
+    easy = write_tree(tmp_path / "easy", even(0.1), failed=((0, 3), (1, 3)))
+    write_comparison(tmp_path, {"easy": easy, "wireval": write_tree(tmp_path / "wireval", even(0.2))})
+    text = render_simulators(tmp_path).read_text(encoding="utf-8")
+    table = text[text.index('id="simulators"') :]
+    assert table.index(">wireval<") < table.index(">easy<")
+
+
 def test_who_is_nearest_where(compared: Path) -> None:
     where = pd.read_csv(compared / "where.csv")
     lead = where[where["lead"].notna() & (where["along"] == "distance from the tip")].set_index("low_mm")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,8 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     kept = {"settings": {"solver.segment_mm": 2.0, "compare.simulated_nulls": False}, "quiet": True, "until": "compare"}
     results = wireval.run(study, tmp_path / "out", sweep=wall, **kept)
     assert results.ok
+    typed = json.loads((tmp_path / "out" / "provenance.json").read_text(encoding="utf-8"))["argv"]
+    assert typed[:3] == ["wireval", "run", str(study)], "the next command names what was called"
     assert list(results.errors["case"]) == ["straight"] * 2
     assert list(results.sweep["parameter"]) == [PLAIN, "simulate.wall_scale"]
     assert results.cases["straight"].result["config"]["solver"]["segment_mm"]["value"] == 2.0
@@ -45,6 +48,9 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert rms == pytest.approx(results.errors["rms_mm"].iloc[1], rel=1e-6)
     assert results.cases["straight"].read_frame(1).simulated_mm is not None
     assert "straight" in results._repr_html_()
+    assert "1 cases, 2 frames, 0 failures" in repr(results)
+    assert len(repr(results).splitlines()) < 13
+    assert len(repr(results)) < 1000
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
 
 
@@ -56,9 +62,15 @@ def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp
     setting = ["--set", 'solver.segment_mm="auto"']
     assert typed == ["calibrate", "m.toml", *setting, "--out", str(tmp_path), "--design"]
     typed.clear()
-    with pytest.raises(wireval.InputError, match="no cases"):
-        wireval.score("m.toml", tmp_path, ["a=x", "b=y"], jobs=2)
+    for curves in (["a=x", "b=y"], {"a": "x", "b": Path("y")}):
+        typed.clear()
+        with pytest.raises(wireval.InputError, match="no cases"):
+            wireval.score("m.toml", tmp_path, curves, jobs=2)
     assert typed == ["score", "m.toml", "--out", str(tmp_path), "--curves", "a=x", "--curves", "b=y", "--jobs", "2"]
+    typed.clear()
+    with pytest.raises(wireval.InputError, match="no cases"):
+        wireval.score("m.toml", tmp_path, "mine=curves", quiet=True)
+    assert typed[-3:] == ["--curves", "mine=curves", "--quiet"]
     monkeypatch.setattr(wireval, "carried_out", lambda args: 2)
     with pytest.raises(wireval.InputError, match="nothing was run"):
         wireval.calibrate("m.toml", tmp_path)
@@ -71,5 +83,11 @@ def test_what_cannot_be_used_is_raised(study: Path, tmp_path: Path) -> None:
         wireval.run(study, tmp_path / "out", fesh=True)
     with pytest.raises(wireval.InputError, match="wireval run"):
         wireval.read_results(tmp_path)
+    with pytest.raises(wireval.InputError, match="nowhere: no such folder"):
+        wireval.read_results(tmp_path / "nowhere")
+    with pytest.raises(wireval.InputError, match="nowhere: no such file or folder"):
+        wireval.score(study, tmp_path / "scored", f"mine={tmp_path / 'nowhere'}", quiet=True)
+    with pytest.raises(wireval.InputError, match="no case has role"):
+        wireval.calibrate(study, tmp_path / "calibrated")
     with pytest.raises(wireval.InputError, match="cannot be written"):
         wireval.run(study, study / "manifest.toml" / "out")

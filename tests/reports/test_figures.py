@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,23 @@ def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     grid = np.ma.filled(np.ma.masked_invalid(mesh.get_array()), -1.0)
     assert grid.shape[0] == 3
     assert np.all(grid[1] == -1.0)
+
+
+def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
+    case = read_case(write_run(tmp_path, [FakeCase("one", frames=1)]) / "cases" / "one")
+    drawing = CASE_FIGURES["error_by_depth"](case)
+    assert drawing is not None
+    lines = drawing.figure.axes[0].get_lines()
+    assert len(lines) > 3
+    assert all(line.get_marker() not in ("", "None", None) for line in lines)
+
+
+def test_the_clamps_reach_is_blank_as_it_is_not_scored(tmp_path: Path) -> None:
+    case = _heat_case(tmp_path)
+    case = replace(case, points=case.points[case.points["arc_mm"] >= 2.0])
+    drawing = CASE_FIGURES["error_along_wire"](case)
+    assert drawing is not None
+    assert drawing.table["arc_mm"].min() == pytest.approx(2.0, abs=0.25)
 
 
 @pytest.mark.parametrize("direction", [np.eye(3), TURN], ids=["aligned", "oblique"])

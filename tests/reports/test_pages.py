@@ -294,3 +294,12 @@ def test_cases_come_worst_first_and_a_tall_map_leaves_the_first_screen(tmp_path:
     tables.write(many / "summary.csv", SUMMARY, rows)
     ids = re.findall(r'<h2 id="(\w+)"', render_index(many).read_text(encoding="utf-8"))
     assert ids.index("planned_within") < ids.index("cases") < ids.index("case_frame_map")
+
+
+def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
+    """Its parameters were learnt from it."""
+    write_run(tmp_path, [FakeCase("learnt", frames=3, role="calibration"), FakeCase("judged", frames=3)])
+    text = {n: render_case(tmp_path / "cases" / n).read_text(encoding="utf-8") for n in ("learnt", "judged")}
+    assert "It is a calibration case and not scored" in text["learnt"]
+    assert "That is better" not in text["learnt"]
+    assert "That is better" in text["judged"]

@@ -44,6 +44,27 @@ def test_no_green_badge_beside_a_negative_skill(skill: float | None, low: float 
     assert badge("no_wire", False, row) == {"text": "no_wire", "look": "bad"}
 
 
+@pytest.mark.parametrize(
+    ("along", "said"), [(-1.9, "ends 1.90 mm short"), (1.9, "ends 1.90 mm beyond"), (None, "has its tip 1.90 mm off")]
+)
+def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, said: str) -> None:
+    """Errors go from the simulated wire to the traced one: what it leaves out is in none of them."""
+    row = {"rms_mm": 0.1, "tip_median_mm": 1.9, "tip_along_median_mm": along}
+    row |= {"skill_strongest": 0.9, "skill_strongest_low": 0.8, "strongest_null": "previous"}
+    assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
+    assert f"It {said} (median)" in verdict(row)
+    assert "judge by tip_median_mm and back_rms_mm" in verdict(row)
+    assert "That is better" not in verdict(row)
+    assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
+    assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
+
+
+def test_a_wrong_roll_is_guessed_at() -> None:
+    row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
+    assert 'worse than with an unknown roll (0.820 mm): try roll_deg = "fit"' in verdict(row)
+    assert "try roll_deg" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
+
+
 def test_a_run_without_a_score_says_why() -> None:
     assert unscored([("calibration", "ok"), ("calibration", "no_wire")]).startswith("Nothing is scored: every case")
     assert "to be compared with" in unscored([("validation", "simulated"), ("calibration", "ok")])
@@ -65,8 +86,8 @@ def test_worst_frames_leave_out_what_failed() -> None:
 
 def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo() -> None:
     typed = ["wireval", "run", "m.toml", "-o", "out", "--only", "x", "--fresh", "-j", "2"]
-    assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c"
-    assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c"
+    assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c --resume"
+    assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c --resume"
     assert next_command("abcde").count("--only") == 5
     assert "--only" not in next_command("abcdef")
 
@@ -74,7 +95,7 @@ def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo()
 def test_the_command_of_a_folder_is_read_from_its_provenance(tmp_path: Path) -> None:
     assert typed(tmp_path) == ()
     (tmp_path / "provenance.json").write_text('{"argv": ["wireval", "run", "m.toml", "-o", "out"]}', encoding="utf-8")
-    assert next_command(["c"], typed(tmp_path)) == "wireval run m.toml -o out --only c"
+    assert next_command(["c"], typed(tmp_path)) == "wireval run m.toml -o out --only c --resume"
 
 
 def test_frames_as_bad_as_each_other_stand_by_case() -> None:
