@@ -79,6 +79,14 @@ def read_json(path: Path) -> dict[str, Any]:
     return content
 
 
+def warnings_of(folder: Path) -> list[str]:
+    """What a case was warned of; nothing of one whose result cannot be read, which is said elsewhere."""
+    try:
+        return list(read_json(folder / "result.json").get("warnings", ()))
+    except ValueError:
+        return []
+
+
 def find_cases(out_dir: Path) -> list[Path]:
     """Folders of the cases of a run, by name; those that no run into the folder names belong to another study."""
     return _folders(out_dir, named=True)

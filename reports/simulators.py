@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import find_cases, read_json
+from reports.case_files import find_cases, warnings_of
 from reports.figures.simulators import OURS, SimulatorFiles
 from reports.html import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
@@ -64,7 +64,7 @@ def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
 
 def _warnings(folder: Path) -> dict[str, list[str]]:
     """Of each case below an output folder."""
-    return {case.name: read_json(case / "result.json").get("warnings", []) for case in find_cases(folder)}
+    return {case.name: warnings_of(case) for case in find_cases(folder)}
 
 
 def _one_table(rows: pd.DataFrame) -> tuple[pd.DataFrame, list[Column]]:

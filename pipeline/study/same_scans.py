@@ -34,4 +34,8 @@ def shared(cases: Sequence[Case]) -> list[str]:
 
 
 def _place(source: Source) -> tuple[str, str]:
-    return str(source.path.resolve()), str(source.dataset)
+    try:
+        path = source.path.resolve()
+    except (OSError, RuntimeError, ValueError):  # a loop of links: that the file cannot be read is said elsewhere
+        path = source.path
+    return str(path), str(source.dataset)

@@ -152,10 +152,10 @@ def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
     whole = tmp_path / "study"
     whole.mkdir()
     made = write(whole)
-    assert _scans_in(whole) == (None, [made])
+    assert _scans_in(whole, None) == (None, [made])
     below = tmp_path / "below"
     for k in (10, 2):
         (below / "frames" / f"f{k}").mkdir(parents=True)
         write(below / "frames" / f"f{k}")
     (below / "frames" / "notes").mkdir()
-    assert [path.name for path in _scans_in(below)[1]] == ["f2", "f10"]
+    assert [path.name for path in _scans_in(below, None)[1]] == ["f2", "f10"]
