@@ -50,24 +50,17 @@ def _traces(out: Path, case: Found) -> Traces:
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces]) -> Found:
     """The case; each frame's guess is the mean over other insertions of what theirs at the nearest depth leaves."""
     mine = {frame.insertion for frame in case.frames.values()}
-    same_phantom = [
-        c for c in shared if c.result.phantom == case.result.phantom and c.result.group != case.result.group
-    ]
-    kin = [c for c in same_phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
+    phantom = [c for c in shared if c.result.phantom == case.result.phantom]
+    kin = [c for c in phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
     others, frames = [list(traces[c.result.case].values()) for c in kin], dict(case.frames)
     for number, (depth, curve, start) in traces[case.result.case].items():
-        near = [at_arc(wire, arcs(depth, start)) for wire in _nearest(others, depth, curve)]
+        arc = samples(depth, STEP_MM)
+        near = [at_arc(wire, arc[arc >= start - 1e-9]) for wire in _nearest(others, depth, curve)]
         if near:
             mean = np.mean([np.mean(point_to_curve(wire, curve)[0] ** 2) for wire in near])
             row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(mean))}
             frames[number] = frames[number]._replace(row=row)
     return replace(case, frames=frames)
-
-
-def arcs(depth_mm: float, start_mm: float) -> Array:
-    """Where a guess is looked at: arc lengths, mm, from ``start_mm`` on."""
-    arc = samples(depth_mm, STEP_MM)
-    return arc[arc >= start_mm - 1e-9]
 
 
 def _nearest(others: Sequence[Sequence[Trace]], depth_mm: float, curve: Array) -> list[Array]:
