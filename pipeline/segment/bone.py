@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipeline.segment.contact import Contact, named
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
 from solver.grid import Grid
 
@@ -18,8 +19,6 @@ SIGMAS = 3.0
 """Standard deviations of a voxel's noise by which the mean of 3^3 must be above BRIGHTER of the contrast."""
 THICK = 2
 """Layers that are taken off: what is left of bone and plaque is nothing of a wire, which is three voxels across."""
-MOST_NAMED = 4
-"""Places that the warning names; the largest."""
 
 
 def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
@@ -39,14 +38,11 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     if not places:
         return ()
     face = float(np.prod(distance.spacing_mm) ** (2 / 3))
-    named = ", ".join(
-        f"{[float(round(x, 1)) for x in distance.to_mm(place)]} ({count * face:.1f} mm^2)"
-        for count, place in sorted(places, key=lambda p: -p[0])[:MOST_NAMED]
-    )
+    found = [Contact(distance.to_mm(place), count * face) for count, place in places]
     return (
         f"segment: something more than {BRIGHTER:g} times as bright as the vessel (bone, calcification, metal) touches "
-        f"its wall in {len(places)} place(s); largest at {named} mm; there the wall may lie too far out: look at the "
-        "picture, subtract the bone, or give the lumen as a file (manifest key lumen)",
+        f"its wall in {len(places)} place(s); largest at {named(found)} mm; there the wall may lie too far out: look at"
+        " the picture, subtract the bone, or give the lumen as a file (manifest key lumen)",
     )
 
 

@@ -5,6 +5,7 @@ flank to flank the opening between them is shallow, so their cores stay apart; a
 one of them ends there. Merged is what meets without being near along the cores, and goes on both ways on both sides.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,26 +40,30 @@ LEAST_DEPTH = 0.75
 
 @dataclass(frozen=True)
 class Contact:
-    """One place where two vessels have merged: where (LPS mm), and the area of the opening between them, mm^2."""
+    """A place where the vessel meets what it should not: where (LPS mm), and the area of the opening, mm^2."""
 
     place_mm: Array
     area_mm2: float
 
 
 MOST_NAMED = 4
-"""Places that a warning names; the largest openings."""
+"""Places that a warning names; the largest."""
+
+
+def named(places: Sequence[Contact]) -> str:
+    """The largest places in words, each with its area."""
+    largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
+    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm^2)" for c in largest)
 
 
 def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
     """One sentence for the report, or none."""
     if not places:
         return ()
-    largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
-    named = ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm^2)" for c in largest)
     return (
         f"segment: vessels that run side by side are open to each other in {len(places)} place(s), allowed 0; largest "
-        f"at {named} mm; a simulated wire may slip across there: look at the picture, scan with smaller voxels, or "
-        "give the lumen as a file (manifest key lumen)",
+        f"at {named(places)} mm; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
+        " or give the lumen as a file (manifest key lumen)",
     )
 
 
