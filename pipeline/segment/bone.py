@@ -34,11 +34,13 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     if len(near) == 0:
         return ()
     bright[tuple(near.T)] = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
-    places = _places(bright, distance.values < AT_WALL_VOXELS * h)
+    first = np.maximum(near.min(axis=0) - THICK, 0)
+    part = tuple(slice(a, b + 1 + THICK) for a, b in zip(first, near.max(axis=0), strict=True))
+    places = _places(bright[part], distance.values[part] < AT_WALL_VOXELS * h)
     if not places:
         return ()
     face = float(np.prod(distance.spacing_mm) ** (2 / 3))
-    found = [Contact(distance.to_mm(place), count * face) for count, place in places]
+    found = [Contact(distance.to_mm(first + place), count * face) for count, place in places]
     return (
         f"segment: something more than {BRIGHTER:g} times as bright as the vessel (bone, calcification, metal) touches "
         f"its wall in {len(places)} place(s); largest at {named(found)} mm; there the wall may lie too far out: look at"

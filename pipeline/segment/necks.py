@@ -47,6 +47,14 @@ def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
     return np.asarray(away, float), np.asarray(at, np.int64)
 
 
+def _shell(flat: Index, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Which of the voxels, ascending, are not all round among their own kind: the nearest to what lies outside is."""
+    steps = np.array([shape[1] * shape[2], shape[2], 1])
+    beside = (flat[:, None] + np.concatenate([steps, -steps])).ravel()
+    at = np.minimum(np.searchsorted(flat, beside), len(flat) - 1)
+    return ~(flat[at] == beside).reshape(len(flat), 6).all(axis=1)
+
+
 def _runs_along(points: Array, end: Array, heading: Array) -> bool:
     """Whether an end of a vessel, voxels (n, 3) near it, is longer along a heading (3,) than it is wide."""
     near = points[np.linalg.norm(points - end, axis=1) < WINDOW]
@@ -89,7 +97,8 @@ def _next(grid: Grid, low: Index, region: Region, affinity: Affinity, config: Se
         return None
     own = _points(region.voxels, grid)
     tree = cKDTree(own)
-    gap = _nearest(tree, _points(left, grid))[0]
+    gap, shell = np.full(len(left), np.inf), _shell(left, grid.shape)
+    gap[shell] = _nearest(tree, _points(left[shell], grid))[0]
     for _ in range(MOST_TRIED):
         n = int(np.argmin(gap))
         if not np.isfinite(gap[n]):
@@ -110,14 +119,13 @@ def _neck(
     grid: Grid, own: Array, tree: cKDTree, more: Index, levels: GreyLevels, taps: NDArray[np.float32]
 ) -> Array | None:
     """The axis of the neck from the vessel to what is beyond; None where that is no other part of it."""
+    core = smooth_voxels(grid.values, taps, more[:: max(1, len(more) // 2000)])
+    if np.quantile(core, 0.75) > levels.outside + BRIGHTER * levels.contrast:  # bone
+        return None
     beyond = _points(more, grid)
     gap, at = _nearest(tree, beyond)
     n = int(np.argmin(gap))
-    if not np.isfinite(gap[n]):
-        return None
-    core = smooth_voxels(grid.values, taps, more[:: max(1, len(more) // 2000)])
-    bone = np.quantile(core, 0.75) > levels.outside + BRIGHTER * levels.contrast
-    return None if bone else _ahead(grid, (own, own[at[n]]), (beyond, beyond[n]))
+    return _ahead(grid, (own, own[at[n]]), (beyond, beyond[n])) if np.isfinite(gap[n]) else None
 
 
 def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region:
