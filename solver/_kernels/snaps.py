@@ -25,7 +25,7 @@ class Books(NamedTuple):
     push, torque, pull : the hand's at its end, see ``records.PLACE``.     way : longest way of a hand, mm.
     share : of the longest step.     lost : work less the change of energy, N mm.     missing : what of that friction
     did not take.     large : what the trapezium rule may leave of work and energy.     change : of the hand's forces,
-    times their ways.
+    times their ways.     gives : whether the wire is pushed with less than before.
     """
 
     push: float
@@ -37,6 +37,7 @@ class Books(NamedTuple):
     missing: float
     large: float
     change: float
+    gives: bool
 
 
 @merged
@@ -49,7 +50,7 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
     moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
     leapt = moved > tol.SNAP_WAYS * books.way
-    doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot)
+    doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot, moved)
     # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
     told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
     if doubtful and not told and at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
@@ -90,20 +91,24 @@ def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
     change = abs((push - at.push) * ahead) + abs((torque - at.torque) * turn)
     way = max(abs(ahead), abs(onwards))
     share = max(way / introducer.step, abs(reached[1] - at.roll) / introducer.turn)
-    return Books(push, torque, pull, way, share, lost, lost - rubbed, large, change)
+    gives = (push - at.push) * ahead < 0.0
+    return Books(push, torque, pull, way, share, lost, lost - rubbed, large, change, gives)
 
 
 @inlined
-def doubt(books: Books, used: int, shrink: float, pivot: float) -> bool:
-    """Whether a shorter step may lead elsewhere. used, shrink, pivot : of the step."""
+def doubt(books: Books, used: int, shrink: float, pivot: float, moved: float) -> bool:
+    """Whether a shorter step may lead elsewhere. used, shrink, pivot : of the step. moved : longest way of a joint."""
     missing, large = books.missing, books.large
     # a step that the tip's sight alone keeps short is easier than a long one
     toil = tol.TOIL * max(min(books.share, 1.0), tol.SIGHT_SHARE) if shrink == 1.0 else tol.TOIL
-    some = abs(missing) > tol.SOFT_SHARE * large
+    some = abs(missing) > (tol.FREE_SHARE if pivot < tol.FREE else tol.SOFT_SHARE) * large
     if (used > toil and (some or pivot < tol.SOFT)) or abs(missing) > tol.STRANGE * large + books.change:
         return True
     if pivot < tol.SOFT:
         return used > tol.EASY and some
+    further = used >= tol.EASY and moved > tol.FURTHER * books.way
+    if further and books.gives and abs(missing) > tol.GIVES * books.change:
+        return True
     large += tol.CHANGE_SHARE * books.share * books.change
     return (used > tol.EASY and missing > large) or (used > tol.SWIFT and missing < -tol.GAINED * large)
 

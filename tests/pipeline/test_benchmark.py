@@ -249,3 +249,10 @@ def test_short_steps_lead_nowhere_else() -> None:
     assert silent.value == 0
     assert flagged.value < 1
     assert without.value >= 3
+
+
+@pytest.mark.parametrize(("seed", "index"), [(9906, 41), (9904, 162), (9928, 36), (9916, 105), (9925, 177)])
+def test_no_hop_of_a_hard_step_is_silent(seed: int, index: int) -> None:
+    """A step of 1 mm let go 0.1 to 1 mm too early: the push fell within it, or the wire was free to turn."""
+    silent = next(iter(against_short_steps(seed, 1, first=index)))
+    assert silent.value == 0.0
