@@ -52,7 +52,7 @@ def _shell(flat: Index, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     steps = np.array([shape[1] * shape[2], shape[2], 1])
     beside = (flat[:, None] + np.concatenate([steps, -steps])).ravel()
     at = np.minimum(np.searchsorted(flat, beside), len(flat) - 1)
-    return ~(flat[at] == beside).reshape(len(flat), 6).all(axis=1)
+    return np.asarray(~(flat[at] == beside).reshape(len(flat), 6).all(axis=1))
 
 
 def _runs_along(points: Array, end: Array, heading: Array) -> bool:

@@ -35,6 +35,8 @@ class Covering:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        return  # it hands out the tests, and executes none
     plugin = Covering()
     plugin.cover.start()
     config.pluginmanager.register(plugin)
