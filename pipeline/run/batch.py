@@ -1,7 +1,8 @@
 """Many jobs on one machine or on a cluster; whatever becomes of one of them, the others go on.
 
 Every executor gives the same outcomes. A job that took its worker with it is run once more after all the others, alone;
-a second death names it.
+a second death names it. On a cluster a worker takes with it what had been handed to it and was not begun: there a death
+counts for a job that was alone.
 """
 
 import sys
@@ -29,14 +30,24 @@ def run_all(
     """
     if address:
         with _cluster(address) as executor:
-            yield from _twice(jobs, lambda part: _on_cluster(executor, part, work))
+
+            def there(part: Sequence[J]) -> Outcomes[J, R]:
+                return _on_cluster(executor, part, work)
+
+            yield from _again(jobs, there, lambda part: _again(part, there, there))
     elif limits.any or (workers > 1 and len(jobs) > 1):
-        yield from _twice(jobs, lambda part: in_processes(part, work, workers, limits))
+
+        def here(part: Sequence[J]) -> Outcomes[J, R]:
+            return in_processes(part, work, workers, limits)
+
+        yield from _again(jobs, here, here)
     else:
         yield from (guarded(work, job) for job in jobs)
 
 
-def _twice(jobs: Sequence[J], run: Callable[[Sequence[J]], Outcomes[J, R]]) -> Outcomes[J, R]:
+def _again(
+    jobs: Sequence[J], run: Callable[[Sequence[J]], Outcomes[J, R]], alone: Callable[[Sequence[J]], Outcomes[J, R]]
+) -> Outcomes[J, R]:
     """All jobs; then those that were lost with their workers, each alone."""
     lost = []
     with closing(run(jobs)) as outcomes:
@@ -46,7 +57,7 @@ def _twice(jobs: Sequence[J], run: Callable[[Sequence[J]], Outcomes[J, R]]) -> O
             else:
                 yield outcome
     for job in lost:
-        yield from run([job])
+        yield from alone([job])
 
 
 def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -> Outcomes[J, R]:
