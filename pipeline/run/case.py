@@ -78,7 +78,8 @@ class Job:
         code = (package_version(), hash_of(Path(__file__)))
         # who registers a metric or a predictor gives its column
         registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
-        return digest((self.case, self.settings.config, self.until, code, ERRORS.columns, registered))
+        given = self.settings.calibrated and self.settings.calibrated[0]
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered))
 
 
 def clear(folder: Path) -> None:
