@@ -37,8 +37,10 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse."""
-        return self.rows[self.rows["verdict"] == "regression"]
+        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed."""
+        rows = self.rows[self.rows["verdict"] == "regression"]
+        times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
+        return rows.loc[times.sort_values(ascending=False, kind="stable").index]
 
     @property
     def moved(self) -> pd.DataFrame:
@@ -82,7 +84,7 @@ class Difference:
         was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
         allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
         return (
-            f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
+            f"{n_cases} cases compared: {n_bad} regressions; the worst: {place}, {first['column']} "
             f"{was} -> {now}{allowed}{moved}"
         )
 
