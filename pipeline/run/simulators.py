@@ -78,7 +78,7 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
     write_failures(out, folders)
     said = write_comparison(out, folders)
     render_index(out, embed)  # its failures are those of all
-    return [*said, f"side by side: {render_simulators(out, embed)}"]
+    return [*said, f"score of {', '.join(folders)}.  side by side: {render_simulators(out, embed)}"]
 
 
 def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:

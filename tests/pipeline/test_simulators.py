@@ -126,7 +126,7 @@ def test_who_has_its_tips_off_is_nearest_nowhere(tmp_path: Path) -> None:
     assert set(where.query("lead == 'clear'")["simulator"]) == {"wireval"}
     page = (tmp_path / "simulators.html").read_text(encoding="utf-8")
     assert "Never the nearest, since their tips lie off" in page
-    assert said[-1] == f"side by side: {tmp_path / 'simulators.html'}"
+    assert said[-1] == f"score of short, fair, wireval.  side by side: {tmp_path / 'simulators.html'}"
 
 
 def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
