@@ -79,13 +79,13 @@ class Difference:
             moved += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
         if not n_bad:
             return f"{n_cases} cases compared: no regression{moved}"
+        worst = f"{n_bad} regression{'s' * (n_bad != 1)}"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
         was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
         allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
         return (
-            f"{n_cases} cases compared: {n_bad} regressions; the worst: {place}, {first['column']} "
-            f"{was} -> {now}{allowed}{moved}"
+            f"{n_cases} cases compared: {worst}; the worst: {place}, {first['column']} {was} -> {now}{allowed}{moved}"
         )
 
 

@@ -12,7 +12,16 @@ from markupsafe import Markup
 from reports import _content, colours
 from reports._content import flatten, settings, size
 from reports.atomic import write_text
-from reports.case_files import GOOD, CaseFiles, find_cases, left_over_sentence, not_reached, read_case, read_json
+from reports.case_files import (
+    GOOD,
+    CaseFiles,
+    find_cases,
+    left_over_sentence,
+    not_reached,
+    not_run_sentence,
+    read_case,
+    read_json,
+)
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 from reports.origin import mixed_settings
@@ -164,6 +173,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "failures": failures,
         "simulators": next(iter(read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"]), ""),
         "left_over": left_over_sentence(out_dir),
+        "not_run": not_run_sentence(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen

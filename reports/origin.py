@@ -34,7 +34,7 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
 def mixed_settings(*outs: Path) -> str:
     """Why nothing may be pooled over the cases of output folders: their settings differ; empty where they do not."""
     made = {
-        f"{out.name}: {case}" if len(outs) > 1 else case: settings_of(result)
+        f"{out.name}: {case}" if len(outs) > 1 else case: _made(result)
         for out in outs
         for case, result in _results(out).items()
     }
@@ -70,8 +70,8 @@ def _results(out: Path) -> dict[str, dict[str, Any]]:
 def _whole(out: Path, found: Mapping[str, Mapping[str, Any]]) -> Told:
     """Settings, code and manifest; a folder whose cases tell nothing has those of its runs."""
     runs = {path.name: read_json(path) for path in sorted(out.glob("run*.json"))}
-    told = _over({name: settings_of(r) | _code(r) for name, r in found.items()})
-    told = told or _over({name: settings_of(r) | _code(r) for name, r in runs.items()})
+    told = _over({name: _made(r) | _code(r) for name, r in found.items()})
+    told = told or _over({name: _made(r) | _code(r) for name, r in runs.items()})
     hashes = dict.fromkeys(str(run["manifest_sha256"])[:12] for run in runs.values() if "manifest_sha256" in run)
     return told | ({"manifest": " and ".join(hashes)} if hashes else {})
 
@@ -93,6 +93,12 @@ def _by_value(made: Mapping[str, Told], name: str) -> dict[str, list[str]]:
         if told:
             values.setdefault(told.get(name, ABSENT), []).append(who)
     return values
+
+
+def _made(result: Mapping[str, Any]) -> Told:
+    """Settings, and the last stage that numbers come from: pages add none."""
+    until = str(result.get("until", "")).replace("report", "compare")
+    return settings_of(result) | ({"--until": until} if until else {})
 
 
 def _code(result: Mapping[str, Any]) -> Told:

@@ -208,7 +208,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
     details = results.details_of(job.case, known, log)
-    details |= {"config": job.settings.as_dict(), "provenance": code_state()}
+    details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}
     results.result_of(job.case, known, summary, key, details).write(job.folder)
     ledger.write(job.folder, key)
 

@@ -107,6 +107,28 @@ def test_shards_of_different_settings_are_not_pooled(
     assert len(pd.read_csv(out / "overall.csv")) == 1
 
 
+def test_shards_that_ended_at_different_stages_are_not_pooled(study: Path, tmp_path: Path) -> None:
+    """They were two cases that are ok, with the error of one."""
+    out = tmp_path / "out"
+    for shard, until in (("1/2", "simulate"), ("2/2", "compare")):
+        words = ["run", str(study), "-o", str(tmp_path / shard[0]), "-q", "--shard", shard]
+        assert main([*words, "--until", until]) == 0
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    assert main(["report", str(out), "--overview"]) == 1
+    assert "(--until simulate in a; compare in b)" in mixed_settings(out)
+
+
+def test_a_shard_that_was_not_merged_is_missed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Half of a study was "1 case: ok", exit 0."""
+    run(study, tmp_path / "out", "--shard", "1/2")
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    assert "named by the manifest and without a result here: b" in capsys.readouterr().err
+    assert "without a result here: b" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    run(study, tmp_path / "out", "--shard", "2/2")
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 0
+
+
 def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_path: Path) -> None:
     run(study, tmp_path / "out")
     path = tmp_path / "out" / "cases" / "a" / "result.json"
