@@ -17,7 +17,10 @@ class FrameStatus(Enum):
     TRACE_FAILED = "the wire could not be followed as one curve from the entry; the message has the reason"
     TRACE_LEFT_LUMEN = "the traced curve leaves the lumen; check the lumen, the registration and trace settings"
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
-    TRACE_LOW_CONTRAST = "the wire's contrast over noise is too low to be traced alone; give a previous curve"
+    TRACE_LOW_CONTRAST = (
+        "nothing here stands out of the noise enough to be called the wire: the frame shows none, or too faintly; "
+        "check that it shows one, then give the frame before, or scan with more dose"
+    )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
     TRACE_WRONG_WAY = (
         "more of the wire lies behind the entry than beyond it; check that entry_direction points the way the wire is "

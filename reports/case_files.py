@@ -103,6 +103,13 @@ def left_over_sentence(out_dir: Path) -> str:
     return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
 
 
+def not_run_sentence(out_dir: Path) -> str:
+    """Cases that the runs into a folder name and that have no result in it, as those of a shard that was not merged."""
+    planned = dict.fromkeys(str(name) for run in _runs(out_dir) for name in run.get("planned") or ())
+    names = ", ".join(name for name in planned if not (out_dir / "cases" / name / "result.json").exists())
+    return f"named by the manifest and without a result here: {names}" * bool(names)
+
+
 def not_reached(out_dir: Path) -> str:
     """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
     ends = [str(run.get("until", "")) for run in _runs(out_dir)]

@@ -37,8 +37,10 @@ class Difference:
 
     @property
     def regressions(self) -> pd.DataFrame:
-        """The rows that became worse."""
-        return self.rows[self.rows["verdict"] == "regression"]
+        """The rows that became worse, the worst first: what is missing, then by how many times what is allowed."""
+        rows = self.rows[self.rows["verdict"] == "regression"]
+        times = (rows["change"].abs() / rows["allowed"]).fillna(math.inf)
+        return rows.loc[times.sort_values(ascending=False, kind="stable").index]
 
     @property
     def moved(self) -> pd.DataFrame:
@@ -77,13 +79,13 @@ class Difference:
             moved += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
         if not n_bad:
             return f"{n_cases} cases compared: no regression{moved}"
+        worst = f"{n_bad} regression{'s' * (n_bad != 1)}"
         first = self.regressions.iloc[0]
         place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
         was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
         allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
         return (
-            f"{n_cases} cases compared: {n_bad} regressions; the first: {place}, {first['column']} "
-            f"{was} -> {now}{allowed}{moved}"
+            f"{n_cases} cases compared: {worst}; the worst: {place}, {first['column']} {was} -> {now}{allowed}{moved}"
         )
 
 

@@ -12,10 +12,20 @@ from markupsafe import Markup
 from reports import _content, colours
 from reports._content import flatten, settings, size
 from reports.atomic import write_text
-from reports.case_files import GOOD, CaseFiles, find_cases, left_over_sentence, not_reached, read_case, read_json
+from reports.case_files import (
+    GOOD,
+    CaseFiles,
+    find_cases,
+    left_over_sentence,
+    not_reached,
+    not_run_sentence,
+    read_case,
+    read_json,
+)
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
-from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SUMMARY, SWEEP, TIMINGS
+from reports.origin import mixed_settings
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
 from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
@@ -151,17 +161,19 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
-    why_none = unscored(zip(summary["role"], summary["status"], strict=True)) or not_reached(out_dir)
+    mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
+    why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
         "title": "wireval",
-        **_headline(cases, bool(failures), row),
+        **_headline(cases, "failures" if failures else "settings differ" if mixed else "ok", row),
         "verdict": verdict(row) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
         "failures": failures,
-        "simulators": (out_dir / "simulators").is_dir(),
+        "simulators": next(iter(read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"]), ""),
         "left_over": left_over_sentence(out_dir),
+        "not_run": not_run_sentence(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "cards": _content.overall(declared("overall"), whole),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
@@ -210,15 +222,20 @@ def _is_tall(section: Mapping[str, Any]) -> bool:
 
 
 def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) -> list[dict[str, Any]]:
-    """Rows of failures.csv, then what it does not know of: cases without result.json."""
+    """Rows of failures.csv, and what it does not know of: cases without result.json; then those of other simulators,
+    whose pages lie beside their logs."""
     table = read_if_there(out_dir / FAILURES.file, FAILURES)
-    table = table[table["status"] != "damaged"]  # the page finds out itself what it cannot read
     rows: list[dict[Any, Any]] = table.astype(object).where(table.notna(), "").to_dict("records")
-    known = {row["case"] for row in rows}
+    beside = [row for row in rows if row["log"].startswith("simulators/")]
+    # the page finds out itself what it cannot read
+    own = [row for row in rows if row not in beside and row["status"] != "damaged"]
+    known = {row["case"] for row in own}
     for case in cases:
         if case.name not in known and case.result.get("status") not in GOOD:
-            rows += _case_failures(case)
-    return [{**row, "link": links.get(row["case"], "")} for row in rows]
+            own += _case_failures(case)
+    pages = [Path(row["log"]).with_name("report.html") for row in beside]
+    theirs = [row | {"link": quote(str(p)) * (out_dir / p).exists()} for row, p in zip(beside, pages, strict=True)]
+    return [*(row | {"link": links.get(row["case"], "")} for row in own), *theirs]
 
 
 def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
@@ -234,14 +251,16 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     return cases, broken
 
 
-def _headline(cases: list[CaseFiles], failed: bool, row: Mapping[str, Any]) -> dict[str, Any]:
-    """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too."""
+def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too.
+
+    status : ok, or what the badge says instead.
+    """
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     sentence = f"{len(cases)} case{'s' * (len(cases) != 1)}, {n_frames} frames: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
-    good = bool(cases) and not failed
-    return {"sentence": sentence, "badge": badge("ok" if good else "failures", good, row)}
+    return {"sentence": sentence, "badge": badge(status if cases else "failures", bool(cases) and status == "ok", row)}
 
 
 def _files(case_dir: Path) -> list[dict[str, str]]:

@@ -1,6 +1,9 @@
-"""Where two runs come from, and what of it differs: settings, code, versions, manifest, the contents of inputs."""
+"""Where results come from: settings, code, versions, manifest, contents of inputs; what of it differs between runs.
 
-from collections.abc import Mapping
+Each case says it of itself: a folder may hold cases that were run at different times.
+"""
+
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,39 +11,115 @@ from reports.case_files import find_cases, read_json
 
 CODE = {"wireval": "wireval", "git_commit": "commit", "git_dirty": "changed files", "python": "Python"}
 ABSENT = "(none)"
+_NAMED = 5
+Told = dict[str, str]
+"""What something was made from, each under a name for a reader."""
 
 
 def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     """Rows (what, before, after) of everything that is not the same in two output folders."""
-    old, new = origin(before), origin(after)
-    return [
-        {"what": name, "before": old.get(name, ABSENT), "after": new.get(name, ABSENT)}
-        for name in dict.fromkeys([*old, *new])
-        if old.get(name) != new.get(name)
-    ]
+    old, new = _results(before), _results(after)
+    told = [(whole | _cases(found), _inputs(found, old.keys() & new.keys()))
+            for whole, found in ((_whole(before, old), old), (_whole(after, new), new))]  # fmt: skip
+    (first, files), (second, others) = told
+    rows = [(name, first.get(name, ABSENT), second.get(name, ABSENT)) for name in dict.fromkeys([*first, *second])]
+    same: dict[tuple[str, str, str], list[str]] = {}
+    for case, key in dict.fromkeys([*files, *others]):
+        change = key, files.get((case, key), ABSENT), others.get((case, key), ABSENT)
+        same.setdefault(change, []).append(case)
+    rows += [(f"input of {_list(cases)}: {key}", a, b) for (key, a, b), cases in same.items()]
+    return [{"what": name, "before": a, "after": b} for name, a, b in rows if a != b]
 
 
-def origin(out: Path) -> dict[str, str]:
-    """What the results of an output folder were made from, each under a name for a reader."""
-    found: dict[str, str] = {}
-    for path in sorted(out.glob("run*.json")):
-        run = read_json(path)
-        found |= _settings(run.get("config", {})) | _code(run.get("provenance", {}))
-        if "manifest_sha256" in run:
-            found["manifest"] = str(run["manifest_sha256"])[:12]
+def mixed_settings(*outs: Path) -> str:
+    """Why nothing may be pooled over the cases of output folders: their settings differ; empty where they do not."""
+    made = {
+        f"{out.name}: {case}" if len(outs) > 1 else case: _made(result)
+        for out in outs
+        for case, result in _results(out).items()
+    }
+    found = _over(made)
+    apart = [f"{name} {found[name]}" for name in found if len(_by_value(made, name)) > 1]
+    if not apart:
+        return ""
+    more = f" and {len(apart) - 1} more" * (len(apart) > 1)
+    what = f"Nothing is pooled: the cases were run with different settings ({apart[0]}{more})"
+    return f"{what}; run all of them with the same ones, or keep them in folders of their own."
+
+
+def settings_of(result: Mapping[str, Any]) -> Told:
+    """Settings of what a result.json or run.json holds, by table.key; None is what the data or the manifest say."""
+    return {
+        f"{table}.{key}": "as the manifest says" if item.get("value") is None else str(item["value"])
+        for table, items in result.get("config", {}).items()
+        for key, item in items.items()
+    }
+
+
+def _results(out: Path) -> dict[str, dict[str, Any]]:
+    """result.json of every case, empty where there is none, or one that cannot be read, which is said elsewhere."""
+    found: dict[str, dict[str, Any]] = {}
     for folder in find_cases(out):
-        result = read_json(folder / "result.json")
-        for item in result.get("inputs", ()):
-            found[f"input of {folder.name}: {Path(item['path']).name}"] = str(item["sha256"])[:12]
-        if not found.keys() & set(CODE.values()):
-            found |= _settings(result.get("config", {})) | _code(result.get("provenance", {}))
+        try:
+            found[folder.name] = read_json(folder / "result.json")
+        except ValueError:
+            found[folder.name] = {}
     return found
 
 
-def _settings(config: Mapping[str, Any]) -> dict[str, str]:
-    return {f"{table}.{key}": str(item.get("value")) for table, items in config.items() for key, item in items.items()}
+def _whole(out: Path, found: Mapping[str, Mapping[str, Any]]) -> Told:
+    """Settings, code and manifest; a folder whose cases tell nothing has those of its runs."""
+    runs = {path.name: read_json(path) for path in sorted(out.glob("run*.json"))}
+    told = _over({name: _made(r) | _code(r) for name, r in found.items()})
+    told = told or _over({name: _made(r) | _code(r) for name, r in runs.items()})
+    hashes = dict.fromkeys(str(run["manifest_sha256"])[:12] for run in runs.values() if "manifest_sha256" in run)
+    return told | ({"manifest": " and ".join(hashes)} if hashes else {})
 
 
-def _code(provenance: Mapping[str, Any]) -> dict[str, str]:
+def _over(made: Mapping[str, Told]) -> Told:
+    """What all say alike, and where they do not, who says what; who says nothing is not asked."""
+    found = {}
+    for name in dict.fromkeys(name for told in made.values() for name in told):
+        values = _by_value(made, name)
+        found[name] = "; ".join(
+            f"{value} in {_list(who)}" if len(values) > 1 else value for value, who in values.items()
+        )
+    return found
+
+
+def _by_value(made: Mapping[str, Told], name: str) -> dict[str, list[str]]:
+    values: dict[str, list[str]] = {}
+    for who, told in made.items():
+        if told:
+            values.setdefault(told.get(name, ABSENT), []).append(who)
+    return values
+
+
+def _made(result: Mapping[str, Any]) -> Told:
+    """Settings, and the last stage that numbers come from: pages add none."""
+    until = str(result.get("until", "")).replace("report", "compare")
+    return settings_of(result) | ({"--until": until} if until else {})
+
+
+def _code(result: Mapping[str, Any]) -> Told:
+    provenance = result.get("provenance", {})
     code = {said: str(provenance[name]) for name, said in CODE.items() if name in provenance}
     return code | {name: str(version) for name, version in provenance.get("versions", {}).items()}
+
+
+def _cases(found: Iterable[str]) -> Told:
+    return {"cases": ", ".join(sorted(found))}
+
+
+def _inputs(found: Mapping[str, Mapping[str, Any]], cases: Iterable[str]) -> dict[tuple[str, str], str]:
+    """Hashes by case and key of the manifest; rows of an older version, which have no key, by their paths."""
+    return {
+        (case, str(item.get("key", item["path"]))): str(item["sha256"])[:12]
+        for case in sorted(cases)
+        for item in found[case].get("inputs", ())
+    }
+
+
+def _list(names: list[str]) -> str:
+    rest = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + f" and {rest} more" * (rest > 0)

@@ -12,9 +12,10 @@ from matplotlib.image import imread
 
 from reports import _content, colours
 from reports.atomic import replacing
-from reports.case_files import WORST, read_case, read_json
+from reports.case_files import WORST, not_reached, read_case, read_json
 from reports.figures import declared
 from reports.html import draw_sections
+from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
 from reports.verdict import next_command, typed, unscored, verdict, worst_frames
@@ -103,14 +104,16 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
     page = _Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
-    said = verdict(row) or unscored(zip(summary["role"], summary["status"], strict=True))
+    cases = zip(summary["role"], summary["status"], strict=True)
+    said = verdict(row) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
     page.text(
         f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {said}", size=11
     )
     if len(failures):
         page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
-        rows = failures[["case", "frame", "status", "message"]].head(_MOST_FAILURES)
-        for case, frame, status, text in rows.to_numpy():
+        rows = failures[["simulator", "case", "frame", "status", "message"]].head(_MOST_FAILURES)
+        for name, case, frame, status, text in rows.to_numpy():
+            case = case if pd.isna(name) else f"{name}: {case}"
             place = f"{case}" if pd.isna(frame) else f"{case}, frame {frame}"
             page.text(f"{place}: {status}. {textwrap.shorten(str(text), 300, placeholder='…')}")
         if len(failures) > _MOST_FAILURES:

@@ -9,11 +9,11 @@ import pandas as pd
 
 from reports import _content
 from reports.case_files import find_cases, warnings_of
-from reports.figures.simulators import OURS, SimulatorFiles
+from reports.figures.simulators import OURS, SimulatorFiles, leads
 from reports.html import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import badge, tips_off, verdict
+from reports.verdict import TIPS_OFF, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -24,7 +24,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     files = SimulatorFiles(*(read_if_there(out_dir / table.file, table) for table in (SIMULATORS, WHERE)))
     table, columns = _one_table(files.simulators)
     grid = _content.grid(table, columns, bad=_doubtful(table), nothing=_content.NOTHING)
-    folders = {name: _folder_of(out_dir, name) for name in table["simulator"]}
+    folders = {name: folders_in(out_dir)[name] for name in table["simulator"]}
     links = {name: quote((folder / "index.html").relative_to(out_dir).as_posix()) for name, folder in folders.items()}
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
         row["cells"][0]["link"] = links[name]
@@ -38,14 +38,15 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
         "simulators": grid,
         "sections": draw_sections("simulators", files, out_dir, embed),
         "where": _where(files.where),
+        "off": sorted(files.where["simulator"][files.where["lead"] == TIPS_OFF].unique()),
     }
     return write_page("simulators.html.j2", page, out_dir / PAGE)
 
 
-def _folder_of(out_dir: Path, name: str) -> Path:
-    """Where a simulator's own pages lie: the first one's beside this page."""
-    folder = out_dir / "simulators" / name
-    return folder if folder.is_dir() else out_dir
+def folders_in(out_dir: Path) -> dict[str, Path]:
+    """Where each simulator's own pages lie, by name: the first one's beside this page. Empty without a score."""
+    names = read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"].unique()
+    return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
 def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
@@ -100,7 +101,7 @@ def _where(rows: pd.DataFrame) -> _content.Grid | None:
     bins = ["along", "low_mm", "high_mm"]
     table = rows.pivot_table(index=bins, columns="simulator", values="rms_mm", sort=False).reset_index()
     names = list(dict.fromkeys(rows["simulator"]))
-    lead = rows[rows["lead"].notna()].rename(columns={"simulator": "nearest"})
+    lead = leads(rows).rename(columns={"simulator": "nearest"})
     ends = ["ratio_to_next", "ratio_to_next_low", "ratio_to_next_high"]
     table = table.merge(lead[[*bins, "nearest", *ends, "lead"]], on=bins, how="left")
     table["nearest"] = table["nearest"].where(table["lead"] != "tie")

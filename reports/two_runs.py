@@ -75,31 +75,32 @@ class Verdict:
         return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
 
     def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:
-        """What a reader is shown, by heading: first what differs, then pooled, then frame by frame.
+        """What a reader is shown, by heading: first what differs, then the worst frames, then all of them.
 
-        most : rows of the last ones, whose headings say where they are cut.
+        most : rows of the lists, whose headings say where they are cut.
         """
         lists = {
-            "What became worse": self.frames.regressions,
-            "What moved, neither worse nor better": self.frames.moved,
-        }
-        shown = {
             "What differs between the runs": pd.DataFrame(self.differs),
-            "Over all frames": pd.DataFrame(self.pooled),
-            "Frame by frame": self.frames.by_column,
+            "What became worse": self.frames.regressions.drop(columns="verdict"),
+            "What moved, neither worse nor better": self.frames.moved.drop(columns="verdict"),
         }
+        shown = {}
         for head, rows in lists.items():
             cut = f" (the first {most} of {len(rows)}; --json has all)" * (len(rows) > most)
-            shown[head + cut] = rows.head(most).drop(columns="verdict")
-        return shown
+            shown[head + cut] = rows.head(most)
+        return shown | {"Over all frames": pd.DataFrame(self.pooled), "Frame by frame": self.frames.by_column}
 
     def lines(self) -> list[str]:
-        """For a terminal."""
-        said = []
-        for head, table in self.tables().items():
-            if len(table):
-                said += [f"{head}:", table.to_string(index=False, na_rep="", float_format="{:.4g}".format), ""]
-        return [*said, *([self.paired] if self.paired else []), self.sentence]
+        """For a terminal: what differs, the verdict, the worst frames, tables; and the verdict again at the end."""
+        parts = [
+            f"{head}:\n{table.to_string(index=False, na_rep='', float_format='{:.4g}'.format)}\n"
+            for head, table in self.tables().items()
+            if len(table)
+        ]
+        verdict = f"Verdict: {self.word.upper()}{f'. {self.paired}' if self.paired else ''}\n"
+        parts.insert(1 if self.differs else 0, verdict)
+        gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"
+        return [*parts, f"{self.sentence}: {gate}"]
 
     def write(self, **places: Path | None) -> None:
         """Write the files that are asked for: json, markdown, junit, html."""

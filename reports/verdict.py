@@ -164,8 +164,10 @@ def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
     """The command that computes these cases again, also after what the message says was done to the manifest.
 
     typed : the command of this run, where it is known; MANIFEST and OUT stand where it is not. More than a few cases
-    are not named: what is finished is kept anyway.
+    are not named: what is finished is kept anyway, and by ``score``, which runs all, without being asked.
     """
+    if list(typed[:2]) == ["wireval", "score"]:
+        return shlex.join(word for word in typed if word != "--fresh")
     named = list(dict.fromkeys(cases))
     only = [word for case in named for word in ("--only", case)] if len(named) <= _MANY else []
     head = list(typed) if list(typed[:2]) == ["wireval", "run"] else ["wireval", "run", "MANIFEST", "-o", "OUT"]

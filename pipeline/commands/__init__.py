@@ -46,10 +46,16 @@ def settings_of(args: argparse.Namespace) -> "list[Setting]":
 
 
 def resolved_settings(args: argparse.Namespace) -> "Resolved":
-    """The settings in force; raises SettingsError listing every problem."""
+    """The settings in force, and which parameters are given beside them; raises SettingsError listing every problem."""
+    from dataclasses import replace
+
+    from pipeline.run.store import file_hash
     from pipeline.study.settings import resolve
 
-    return resolve(settings_of(args))
+    found, path = resolve(settings_of(args)), getattr(args, "parameters", None)
+    if path is None or not path.is_file():  # what else stands there is told where it is read
+        return found
+    return replace(found, calibrated=(file_hash(path)[:12], str(path)))
 
 
 def complain(problems: Sequence[str], what: str, then: str = "; nothing was run") -> int:

@@ -51,22 +51,28 @@ def main(args: argparse.Namespace) -> int:
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Fit, write, and say what was found."""
     from pipeline.run.calibration import calibrate, file_in, gathered
-    from pipeline.run.calibration_files import estimates_of, misfit, write_parameters, write_record
+    from pipeline.run.calibration_files import misfit, write_parameters, write_record
     from reports.calibration import render_calibration
 
     found = gathered(cases, config, store, say)
     fit = calibrate(found, config)
-    write_parameters(file_in(args.out), found, fit)
+    file = file_in(args.out)
+    before = file.read_bytes() if file.exists() else b""
+    written = write_parameters(file, found, fit)
     write_record(args.out / "calibration.json", found, fit)
-    for row in estimates_of(found, fit):
-        sd = f"{100 * row['sd']:.2g} %" if row["logarithmic"] else f"{row['sd']:.2g}"
-        verdict = "" if row["seen"] else f"  UNIDENTIFIABLE, stays at {row['used']:.4g}: {row['why']}"
-        say(f"{row['name']:20s} {row['value']:10.4g}  +- {sd:8s}{verdict}")
+    for one in written.estimate:
+        sd = f"{100 * one.sd:.2g} %" if one.logarithmic else f"{one.sd:.2g}"
+        verdict = "" if one.seen else f"  UNIDENTIFIABLE, as stated; fitted {one.value:g}: {one.why}"
+        say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     for warning in misfit(fit):
         say(f"warning: {warning}")
     for note in found.left_out:
         say(note)
-    say(f"parameters: {file_in(args.out)}  page: {render_calibration(args.out)}")
+    if before not in (b"", file.read_bytes()):
+        say(f"{file}: that of a calibration before, which said otherwise, is replaced")
+    seen = f"{len(written.estimate) - len(written.unseen)} of {len(written.estimate)} parameters seen"
+    of = ", ".join(case.id for case in found.cases)
+    say(f"calibrated with {of}: {seen}.  parameters: {file}  page: {render_calibration(args.out)}")
     return 1 if found.left_out else 0
 
 

@@ -30,12 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 if all cases are ok, 1 if some failed, 2 if there are none."""
+    """Exit 0 if all cases are ok, 1 if some failed or have not been run, 2 if there are none."""
     from pipeline.run.aggregate import aggregate
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.case_files import left_over_sentence
+    from reports.case_files import left_over_sentence, not_run_sentence
+    from reports.html import render_index
     from reports.inside import links_out
 
     found = found_results(args.out)
@@ -48,16 +49,17 @@ def main(args: argparse.Namespace) -> int:
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))
     drawn = args.overview or _all_drawn(args, found)
-    page = _pages(args.out, embed=args.embed)
+    page = render_index(args.out, embed=args.embed)
+    others_ok = _others(args.out, embed=args.embed)
     if args.pdf:
         from reports.pdf import write_pdf
 
         say(f"summary: {write_pdf(args.out)}")
-    aside = left_over_sentence(args.out)
-    if aside:
+    missing = not_run_sentence(args.out)
+    for aside in filter(None, (left_over_sentence(args.out), missing)):
         sys.stderr.write(f"{aside}\n")
     say(last_line(totals, page))
-    return 0 if totals.all_ok and drawn else 1
+    return 0 if totals.all_ok and others_ok and drawn and not missing else 1
 
 
 def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
@@ -96,12 +98,18 @@ def _drawn(out: Path, embed: bool, result: "Result") -> str:
     return str(result.failures[0]["message"]) if result.status == "damaged" else ""
 
 
-def _pages(out: Path, *, embed: bool) -> Path:
-    """The pages over all cases, and of several simulators side by side; the path of the first."""
+def _others(out: Path, *, embed: bool) -> bool:
+    """In a score the tables and pages of the other simulators and of all side by side; whether all of them are ok."""
+    from pipeline.run.aggregate import aggregate
+    from pipeline.run.simulators import side_by_side
     from reports.html import render_index
-    from reports.schema import SIMULATORS
-    from reports.simulators import render_simulators
+    from reports.simulators import folders_in
 
-    if (out / SIMULATORS.file).exists():
-        render_simulators(out, embed=embed)
-    return render_index(out, embed=embed)
+    folders = folders_in(out)
+    good = []
+    for name, folder in [*folders.items()][1:]:
+        good.append(aggregate(folder).all_ok)
+        say(f"{name}: report: {render_index(folder, embed)}")
+    for line in side_by_side(out, folders, embed) if folders else ():
+        say(line)
+    return all(good)

@@ -86,7 +86,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError, chosen, guard_out, guard_stages
+    from pipeline.run.guards import guard_kept, guard_out, guard_stages
+    from pipeline.run.launch import Plan, UsageError, chosen
     from pipeline.run.log import STAGES
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
@@ -112,6 +113,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
         say(note)
     if not (args.resume or args.fresh):
         guard_out(args.out, manifest.path, settings)
+    guard_kept(args.out, {case.id for case in manifest.cases} - {case.id for case in cases}, settings)
     if not args.fresh:
         guard_stages(args.out, args.until)
     return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)

@@ -42,10 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed; raises InputError where the input is wrong."""
     from pipeline.run.launch import failure_lines, last_line, launch
-    from pipeline.run.simulators import OURS, write_comparison, write_failures
+    from pipeline.run.simulators import OURS, side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
-    from reports.simulators import render_simulators
     from reports.verdict import remarks
 
     plans = _plans(args)
@@ -63,11 +62,8 @@ def main(args: argparse.Namespace) -> int:
         say(f"{name}: {last_line(*done[name])}")
         for text in remarks(done[name][0].pooled):
             say(f"{name}: warning: {text}")
-    folders = {name: plan.out for name, plan in plans.items()}
-    write_failures(args.out, folders.values())
-    for line in write_comparison(args.out, folders):
+    for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
-    say(f"side by side: {render_simulators(args.out, embed=args.embed)}")
     return 0 if all(totals.all_ok for totals, _ in done.values()) else 1
 
 

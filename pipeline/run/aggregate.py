@@ -19,6 +19,7 @@ from pipeline.run.results import Result, write_json
 from reports import tables
 from reports.case_files import not_reached
 from reports.junit import write_junit
+from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
 
@@ -27,7 +28,8 @@ from reports.verdict import unscored
 class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
-    unscored : why there are none.     sweep_lost : cases that crashed at a point of a sweep, none of ``cases``.
+    unscored : why there are none.     mixed : whether it is that settings differ.     sweep_lost : cases that crashed
+    at a point of a sweep, none of ``cases``.
     """
 
     cases: int
@@ -39,18 +41,19 @@ class Totals:
     solver_s: float
     pooled: Mapping[str, Any] = field(default_factory=dict)
     unscored: str = ""
+    mixed: bool = False
     sweep_lost: int = 0
 
     @property
     def all_ok(self) -> bool:
         """The one source of the exit code and of the printed counts."""
-        return self.cases > 0 and self.cases_ok == self.cases and not self.sweep_lost
+        return self.cases > 0 and self.cases_ok == self.cases and not (self.mixed or self.sweep_lost)
 
 
 def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "run.json") -> Totals:
     """Write the tables over all cases found, and ``name`` where ``run_info`` is given."""
-    cases = found_cases(out)
-    found, whole = [case.result for case in cases], overall(with_another(out, cases))
+    cases, mixed = found_cases(out), mixed_settings(out)
+    found, whole = [case.result for case in cases], {} if mixed else overall(with_another(out, cases))
     rows, (times, replayed_s) = [result.summary for result in found], _times(out, found)
     failures = [row for result in found for row in result.failures]
     for file, table, given in (
@@ -66,7 +69,8 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         assumed = [*run_info.get("assumptions", ()), *shared_scans(found)]
         cases_of = {"assumptions": assumed, "cases": [result.case for result in found]}
         write_json(out / name, run_info | cases_of | {"overall": whole})
-    points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in frames_of(validation(cases)))])
+    pooled = [] if mixed else frames_of(validation(cases))
+    points = np.concatenate([np.zeros(0), *(frame.error_mm for frame in pooled)])
     return Totals(
         len(rows),
         sum(result.ok for result in found),
@@ -76,7 +80,8 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         float(np.percentile(points, 95)) if points.size else float("nan"),
         replayed_s,
         whole,
-        unscored((result.role, result.status) for result in found) or not_reached(out),
+        mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
+        bool(mixed),
     )
 
 

@@ -12,7 +12,7 @@ from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, WA
 from pipeline.run.calibration import Gathered, depth_offset, used_by
 from pipeline.run.provenance import code_state
 from pipeline.run.results import jsonable, write_json
-from pipeline.study.parameters import read_parameters
+from pipeline.study.parameters import Parameters, read_parameters
 from reports.atomic import write_text
 
 DEPTH = "depth_offset_mm"
@@ -48,8 +48,8 @@ def _row(e: Estimate) -> dict[str, Any]:
     return row | {"seen": e.seen, "used": u.shown(e.used), "why": e.why}
 
 
-def write_parameters(path: Path, found: Gathered, fit: Calibration) -> None:
-    """Write parameters.toml, and read it back: a file that cannot be read is not left to a run to find."""
+def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameters:
+    """Write parameters.toml, and read it back: what runs take from it, and no file that they cannot read."""
     rows, values, first = estimates_of(found, fit), fit.values, found.cases[0]
     wire, by_name = bent(first.wire, values), {row["name"]: row for row in rows}
     walls = sorted({case.wall.stiffness_N_mm2 for case in found.cases})
@@ -75,7 +75,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> None:
     for used in used_by(found):
         lines += ["", "[[used]]", *(f"{key} = {_text(value)}" for key, value in used.items())]
     write_text(path, "\n".join(lines) + "\n")
-    read_parameters(path)
+    return read_parameters(path)
 
 
 def _text(value: Any) -> str:

@@ -78,7 +78,8 @@ class Job:
         code = (package_version(), hash_of(Path(__file__)))
         # who registers a metric or a predictor gives its column
         registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
-        return digest((self.case, self.settings.config, self.until, code, ERRORS.columns, registered))
+        given = self.settings.calibrated and self.settings.calibrated[0]
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered))
 
 
 def clear(folder: Path) -> None:
@@ -207,7 +208,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
     details = results.details_of(job.case, known, log)
-    details |= {"config": job.settings.as_dict(), "provenance": code_state()}
+    details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}
     results.result_of(job.case, known, summary, key, details).write(job.folder)
     ledger.write(job.folder, key)
 

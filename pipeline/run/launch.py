@@ -5,7 +5,6 @@ depend on the solver's settings, so the stage store answers them: a sweep costs 
 agreement that no parameter moves is suspicious.
 """
 
-import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -21,7 +20,7 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
-from pipeline.run.log import STAGES, Stage, last_stage
+from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
 from pipeline.run.overall import shared_scans
@@ -33,10 +32,11 @@ from pipeline.run.watch import Watch
 from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
-from pipeline.study.settings import Resolved, differing, to_toml
+from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import left_over, left_over_sentence, read_json
 from reports.html import render_index
+from reports.origin import mixed_settings
 from reports.schema import SWEEP
 from reports.verdict import next_command, typed
 
@@ -110,39 +110,6 @@ def _shard(text: str) -> tuple[int, int]:
     raise UsageError([f"--shard {text!r}: expected I/N with 1 <= I <= N, as in 3/20"])
 
 
-def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
-    """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
-    if (out / "simulators").is_dir():
-        raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
-    allowed = "say --resume (keep what fits) or --fresh (compute again)"
-    # a run that ended before its first file was whole leaves nothing but that file's temporary name
-    if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):
-        return
-    infos, wanted = sorted(out.glob("run*.json")), file_hash(manifest)
-    for info in infos:
-        try:
-            known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256")
-        except (ValueError, AttributeError):
-            raise UsageError([f"{info} is damaged; {allowed}"]) from None
-        if known != wanted:
-            raise UsageError([f"{out} was made from another manifest; name another folder, or {allowed}"])
-    if not infos and not (out / "manifest.inferred.toml").exists():
-        raise UsageError([f"{out} is not empty and holds no run; name another folder, or {allowed}"])
-    others = differing(out / "config.resolved.toml", settings)
-    if others:
-        raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
-
-
-def guard_stages(out: Path, until: Stage) -> None:
-    """Refuse to put results of fewer stages in the place of finished ones."""
-    with suppress(ValueError):  # a damaged file is for guard_out to say
-        ends = [read_json(path).get("until", STAGES[-1]) for path in out.glob("run*.json")]
-        later = [end for end in ends if end in STAGES and STAGES.index(end) > STAGES.index(until)]
-        if later and any(out.glob("cases/*/result.json")):
-            lost = f"{out} was run until {later[0]}, and --until {until} would take that away"
-            raise UsageError([f"{lost}; name another folder, or say --fresh (compute again)"])
-
-
 def launch(plan: Plan) -> tuple[Totals, Path]:
     """Run everything and write what is about the whole; the totals and the path of the page.
 
@@ -152,6 +119,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "until": plan.template.until, "planned": [case.id for case in plan.manifest.cases]}
+    info["config"] = settings.as_dict()
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
     try:
         write_json(out / name, info | {"cases": []})
@@ -165,7 +133,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if heads:
         write_sweep(out, found_heads(out))  # what other shards have done so far is among them
-    info |= {"provenance": code_state(), "assumptions": plan.assumptions, "config": settings.as_dict()}
+    info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
@@ -246,7 +214,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     then : that, where it is not the run's own command for these cases.
     """
     found, cases = found_results(plan.out), []
-    lines = shared_scans(found)
+    lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
     for result in found:
         for row in result.failures:
             cases.append(row["case"])

@@ -20,6 +20,7 @@ from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest, file_hash
 from pipeline.study.manifest import Case
+from pipeline.study.sources import files_of
 from reports.atomic import write_text
 from reports.case_files import find_cases
 
@@ -151,7 +152,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "entry": clamp,
         **{name: value for name in ("down", "catheter") if (value := getattr(case, name)) is not None},
         "geometry": _geometry(known.scans),
-        "inputs": _inputs(known.scans),
+        "inputs": _inputs(case),
         "counters": log.counters,
         "chosen": log.chosen,
     }
@@ -181,10 +182,21 @@ def _geometry(scans: Scans | None) -> dict[str, Any]:
     return {name: getattr(scans.first, name) for name in names}
 
 
-def _inputs(scans: Scans | None) -> list[dict[str, Any]]:
-    """Every file of the scans with its hash and size."""
-    paths = dict.fromkeys(header.source.path for header in scans.all) if scans else {}
-    return [{"path": str(p), "sha256": file_hash(p), "bytes": p.stat().st_size} for p in paths]
+def _inputs(case: Case) -> list[dict[str, Any]]:
+    """Every file that a case was made of, once: its key in the manifest, path, hash and size."""
+    named = {path: key for key, path in reversed(_files(case).items()) if path.exists()}
+    return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
+
+
+def _files(case: Case) -> dict[str, Path]:
+    """Those that it names, another simulator's wires, and those of the case whose clamp it borrows."""
+    others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
+    return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, or of all files of a folder."""
+    return sum(p.stat().st_size for p in path.rglob("*") if p.is_file()) if path.is_dir() else path.stat().st_size
 
 
 def jsonable(value: Any) -> Any:

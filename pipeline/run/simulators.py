@@ -5,7 +5,7 @@ over depth, over those that count in all. A simulator's failed frames stand besi
 none of its shares of the planned frames.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,11 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, validation
 from pipeline.run.results import found_results
 from reports import tables
+from reports.html import render_index
+from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
+from reports.simulators import render_simulators
+from reports.verdict import TIPS_OFF, tips_off
 
 OURS = "wireval"
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -36,9 +40,10 @@ class Piece(NamedTuple):
 def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
     """simulators.csv and where.csv from the output folders of simulators by name; sentences for the terminal."""
     studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
-    pairs = [(one, other) for one in studies for other in studies if one != other]
+    mixed = mixed_settings(*folders.values())
+    pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
     rows = [_alone(name, found) for name, found in studies.items()]
-    sentences = []
+    sentences = [mixed] * bool(mixed)
     for one, other in pairs:
         both = ratio(studies[other], studies[one])
         if both is not None:
@@ -46,21 +51,34 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
             rows.append({"simulator": one, "against": other, "common_frames": both.frames, **values})
             if other == OURS:
                 sentences.append(both.sentence.replace("the second run / the first", f"{one} / {OURS}"))
+    off = {row["simulator"] for row in rows if tips_off(row)}
     tables.write(out / SIMULATORS.file, SIMULATORS, rows)
-    tables.write(out / WHERE.file, WHERE, list(_where(folders, studies)))
+    tables.write(out / WHERE.file, WHERE, [] if mixed else list(_where(folders, studies, off)))
     return sentences
 
 
-def write_failures(out: Path, folders: Iterable[Path]) -> None:
-    """simulators/failures.csv: what failed of every simulator; the logs, below ``out``, tell whose it is."""
+def write_failures(out: Path, folders: Mapping[str, Path]) -> None:
+    """failures.csv of ``out``, and the same below simulators/: what failed of every simulator, and whose it is."""
     rows = [
-        row | {"log": (folder / row["log"]).relative_to(out).as_posix()}
-        for folder in folders
+        {key: row[key] for key in row.keys() & FAILURES.names}
+        | {"simulator": name, "log": (folder / row.get("log", "")).relative_to(out).as_posix()}
+        for name, folder in folders.items()
         for result in found_results(folder)
         for row in result.failures
     ]
-    known = [{name: row[name] for name in row.keys() & FAILURES.names} for row in rows]
-    tables.write(out / "simulators" / FAILURES.file, FAILURES, known)
+    for place in (out, out / "simulators"):
+        tables.write(place / FAILURES.file, FAILURES, rows)
+
+
+def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[str]:
+    """Everything about several simulators, from the results in their folders; sentences for the terminal.
+
+    folders : by name, the first one ``out`` itself.
+    """
+    write_failures(out, folders)
+    said = write_comparison(out, folders)
+    render_index(out, embed)  # its failures are those of all
+    return [*said, f"score of {', '.join(folders)}.  side by side: {render_simulators(out, embed)}"]
 
 
 def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
@@ -71,8 +89,11 @@ def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
     return {key: value for key, value in row.items() if key in SIMULATORS.names} | {"simulator": name}
 
 
-def _where(folders: Mapping[str, Path], studies: Studies) -> Iterator[dict[str, Any]]:
-    """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest."""
+def _where(folders: Mapping[str, Path], studies: Studies, off: Set[str]) -> Iterator[dict[str, Any]]:
+    """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
+
+    off : those whose tips lie off: distances to the traced wire do not see that, so that they win nothing.
+    """
     kept = [{(c.result.case, n) for c in validation(found) for n in c.frames} for found in studies.values()]
     common = set.intersection(*kept)
     points = {name: list(_points(folders[name], found, common)) for name, found in studies.items()}
@@ -85,7 +106,7 @@ def _where(folders: Mapping[str, Path], studies: Studies) -> Iterator[dict[str, 
             low, high = number * step, (number + 1) * step
             found = {name: _pieces(parts, place, low, high) for name, parts in points.items()}
             if all(found.values()):
-                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, found)
+                yield from _rows({"along": along, "low_mm": low, "high_mm": high}, found, off)
 
 
 Part = tuple[str, Array, Array, Array]
@@ -115,13 +136,14 @@ def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[
     return pieces
 
 
-def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]]) -> Iterator[dict[str, Any]]:
-    """A row for each simulator in a bin; that of the nearest says by how much, and how sure that is."""
+def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Set[str]) -> Iterator[dict[str, Any]]:
+    """A row for each simulator in a bin; that of the nearest which is not ``off`` says by how much, and how sure."""
     mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
-    order = sorted(mean, key=lambda name: mean[name])
+    order = sorted(mean.keys() - off, key=lambda name: mean[name])
     for name in found:
         row = head | {"simulator": name, "rms_mm": float(np.sqrt(mean[name])), "frames": len(found[name])}
-        if name == order[0] and len(order) > 1:
+        row |= {"lead": TIPS_OFF} if name in off else {}
+        if len(order) > 1 and name == order[0]:
             row |= _lead(found[order[0]], found[order[1]])
         yield row
 

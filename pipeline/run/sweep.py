@@ -16,6 +16,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
 from reports import tables
 from reports.case_files import find_cases, read_json
+from reports.origin import mixed_settings
 from reports.schema import SWEEP
 
 PLAIN = "(plain)"
@@ -93,7 +94,13 @@ def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
 
 
 def write_sweep(out: Path, heads: Sequence[Head]) -> None:
-    """sweep.csv: the plain result first, then every point, each of them case by case and over all of them."""
+    """sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
+
+    There is none of cases that were run with different settings.
+    """
+    if mixed_settings(out):
+        (out / SWEEP.file).unlink(missing_ok=True)
+        return
     if not heads:
         return
     before = with_another(out, found_cases(out))

@@ -9,7 +9,6 @@ from pipeline.load import (
     Header,
     LoadError,
     Scans,
-    Source,
     each_volume,
     read_header,
     require_one,
@@ -28,6 +27,7 @@ from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.same_scans import repeated
 from pipeline.study.settings import Config
+from pipeline.study.sources import files_of
 
 NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
@@ -52,7 +52,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         except LoadError as error:
             problems.append(str(error))
 
-    for path in inputs_of(case):
+    for path in dict.fromkeys(files_of(case).values()):
         found(lambda path=path: _require_there(path))  # type: ignore[misc]
     problems += repeated(case)
     if problems:
@@ -143,13 +143,6 @@ def _others_problems(case: Case, count: int) -> list[str]:
     if not files or not case.simulated.files or not all(wrong):
         return []
     return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
-
-
-def inputs_of(case: Case) -> list[Path]:
-    """Every file or folder that a case names, once."""
-    values = [item for _, value in case for item in (value if isinstance(value, tuple) else (value,))]
-    paths = (item.path if isinstance(item, Source) else item for item in values)
-    return list(dict.fromkeys(path for path in paths if isinstance(path, Path)))
 
 
 def entry_problems(case: Case, scans: Scans) -> list[str]:

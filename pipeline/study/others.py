@@ -65,9 +65,9 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
     for text in texts:
         name, equals, place = text.partition("=") if "=" in text and not Path(text).exists() else ("", "", text)
         name = name if equals else Path(place).absolute().stem
-        if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name == "wireval":
+        if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
             raise InputError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
-        if name in found:
+        if name.lower() in map(str.lower, found):  # they name folders, which some disks do not tell apart
             raise InputError([f"--curves {text!r}: the name {name!r} is taken; write NAME={place}"])
         found[name] = Path(place)
     return found

@@ -42,14 +42,20 @@ class SettingsError(InputError):
 
 @dataclass(frozen=True)
 class Resolved:
-    """The settings in force and, by ``table.key``, where each one that is not the default came from."""
+    """The settings in force and, by ``table.key``, where each one that is not the default came from.
+
+    calibrated : hash and name of a file of parameters that was given for all cases.
+    """
 
     config: Config
     origin: dict[str, str]
+    calibrated: tuple[str, str] | None = None
 
     def as_dict(self) -> dict[str, dict[str, dict[str, Any]]]:
         """{table: {key: {"value", "source"}}}, as result.json holds it."""
-        return {
+        value, source = self.calibrated or ("", "")
+        given = {"calibrate": {"parameters": {"value": value, "source": source}}} if self.calibrated else {}
+        return given | {
             table: {
                 key: {"value": value, "source": self.origin.get(f"{table}.{key}", "default")}
                 for key, value in values.items()
@@ -125,27 +131,10 @@ def _applied(config: Config, setting: Setting) -> Config:
     return replace(config, **{table: replace(current, **{key: value})})
 
 
-def _said(value: Any) -> str:
-    return "as the manifest says" if value is None else str(value)
-
-
-def differing(path: Path, settings: Resolved) -> str:
-    """Which settings a run before had otherwise, by its config.resolved.toml; empty where none, or without the file."""
-    try:
-        before = resolve(read_settings(path)).config if path.exists() else settings.config
-    except SettingsError as error:
-        return str(error)
-    old, new = asdict(before), asdict(settings.config)
-    names = [(table, key) for table in new for key in new[table] if old[table][key] != new[table][key]]
-    return ", ".join(
-        f"{table}.{key} {_said(old[table][key])} before, {_said(new[table][key])} now" for table, key in names
-    )
-
-
 def to_toml(resolved: Resolved) -> str:
     """config.resolved.toml: every setting with a comment saying where it came from; reads back through -c."""
-    lines: list[str] = []
-    for table, items in resolved.as_dict().items():
+    lines = [f"# --parameters {resolved.calibrated[1]}", ""] if resolved.calibrated else []
+    for table, items in replace(resolved, calibrated=None).as_dict().items():
         lines += [f"[{table}]", *(_line(key, item) for key, item in items.items()), ""]
     return "\n".join(lines)
 

@@ -108,3 +108,15 @@ class Strict(BaseModel):
     """Unknown keys are errors; values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def files_of(table: Strict, within: str = "") -> dict[str, Path]:
+    """Every file or folder that a table names, by its key, with its place where that is a list: ``frames[3]``."""
+    found = {}
+    for key, value in table:
+        named = {f"{key}[{n}]": item for n, item in enumerate(value)} if isinstance(value, tuple) else {key: value}
+        for name, item in named.items():
+            path = item.path if isinstance(item, Source) else item
+            if isinstance(path, Path):
+                found[within + name] = path
+    return found

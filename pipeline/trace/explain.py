@@ -168,7 +168,7 @@ def _no_wire(image: Subtraction) -> Curve:
     do = "check entry_mm and that the frame shows a wire"
     if _traces_of_wire(image):
         status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
-        do = "give the curve of the frame before, check entry_mm, or scan with more dose"
+        do = f"{do}; give the curve of the frame before, or scan with more dose"
     got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
     return Curve(
         np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
@@ -236,8 +236,8 @@ def _faint_for_its_noise(curve: Curve) -> Curve:
     seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
     if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
         return curve
-    got = f"a wire {seen:.1f} noises bright, noise counted as it is correlated"
-    do = "scan with more dose or a smoother reconstruction kernel"
+    got = f"a line {seen:.1f} noises bright, noise counted as it is correlated"
+    do = "check that the frame shows a wire; scan with more dose or a smoother reconstruction kernel"
     note = note_of(got, f"{LEAST_SEEN} at least", do)
     return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
 

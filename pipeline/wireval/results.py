@@ -8,6 +8,7 @@ import pandas as pd
 from pipeline.status import InputError
 from reports import tables
 from reports.case_files import CaseFiles, find_cases, read_case
+from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
@@ -32,8 +33,8 @@ class Results:
 
     @property
     def ok(self) -> bool:
-        """Whether there is a case, and all frames of all cases are ok."""
-        return bool(len(self.summary)) and len(self.failures) == 0
+        """Whether there is a case, all frames of all cases are ok, and all were run with the same settings."""
+        return bool(len(self.summary)) and len(self.failures) == 0 and not mixed_settings(self.out)
 
     @property
     def points(self) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
+from reports.verdict import TIPS_OFF
 
 OURS = "wireval"
 _FAINT = 0.3  # of a lead that is not clear
@@ -20,6 +21,11 @@ class SimulatorFiles:
 
     simulators: pd.DataFrame
     where: pd.DataFrame
+
+
+def leads(where: pd.DataFrame) -> pd.DataFrame:
+    """Of where.csv the rows of who is nearest."""
+    return where[where["lead"].notna() & (where["lead"] != TIPS_OFF)]
 
 
 def colours(names: "pd.Series[str]") -> dict[str, str]:
@@ -55,7 +61,7 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
 
 def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:
     """A strip with the colour of the nearest in each bin; white where several are as near."""
-    for row in rows[rows["lead"].notna() & (rows["lead"] != "tie")].to_dict("records"):
+    for row in leads(rows).query("lead != 'tie'").to_dict("records"):
         alpha = 1.0 if row["lead"] == "clear" else _FAINT
         span = row["low_mm"], row["high_mm"]
         axes.axvspan(*span, color=shown[row["simulator"]], alpha=alpha, linewidth=0)

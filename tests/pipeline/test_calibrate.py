@@ -294,7 +294,11 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     found = read_parameters(study / "out" / "parameters.toml")
     assert [used.case for used in found.used] == ["a"]
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
-    assert "UNIDENTIFIABLE" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "UNIDENTIFIABLE" in said
+    assert "calibrated with a: 0 of 6 parameters seen.  parameters: " in said.splitlines()[-1]
+    for one in found.estimate:
+        assert f"{one.name:20s} {one.used:10g}  +-" in said, "the number that runs take, not one of another fit"
     page = (study / "out" / "calibration.html").read_text(encoding="utf-8")
     assert "not seen" in page
     lines = (study / "out" / "figures" / "profiles.csv").read_text(encoding="utf-8").splitlines()

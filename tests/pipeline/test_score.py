@@ -20,6 +20,7 @@ from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
 from pipeline.model import arc_length
 from pipeline.simulate.others import begun, not_to_depth, oddity
+from pipeline.status import InputError
 from pipeline.study.others import named
 from reports.export import write_markups_curve, write_polyline_vtp
 from tests.pipeline.known_study import FRAMES, PEERS, QUICK, Known, errors_of, peers, run_known, simulated, write_csv
@@ -284,6 +285,12 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     ):
         assert main(["score", str(known[0]), "--curves", str(curves), "-o", str(tmp_path / out), *QUICK]) == 2
         assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("names", [("sofa", "SOFA"), ("Wireval",)])
+def test_names_that_a_disk_may_not_tell_apart_are_refused(names: tuple[str, ...]) -> None:
+    with pytest.raises(InputError, match=r"is taken|not 'wireval'"):
+        named([f"{name}=there" for name in names])
 
 
 def script(name: str) -> str:

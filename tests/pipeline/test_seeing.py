@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.model import Volume
 from pipeline.segment import segment
+from pipeline.status import FrameStatus
 from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
@@ -68,6 +69,9 @@ def test_what_can_be_seen_is_traced(case, seed):
 def test_what_cannot_be_told_is_refused(case, seed, status):
     row = look(case, seed)
     assert row.status == status, row.text
+    if case.startswith("no wire"):
+        assert "the frame shows none" in FrameStatus[status].value, "in noise something thin is always found"
+        assert "check that the frame shows a wire" in row.text
 
 
 @pytest.mark.parametrize("seed", [0, 5])

@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.run.simulators import write_comparison
+from pipeline.cli import main
+from pipeline.run.simulators import side_by_side, write_comparison
 from reports import tables
 from reports.schema import ERRORS, POINTS, SUMMARY
 from reports.simulators import render_simulators
@@ -22,7 +23,7 @@ Law = Callable[[Array, Array, np.random.Generator], Array]
 CASES, DEPTHS = 6, (20.0, 30.0, 40.0, 50.0)
 
 
-def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) -> Path:
+def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = (), tip_mm: float = 0.0) -> Path:
     """An output of a run: six insertions of four frames. failed : (case, frame) of frames without a result."""
     for c in range(CASES):
         rng, folder = np.random.default_rng([c, len(out.name)]), out / "cases" / f"c{c}"
@@ -33,7 +34,11 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) ->
             error = law(depth - arc, np.full(len(arc), depth), rng) * (1 + 0.1 * c)
             bad = (c, f) in failed
             row = {"frame": f, "status": "curve_missing" if bad else "ok", "insertion_mm": depth}
-            rows.append(row | {} if bad else row | {"rms_mm": np.sqrt(np.mean(error**2)), "p95_mm": error.max()})
+            rows.append(
+                row | {}
+                if bad
+                else row | {"rms_mm": np.sqrt(np.mean(error**2)), "p95_mm": error.max(), "tip_mm": tip_mm}
+            )
             if not bad:
                 parts.append(pd.DataFrame({"frame": f, "arc_mm": arc, "error_mm": error}))
         tables.write(folder / ERRORS.file, ERRORS, rows)
@@ -41,6 +46,7 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) ->
         good = sum(row["status"] == "ok" for row in rows)
         status = "ok" if good == len(rows) else "curve_missing"
         summary = {"case": f"c{c}", "frames": len(rows), "frames_ok": good, "frames_failed": len(rows) - good}
+        bad_rows = [row for row in rows if row["status"] != "ok"]
         said = [{"frame": r["frame"], "status": r["status"], "sentence": "", "message": ""} for r in rows]
         whole = {
             "case": f"c{c}",
@@ -50,7 +56,11 @@ def write_tree(out: Path, law: Law, failed: tuple[tuple[int, int], ...] = ()) ->
             "sentence": "",
             "frames": said,
         }
-        whole |= {"failures": [], "summary": summary | {"status": status}}
+        lost = [
+            {"case": f"c{c}", "frame": r["frame"], "status": r["status"], "sentence": "", "message": ""}
+            for r in bad_rows
+        ]
+        whole |= {"failures": lost, "summary": summary | {"status": status}}
         (folder / "result.json").write_text(json.dumps(whole), encoding="utf-8")
     return out
 
@@ -105,6 +115,49 @@ def test_who_is_nearest_where(compared: Path) -> None:
     assert list(depth.query("low_mm == 50")["frames"]) == [CASES - 2] * 3, "frames that count for all"
 
 
+def test_who_has_its_tips_off_is_nearest_nowhere(tmp_path: Path) -> None:
+    """A wire that ends 8 mm short lies near the traced one all along, and used to win every bin."""
+    short = write_tree(tmp_path, even(0.1), tip_mm=8.0)
+    others = {name: tmp_path / "simulators" / name for name in ("fair", "wireval")}
+    folders = {"short": short} | {n: write_tree(f, even(0.2 + 0.1 * (n == "fair"))) for n, f in others.items()}
+    said = side_by_side(tmp_path, folders, embed=False)
+    where = pd.read_csv(tmp_path / "where.csv")
+    assert set(where.query("simulator == 'short'")["lead"]) == {"the tips lie off"}
+    assert set(where.query("lead == 'clear'")["simulator"]) == {"wireval"}
+    page = (tmp_path / "simulators.html").read_text(encoding="utf-8")
+    assert "Never the nearest, since their tips lie off" in page
+    assert said[-1] == f"score of short, fair, wireval.  side by side: {tmp_path / 'simulators.html'}"
+
+
+def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """simulators/failures.csv stayed as it was, and the root's failures were the first simulator's alone."""
+    good, bad = write_tree(tmp_path, even(0.2)), write_tree(tmp_path / "simulators" / "bad", even(0.3), ((1, 2),))
+    side_by_side(tmp_path, {"good": good, "bad": bad}, embed=False)
+    tables_of = [tmp_path / n for n in ("failures.csv", "simulators/failures.csv", "simulators.csv", "where.csv")]
+    before = [path.read_bytes() for path in tables_of]
+    for path in [*tables_of[:2], tables_of[3], tmp_path / "simulators.html", tmp_path / "index.html"]:
+        path.unlink()
+    assert main(["report", str(tmp_path), "--overview"]) == 1, "as score did"
+    assert [path.read_bytes() for path in tables_of] == before
+    (row,) = pd.read_csv(tmp_path / "failures.csv").to_dict("records")
+    assert (row["simulator"], row["case"], row["frame"]) == ("bad", "c1", 2)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "Failures (1)" in page
+    assert "bad: c1" in page
+    assert "side by side" in capsys.readouterr().out
+
+
+def test_simulators_of_different_settings_are_not_compared(tmp_path: Path) -> None:
+    one, other = write_tree(tmp_path, even(0.2)), write_tree(tmp_path / "simulators" / "other", even(0.3))
+    for folder, step in ((one, 1.0), (other, 0.5)):
+        for path in folder.glob("cases/*/result.json"):
+            config = {"config": {"solver": {"step_mm": {"value": step, "source": "default"}}}}
+            path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | config), encoding="utf-8")
+    said = side_by_side(tmp_path, {"one": one, "other": other}, embed=False)
+    assert "Nothing is pooled" in said[0]
+    assert pd.read_csv(tmp_path / "simulators.csv")["against"].isna().all()
+
+
 def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:
     both = {name: write_tree(tmp_path / name, even(0.2)) for name in ("wireval", "another")}
     said = write_comparison(tmp_path, both)
@@ -123,7 +176,9 @@ def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -
     """`score` writes the first simulator beside the page; a warning that our wires get, too, is none of another's."""
     for name, skill in (("tip", 0.5), ("worse", -1.0), ("wireval", 0.4)):
         (compared / "simulators").mkdir(exist_ok=True)
-        folder = (compared / name).rename(compared / "simulators" / name)
+        folder = (compared / name).rename(compared / "simulators" / name) if name != "tip" else compared
+        if name == "tip":
+            (compared / "tip" / "cases").rename(compared / "cases")
         row = {"frames_failed": 0, "rms_mm": 0.3, "skill_strongest": skill, "strongest_null": "previous"}
         tables.write(folder / "overall.csv", SUMMARY, [row])
         path = folder / "cases" / "c0" / "result.json"

@@ -212,7 +212,10 @@ def _write_case(folder: Path, case: FakeCase, rows: list[dict[str, Any]], statis
         "chosen": {"segment_mm": "0.5: half as long ones lie within 0.03 mm"},
         "wall": {"stiffness_N_mm2": 2.0, "friction": 0.0},
         "geometry": {"shape": list(SHAPE), "spacing_mm": SPACING.tolist(), "origin_mm": ORIGIN.tolist()},
-        "inputs": [{"path": f"frames/{i:03d}.mha", "sha256": f"{i:02x}" * 32, "bytes": 33554432} for i in range(30)],
+        "inputs": [
+            {"key": f"frames[{i}]", "path": f"frames/{i:03d}.mha", "sha256": f"{i:02x}" * 32, "bytes": 33554432}
+            for i in range(30)
+        ],
         "counters": {"segment": {"voxels_visited": 81234, "voxels_total": 16777216}, "simulate": {"skipped": 1200}},
         "config": _config(),
         "provenance": _provenance(),

@@ -41,7 +41,7 @@ SUMMARY_HEADER = (
     "energy_score_mm"
 )
 TIMINGS_HEADER = "case,frame,load_s,segment_s,trace_s,clamp_s,simulate_s,compare_s,total_s,peak_memory_MiB"
-FAILURES_HEADER = "case,frame,stage,status,sentence,message,log"
+FAILURES_HEADER = "case,frame,stage,status,sentence,message,log,simulator"
 
 
 def _header(path: Path) -> str:

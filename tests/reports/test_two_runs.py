@@ -59,20 +59,41 @@ def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[
 
 
 def test_what_differs_is_said_first(first: Path, second: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = json.loads((second / "run.json").read_text(encoding="utf-8"))
-    table, key = next((table, key) for table, items in run["config"].items() for key in items)
-    run["config"][table][key] = {"value": "another", "source": "command line"}
-    run["provenance"]["git_commit"] = "0123abc"
-    (second / "run.json").write_text(json.dumps(run), encoding="utf-8")
-    path = second / "cases" / "a" / "result.json"
-    result = json.loads(path.read_text(encoding="utf-8"))
-    result["inputs"] = [{"path": "x/frame_000.mha", "sha256": "f" * 64, "bytes": 1}]
-    path.write_text(json.dumps(result), encoding="utf-8")
+    for name in GROUPS:
+        path = second / "cases" / name / "result.json"
+        result = json.loads(path.read_text(encoding="utf-8"))
+        table, key = next((table, key) for table, items in result["config"].items() for key in items)
+        result["config"][table][key] = {"value": "another", "source": "command line"}
+        result["provenance"]["git_commit"] = "0123abc"
+        result["inputs"][4 * (name == "a")]["sha256"] = "f" * 64
+        path.write_text(json.dumps(result), encoding="utf-8")
     assert main(["diff", str(first), str(second)]) == 0, "another commit alone is no regression"
     said = capsys.readouterr().out
     assert said.splitlines()[0] == "What differs between the runs:"
-    for what in (f"{table}.{key}", "0123abc", "input of a: frame_000.mha"):
+    for what in (f"{table}.{key}", "0123abc", "input of a: frames[4]", "input of b, c: frames[0]"):
         assert what in said
+
+
+def test_the_verdict_follows_what_differs_and_ends_the_text(
+    first: Path, second: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for frame, off in ((1, 1.0), (2, 3.0)):
+        path = second / "cases" / "b" / ERRORS.file
+        rows = tables.read(path, ERRORS)
+        rows.loc[frame, "tip_mm"] += off
+        tables.write(path, ERRORS, rows)
+    path = second / "cases" / "b" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result["provenance"]["git_commit"] = "0123abc"
+    path.write_text(json.dumps(result), encoding="utf-8")
+    assert main(["diff", str(first), str(second)]) == 1
+    said = capsys.readouterr().out
+    assert "in a, c; 0123abc in b" in said, "who was run with what"
+    heads = ["What differs between the runs:", "Verdict: WORSE.", "What became worse:", "Frame by frame:"]
+    places = [said.index(head) for head in heads]
+    assert places == sorted(places)
+    assert said.splitlines()[-1].startswith("WORSE: 3 cases compared: 2 regressions; the worst: case b frame 2, tip_mm")
+    assert said.endswith("exit 1, the gate closes\n")
 
 
 def test_small_changes_of_every_frame_close_the_gate_over_all(first: Path, second: Path, tmp_path: Path) -> None:

@@ -1,0 +1,68 @@
+"""Before a run writes into a folder: what lies there, and whether the new results may stand beside it."""
+
+import json
+from collections.abc import Container, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from pipeline.run.launch import UsageError
+from pipeline.run.log import STAGES, Stage
+from pipeline.run.results import jsonable
+from pipeline.run.store import file_hash
+from pipeline.study.settings import Resolved
+from reports.case_files import find_cases, read_json
+from reports.origin import ABSENT, settings_of
+
+
+def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
+    """Refuse an output folder that holds something else than a run of the same manifest with the same settings."""
+    if (out / "simulators").is_dir():
+        raise UsageError([f"-o {out}: it holds a score of other simulators' wires; name another folder"])
+    allowed = "say --resume (keep what fits) or --fresh (compute again)"
+    # a run that ended before its first file was whole leaves nothing but that file's temporary name
+    if not out.exists() or all(path.name.startswith(".") for path in out.iterdir()):
+        return
+    infos, wanted = sorted(out.glob("run*.json")), file_hash(manifest)
+    for info in infos:
+        try:
+            known = json.loads(info.read_text(encoding="utf-8")).get("manifest_sha256")
+        except (ValueError, AttributeError):
+            raise UsageError([f"{info} is damaged; {allowed}"]) from None
+        if known != wanted:
+            raise UsageError([f"{out} was made from another manifest; name another folder, or {allowed}"])
+    if not infos and not (out / "manifest.inferred.toml").exists():
+        raise UsageError([f"{out} is not empty and holds no run; name another folder, or {allowed}"])
+    others = next(filter(None, (_changed(read_json(info), settings) for info in infos)), "")
+    if others:
+        raise UsageError([f"{out} was run with other settings: {others}; name another folder, or {allowed}"])
+
+
+def guard_kept(out: Path, others: Container[str], settings: Resolved) -> None:
+    """Refuse settings that cases which this run leaves as they are do not have: one folder's cases are pooled.
+
+    others : ids of the manifest's other cases.
+    """
+    with suppress(ValueError):  # what cannot be read is pooled with nothing
+        for folder in find_cases(out):
+            changed = folder.name in others and _changed(read_json(folder / "result.json"), settings)
+            if changed:
+                what = f"{out}: case {folder.name!r} would keep its result of other settings: {changed}"
+                raise UsageError([f"{what}; run all cases (no --only, no --shard), or name another folder"])
+
+
+def _changed(known: Mapping[str, Any], settings: Resolved) -> str:
+    """What is set otherwise than in a run.json or result.json, where that says anything."""
+    old, new = settings_of(known), settings_of({"config": jsonable(settings.as_dict())})
+    pairs = {name: (old.get(name, ABSENT), new.get(name, ABSENT)) for name in dict.fromkeys([*old, *new]) if old}
+    return ", ".join(f"{name} {before} before, {now} now" for name, (before, now) in pairs.items() if before != now)
+
+
+def guard_stages(out: Path, until: Stage) -> None:
+    """Refuse to put results of fewer stages in the place of finished ones."""
+    with suppress(ValueError):  # a damaged file is for guard_out to say
+        ends = [read_json(path).get("until", STAGES[-1]) for path in out.glob("run*.json")]
+        later = [end for end in ends if end in STAGES and STAGES.index(end) > STAGES.index(until)]
+        if later and any(out.glob("cases/*/result.json")):
+            lost = f"{out} was run until {later[0]}, and --until {until} would take that away"
+            raise UsageError([f"{lost}; name another folder, or say --fresh (compute again)"])

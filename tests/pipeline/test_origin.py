@@ -1,0 +1,136 @@
+"""Where results come from: what was not the same in two runs is named; cases of different settings are not pooled."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import wireval
+from pipeline.cli import main
+from reports.origin import mixed_settings, what_differs
+from tests.pipeline.test_calibrate import PARAMETERS
+
+QUICK = ("--until", "load", "-q")
+FINE = ("--set", "solver.step_mm=0.5")
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """Two cases of the same scans, whose frames all have the same base name."""
+    folder = tmp_path / "study"
+    assert main(["synth", "straight", "-o", str(folder), "--size", "72", "--frames", "2"]) == 0
+    for number, path in enumerate(sorted((folder / "frames").iterdir())):
+        (folder / f"depth_{number}").mkdir()
+        path.rename(folder / f"depth_{number}" / "recon.mha")
+    text = (folder / "manifest.toml").read_text(encoding="utf-8")
+    text = text.replace('"frames/*.mha"', '["depth_0/recon.mha", "depth_1/recon.mha"]').replace('"straight"', '"a"')
+    case = text[text.index("[[case]]") :].replace('id = "a"', 'id = "b"')
+    (folder / "manifest.toml").write_text(f"{text}\n{case}", encoding="utf-8")
+    return folder
+
+
+def run(study: Path, out: Path, *more: str) -> int:
+    return main(["run", str(study), "-o", str(out), *QUICK, *more])
+
+
+def differing(study: Path, tmp_path: Path, *more: str) -> set[str]:
+    """What differs from the run of before, by name."""
+    run(study, tmp_path / "after", *more)
+    return {row["what"] for row in what_differs(tmp_path / "before", tmp_path / "after")}
+
+
+def test_every_input_of_a_run_is_held_against_the_other_s(study: Path, tmp_path: Path) -> None:
+    """A truth was never named, of frames of one base name the last alone."""
+    run(study, tmp_path / "before")
+    assert differing(study, tmp_path) == set()
+    frame = study / "depth_0" / "recon.mha"
+    frame.write_bytes(frame.read_bytes()[:-1] + b"\1")
+    truth = study / "truth.json"
+    truth.write_text(truth.read_text(encoding="utf-8") + " ", encoding="utf-8")
+    assert differing(study, tmp_path) == {"input of a, b: frames[0]", "input of a, b: truth"}
+
+
+def test_given_parameters_are_told_by_their_content(study: Path, tmp_path: Path) -> None:
+    file = tmp_path / "p.toml"
+    manifest = (study / "manifest.toml").read_text(encoding="utf-8")
+    wire = manifest.partition("[wires.")[2].partition("]")[0]
+    text = PARAMETERS.replace('wire = "w"', f'wire = "{wire}"').partition("[stated]")[0]
+    file.write_text(text, encoding="utf-8")
+    run(study, tmp_path / "before", "--parameters", str(file))
+    assert differing(study, tmp_path, "--parameters", str(shutil.copy(file, tmp_path / "q.toml"))) == set()
+    file.write_text(f"{text}\n# found again\n", encoding="utf-8")
+    assert run(study, tmp_path / "after", "--parameters", str(file)) == 2, "it has other results"
+    assert differing(study, tmp_path, "--parameters", str(file), "--resume") == {"calibrate.parameters"}
+
+
+def test_a_part_of_the_cases_is_not_run_with_other_settings(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    run(study, out)
+    for words in (("--resume",), ("--fresh",)):
+        for part in (("--only", "a"), ("--shard", "1/2")):
+            capsys.readouterr()
+            assert run(study, out, *FINE, *words, *part) == 2
+            said = capsys.readouterr().err
+            assert "case 'b' would keep its result of other settings: solver.step_mm 1.0 before, 0.5 now" in said
+    assert run(study, out, "--resume", "--only", "a") != 2
+    assert run(study, out, *FINE, "--resume") != 2, "all of them"
+
+
+def test_shards_of_different_settings_are_not_pooled(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, words = tmp_path / "out", (str(tmp_path / "out"), "--overview")
+    for shard, settings in (("1/2", ()), ("2/2", FINE)):
+        main(
+            ["run", str(study), "-o", str(tmp_path / shard[0]), "--until", "compare", "-q", "--shard", shard, *settings]
+        )
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    capsys.readouterr()
+    assert main(["report", *words, "--pdf"]) == 1
+    said = "Nothing is pooled: the cases were run with different settings (solver.step_mm 1.0 in a; 0.5 in b)"
+    assert said in capsys.readouterr().out
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert said in page
+    assert "settings differ" in page
+    assert pd.read_csv(out / "overall.csv").empty
+    assert not wireval.read_results(out).ok
+    main(["run", str(study), "-o", str(tmp_path / "3"), "--until", "compare", "-q", "--shard", "1/2", *FINE])
+    shutil.copytree(tmp_path / "3", out, dirs_exist_ok=True)
+    assert main(["report", *words]) == 0
+    assert mixed_settings(out) == ""
+    assert len(pd.read_csv(out / "overall.csv")) == 1
+
+
+def test_shards_that_ended_at_different_stages_are_not_pooled(study: Path, tmp_path: Path) -> None:
+    """They were two cases that are ok, with the error of one."""
+    out = tmp_path / "out"
+    for shard, until in (("1/2", "simulate"), ("2/2", "compare")):
+        words = ["run", str(study), "-o", str(tmp_path / shard[0]), "-q", "--shard", shard]
+        assert main([*words, "--until", until]) == 0
+        shutil.copytree(tmp_path / shard[0], out, dirs_exist_ok=True)
+    assert main(["report", str(out), "--overview"]) == 1
+    assert "(--until simulate in a; compare in b)" in mixed_settings(out)
+
+
+def test_a_shard_that_was_not_merged_is_missed(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Half of a study was "1 case: ok", exit 0."""
+    run(study, tmp_path / "out", "--shard", "1/2")
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 1
+    assert "named by the manifest and without a result here: b" in capsys.readouterr().err
+    assert "without a result here: b" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    run(study, tmp_path / "out", "--shard", "2/2")
+    assert main(["report", str(tmp_path / "out"), "--overview"]) == 0
+
+
+def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_path: Path) -> None:
+    run(study, tmp_path / "out")
+    path = tmp_path / "out" / "cases" / "a" / "result.json"
+    path.write_text(json.dumps([1]), encoding="utf-8")
+    assert mixed_settings(tmp_path / "out") == ""
