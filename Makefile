@@ -44,10 +44,11 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# the wheel as a user gets it: built, installed where nothing is, outside the checkout, and run there
+# the wheel as a user gets it: built (what an earlier one left in build would go into it), installed where nothing is,
+# outside the checkout, and run there
 AWAY = $(abspath $(OUT))/package
 package: setup
-	rm -rf $(AWAY) && mkdir -p $(AWAY)/wheel
+	rm -rf $(AWAY) build && mkdir -p $(AWAY)/wheel
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir $(AWAY)/wheel .
 	$(PYTHON) -m venv $(AWAY)/venv
 	$(AWAY)/venv/bin/python -m pip install --quiet --disable-pip-version-check $(AWAY)/wheel/*.whl
