@@ -120,8 +120,12 @@ def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
 
 
 def _told_problems(case: Case, count: int) -> list[str]:
-    """What is wrong with the truth, the projections and another simulator's wires."""
+    """What is wrong with the roll, the truth, the projections and another simulator's wires."""
     problems = []
+    seen = count if case.frames or case.traces else 0
+    if case.roll_deg == "fit" and case.role == "validation" and seen < 2:
+        said = "the first one is what it is fitted on, and is not scored; give a number, or two frames or more"
+        problems.append(f'roll_deg = "fit" with frames: {seen}; {said}')
     for told, read in ((case.truth, read_truth), (case.projections, read_views)):
         try:
             _read(None if told is None else read(told, count))

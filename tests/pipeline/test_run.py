@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -702,3 +703,21 @@ def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, stud
     )
     assert any("blind to this case's scans" in line for line in borrowed["assumptions"])
     np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])
+
+
+def test_a_roll_is_fitted_where_frames_are_left_to_score(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # one frame: it ended as "0 frames: 0 ok", exit 0
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    manifest, frame = folder / "manifest.toml", sorted((folder / "frames").iterdir())[0]
+    text = re.sub(
+        r"^(roll_deg|insertion_mm|truth) = .*\n", "", manifest.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    text = text.replace("frames/*.mha", f"frames/{frame.name}").replace("[[case]]", '[[case]]\nroll_deg = "fit"')
+    manifest.write_text(text, encoding="utf-8")
+    assert main(["check", str(folder)]) == 2
+    assert 'roll_deg = "fit" with frames: 1' in capsys.readouterr().err
+    manifest.write_text(text.replace('role = "validation"', 'role = "calibration"'), encoding="utf-8")
+    assert main(["check", str(folder)]) == 0
