@@ -101,7 +101,7 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            named = f" {statistics.get(entry['name'], '')}" if entry.get("name") else ""
+            named = " " + str(statistics.get(entry["name"], "")).replace("_", " ") if entry.get("name") else ""
             shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
 

@@ -130,7 +130,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
         if len(failures) > _MOST_FAILURES:
             page.text(f"… and {len(failures) - _MOST_FAILURES} more in failures.csv")
         command = next_command(failures["case"], typed(out_dir))
-        page.text(f"Next: do what the message says, then {command}", weight="bold")
+        page.text(f"Next: do what the message says, then {command}", width=_WIDE * 9 // 10, weight="bold")
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         page.text(f"{tile['value']}  {tile['label']}")
     results = results_in(out_dir)

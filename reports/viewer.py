@@ -31,7 +31,7 @@ _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 
 
 def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
-    """The JSON of the viewer; None where no frame has a curve or a picture."""
+    """The JSON of the viewer; None where no frame has a wire that was traced or simulated, or a picture."""
     rows = case.errors.set_index("frame")
     arrays = [case.read_frame(case.frames[place]) for place in thinned(len(case.frames), _MAX_FRAMES)]
     if not arrays:
@@ -42,7 +42,8 @@ def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
         _frame(a, rows.loc[a.frame] if a.frame in rows.index else {}, shrink) | {"straight": one}
         for a, one in zip(arrays, straight, strict=True)
     ]
-    if not any(frame["curves"] or frame["pictures"] for frame in frames):
+    # a true wire alone, as of a case whose lumen was not found, is nothing of this study's
+    if not any(frame["curves"].keys() - {"true"} or frame["pictures"] for frame in frames):
         return None
     worst = [frame["p95_mm"] if frame["status"] == "ok" else None for frame in frames]
     start = max(range(len(frames)), key=lambda i: (worst[i] is not None, worst[i] or 0.0, i))

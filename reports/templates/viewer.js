@@ -267,7 +267,7 @@
   const straight = () => {
     const { pen, width, height } = cleared($("straight"), paper ? "#ffffff" : css("--card")), f = frame(), ink = paper ? "#000000" : css("--ink"), line = paper ? "#bbbbbb" : css("--line");
     pen.font = "12px system-ui, sans-serif"; pen.fillStyle = ink;
-    if (!f.offsets) { pen.textAlign = "left"; pen.fillText("No traced wire in this frame: nothing to measure offsets from.", 12, 28); return; }
+    if (!f.offsets) { pen.textAlign = "left"; ["No traced wire in this frame:", "nothing to measure offsets from."].forEach((text, i) => pen.fillText(text, 12, 28 + 17 * i)); return; }
     const { from, length, px, X } = seen(f, width), most = Number($("range").value); // the same in all frames
     const beyond = (f.offsets.simulated ?? []).some((o) => o[0] >= from && o[0] <= from + length && Math.max(Math.abs(o[1]), Math.abs(o[2])) > most);
     const high = (STRIP / 2 - 4) / most;
