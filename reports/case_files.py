@@ -55,15 +55,16 @@ class CaseFiles:
         return frames_file.read_frame(self.folder / "frames.h5", frame)
 
 
-def read_case(folder: Path, points: bool = True) -> CaseFiles:
+def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles:
     """Read a case's folder; raises ValueError, naming the file, where one is damaged.
 
-    points : False leaves points.csv.gz unread, by far the largest table, where a page of the run needs none.
+    points, rest : False leaves points.csv.gz unread, by far the largest table; or the times and the scan's geometry.
+    The page of a run needs neither.
     """
     errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
     samples = tables.read_if_there(folder / POINTS.file if points else None, POINTS)
-    timings = tables.read_if_there(folder / TIMINGS.file, TIMINGS)
-    scan, numbers = _frames(folder / "frames.h5")
+    timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
+    scan, numbers = _frames(folder / "frames.h5", rest)
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
@@ -186,11 +187,11 @@ def thinned(count: int, most: int) -> NDArray[np.int_]:
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
 
 
-def _frames(path: Path) -> tuple[ScanCrop | None, tuple[int, ...]]:
+def _frames(path: Path, scan: bool) -> tuple[ScanCrop | None, tuple[int, ...]]:
     if not path.exists():
         return None, ()
     try:
-        return frames_file.read_scan(path), frames_file.frame_numbers(path)
+        return frames_file.read_scan(path) if scan else None, frames_file.frame_numbers(path)
     except OSError as error:
         raise ValueError(
             f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"

@@ -150,6 +150,15 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         return FrameArrays(frame, mips=_read_pictures(group, "mip"), straightened=_read_straightened(group), **arrays)
 
 
+def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:
+    """Of every frame these fields of ``FrameArrays`` alone, where it has them."""
+    with h5py.File(path, "r") as file:
+        return {
+            int(number): {name: np.array(group[name], float) for name in names if name in group}
+            for number, group in file.get("frames", {}).items()
+        }
+
+
 def _read_straightened(group: Any) -> Straightened | None:
     if "straightened" not in group:
         return None

@@ -246,7 +246,7 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     cases, broken = [], []
     for folder in find_cases(out_dir):
         try:
-            cases.append(read_case(folder, points=False))
+            cases.append(read_case(folder, points=False, rest=False))
         except ValueError as error:
             row = dict.fromkeys((*FAILURES.names, "link"), "") | {"case": folder.name, "stage": "report"}
             row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": str(error)}
