@@ -48,7 +48,7 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
     # a colour bar of readable size at the top, however tall the figure is
     share = min(1.0, _BAR_INCH / figure.get_figheight())
     bar: Look = {"shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
-    look: Look = {"edgecolors": "white", "linewidth": 0.4}
+    look: Look = {"edgecolors": "white", "linewidth": 0.4 if len(cases) <= _MAX_NAMES else 0.0}
     heat_map(axes, grid, edges, "95th percentile, mm", error_scale(), bar, **look)
     axes.plot(frames[failed], rows[failed], "x", color=BAD, markersize=5)
     axes.set_xlabel("frame")
@@ -73,7 +73,7 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
     axes.plot(table[column], places, marker, color=colour, fillstyle="none", label=label)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
-    legend(axes, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    legend(figure, *axes.get_legend_handles_labels(), ncols=3, loc="outside upper right")
     plain(axes)
     return Drawing(figure, table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column]])
 
