@@ -29,6 +29,7 @@ Array = NDArray[np.floating[Any]]
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
 LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
+_ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
@@ -154,7 +155,8 @@ def heat_map(
     extend = "both" if logarithmic else "max"
     shown = figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)
     if logarithmic:
-        plain_decades(shown.ax.yaxis)
+        shown.set_ticks(_ERROR_TICKS_MM, labels=[f"{mm:g}" for mm in _ERROR_TICKS_MM])
+        shown.ax.minorticks_off()
     axes.set_facecolor("0.93")
     plain(axes)
     axes.grid(visible=False)
