@@ -80,7 +80,9 @@ def read(path: Path, table: Table) -> pd.DataFrame:
     kept: Any = {"keep_default_na": False, "na_values": [""]}
     try:
         raw = pd.read_csv(path, dtype=defaultdict(lambda: _DTYPES["text"], kinds), **kept)
-        raw = raw.assign(**{c.name: raw[c.name].map(_own_text) for c in table if c.kind == "text" and c.name in raw})
+        texts = [c.name for c in table if c.kind == "text" and c.name in raw]
+        if texts and (path.suffix == ".gz" or b"'" in path.read_bytes()):  # few tables have any
+            raw = raw.assign(**{name: raw[name].map(_own_text) for name in texts})
         return _conform(raw, table)
     except (ValueError, TypeError) as error:
         raise ValueError(
