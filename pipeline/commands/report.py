@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 if all cases are ok, 1 if some failed or have not been run, 2 if there are none."""
+    """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out), 2 if there are none."""
     from pipeline.run.aggregate import aggregate
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.case_files import left_over_sentence, not_run_sentence
+    from reports.case_files import left_out_sentence, left_over_sentence, not_run_sentence
     from reports.html import render_index
     from reports.inside import links_out
 
@@ -56,7 +56,7 @@ def main(args: argparse.Namespace) -> int:
 
         say(f"summary: {write_pdf(args.out)}")
     missing = not_run_sentence(args.out)
-    for aside in filter(None, (left_over_sentence(args.out), missing)):
+    for aside in filter(None, (left_over_sentence(args.out), left_out_sentence(args.out), missing)):
         sys.stderr.write(f"{aside}\n")
     say(last_line(totals, page))
     return 0 if totals.all_ok and others_ok and drawn and not missing else 1
