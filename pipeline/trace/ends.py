@@ -48,12 +48,16 @@ def _at_edge(image: Subtraction, point: Array) -> bool:
     return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
 
 
-def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float]:
-    """How much further back and on (mm) a wire may end whose brightness has steps, or in correlated noise."""
-    tube = attempt.tube
-    if not len(tube.steps.edges) and not image.correlated:
-        return 0.0, 0.0
-    return end_range(image, tube)
+def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, float]:
+    """How much further back and on a wire may end whose brightness has steps, or in correlated noise; and may at most.
+
+    All in mm.
+    """
+    stepped = len(attempt.tube.steps.edges) > 0
+    most_mm = (END_VOXELS if stepped else EVEN_END_VOXELS) * image.voxel
+    if not stepped and not image.correlated:
+        return 0.0, 0.0, most_mm
+    return *end_range(image, attempt.tube), most_mm
 
 
 Objection = tuple[bool, FrameStatus, str, str, str]
@@ -63,8 +67,7 @@ Objection = tuple[bool, FrameStatus, str, str, str]
 def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
     missing_mm = attempt.tube.steps.missing_mm
-    back_mm, on_mm = _end_range(image, attempt)
-    sure_mm = (END_VOXELS if len(attempt.tube.steps.edges) else EVEN_END_VOXELS) * image.voxel
+    back_mm, on_mm, sure_mm = _end_range(image, attempt)
     folded = beside_itself(points, length_mm / max(1, len(points) - 1), TIP_BESIDE * image.voxel)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
