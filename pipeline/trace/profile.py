@@ -31,8 +31,6 @@ LEAST_LEVEL = 0.1
 """Share of the usual grey from which something is wire: a plastic tip has 0.15, streaks a few hundredths."""
 INDEPENDENT_VOXELS = 1.7
 """Length of wire over which the noise of crest grey is one."""
-END_SIGMAS = 3.0
-"""Standard deviations within which an end is possible."""
 SURE = 6.0
 """Standard deviations by which a fainter piece stands out of the noise, all of it taken together."""
 
@@ -143,9 +141,12 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
         seen = _seen(level, np.diff(edges, prepend=0.0, append=arc[-1]) / h, noise)
         last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
     end = _end_of(last, edges, arc, grey, (blur, h))
-    if last and level[last] < level[last - 1] and end - edges[last - 1] < BAND_VOXELS * h:
-        last -= 1  # the blur of the end, not a part of the wire
-        end = _end_of(last, edges, arc, grey, (blur, h))
+    if last and level[last] < level[last - 1]:
+        # four samples a voxel, and each voxel's noise is that of INDEPENDENT_VOXELS
+        least = SURE**2 * 4.0 * INDEPENDENT_VOXELS * image.noise_in(CREST_VOXELS) ** 2
+        if end - edges[last - 1] < BAND_VOXELS * h or _saved(grey, arc, edges[:last], end, (blur, h)) < least:
+            last -= 1  # the blur of the end, not a part of the wire
+            end = _end_of(last, edges, arc, grey, (blur, h))
     edges = edges[:last]
     line, edges = line[arc <= end], edges[edges < end - h]
     if not len(edges):
@@ -169,24 +170,17 @@ def _end_of(last: int, edges: Array, arc: Array, grey: Array, size: tuple[float,
     return max(step_position(grey[tail], arc[tail], blur), float(arc[0]) + 2 * h)
 
 
-def end_range(image: Subtraction, points: Array, steps: Steps, blur_mm: float) -> tuple[float, float]:
-    """How much further back and further on (mm) a wire may end, by the profile of its last piece.
+def _saved(grey: Array, arc: Array, edges: Array, end: float, size: tuple[float, float]) -> float:
+    """How much squared grey less is left of a profile by its last piece than if the wire ended without it.
 
-    Ends are as likely as they leave the profile explained; what is three standard deviations off counts as possible.
+    edges : (m,) of the pieces.  end : of the last one.  size : blur and voxel, mm.
     """
-    h = image.voxel
-    line = resampled(extended(points, AHEAD_VOXELS * h, 0.25 * h), 0.25 * h)
-    arc, grey = arc_length(line), image.along(line)
-    end = float(arc_length(points)[-1])
-    edge = float(steps.edges[-1]) * end if len(steps.edges) else max(0.0, end - BACK_VOXELS * h)
-    before = [edge] if len(steps.edges) else []
-    blur = float(np.hypot(CREST_VOXELS * h, blur_mm))
-    near = arc > edge - BAND_VOXELS * h
-    tries = np.arange(edge + 0.5 * blur, arc[-1], 0.2 * h)
-    costs = np.array([_levels(grey[near], arc[near], np.array([*before, e]), blur, beyond=False)[1] for e in tries])
-    variance = image.noise_in(CREST_VOXELS) ** 2 * 4.0 * INDEPENDENT_VOXELS
-    likely = tries[costs - costs.min() < END_SIGMAS**2 * variance]
-    return max(0.0, end - float(likely[0])), max(0.0, float(likely[-1]) - end)
+    blur, h = size
+    start = max(float(edges[-2]) if len(edges) > 1 else float(arc[0]), float(edges[-1]) - BACK_VOXELS * h)
+    near = (arc > start) & (arc < end + AHEAD_VOXELS * h)
+    tries = np.arange(start + 2.0 * h, end + h, 0.2 * h)
+    left = [_levels(grey[near], arc[near], np.array([e]), blur, beyond=False)[1] for e in tries]
+    return min(left, default=np.inf) - _levels(grey[near], arc[near], np.array([edges[-1], end]), blur, beyond=False)[1]
 
 
 def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:

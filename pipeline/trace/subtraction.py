@@ -111,10 +111,15 @@ class Subtraction:
         return self.noises[blur_voxels]
 
     @property
+    def correlation(self) -> float:
+        """Noise of blurred grey over that of blurred white noise: 1 where it is white."""
+        white = float(np.sum(gaussian_taps(CREST_VOXELS) ** 2)) ** 1.5
+        return max(1.0, float(self.noise_in(CREST_VOXELS) / (white * self.noise)))
+
+    @property
     def correlated(self) -> bool:
         """Whether noise is, so that smoothing leaves it."""
-        white = float(np.sum(gaussian_taps(CREST_VOXELS) ** 2)) ** 1.5
-        return bool(self.noise_in(CREST_VOXELS) > CORRELATED * white * self.noise)
+        return self.correlation > CORRELATED
 
     def local(self, points_mm: ArrayLike) -> Array:
         """LPS mm -> kernel coordinates."""

@@ -177,7 +177,9 @@ def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArra
     own = noise / np.maximum(share, 1.0)
     least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
     hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
-    return np.asarray(hidden | (oblong > least + 3.0 * own))
+    # one that is as bright as two needs no more than its own noise: two in contact have 0.06, which three would hide
+    sure = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [3.0, 1.0]), 3.0)
+    return np.asarray(hidden | (oblong > least + sure * own))
 
 
 def _of_the_line(

@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import ndimage
+from scipy.special import ndtr
 
 from pipeline.model import Volume
 from pipeline.segment import segment
@@ -15,7 +17,9 @@ from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.onward import seen_outside
-from pipeline.trace.subtraction import subtracted
+from pipeline.trace.reach import end_range
+from pipeline.trace.subtraction import CREST_VOXELS, subtracted
+from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge
 from tests.studies.seeing.scenes import Draft
 from tests.studies.seeing.table import look
@@ -26,16 +30,17 @@ from tests.studies.seeing.table import look
     [
         ("no wire, contrast x 1.15 to 1.6", 3),
         ("no wire, contrast x 1.15 to 1.6", 311),
-        ("correlated noise, CNR 4 to 6", 2),
+        ("correlated noise, CNR 4 to 6", 503),
         ("wire, contrast x 0.7 to 1.4", 2),
         ("platinum coil tip, x 3 to 10", 4),
         ("platinum coil tip, x 3 to 10", 450),  # 2 voxels too long: a last piece of no brightness
         ("marker band before the tip", 2),
-        ("dim distal part, x 0.15 to 0.2", 12),
+        ("dim distal part, x 0.15 to 0.2", 502),
         ("dim distal part, x 0.15 to 0.2", 343),  # 2.4 voxels too long and ok, by an offset common to bright and dim
         ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 341),  # its tip behind the plane of entry was not fitted
         ("plain, no reference", 347),  # once cut by 7.5 mm, and ok
         ("plain", 300),  # the blur of its end was a dimmer part
+        ("a catheter over the wire", 616),  # the same, 2 voxels too long and ok
         ("stenosis", 1),
         ("stenosis, no reference", 2),
         ("0.9 mm wire, 0.1 mm voxels", 300),
@@ -61,6 +66,10 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
         ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
+        ("dim distal part, x 0.15 to 0.2", 434, "TRACE_AMBIGUOUS"),  # 2.0 voxels too long, by its noise, and ok
+        ("dim distal part, x 0.15 to 0.2", 463, "TRACE_AMBIGUOUS"),  # 2.4 voxels too short, the same
+        ("correlated noise, CNR 4 to 6", 2, "TRACE_AMBIGUOUS"),  # right, but nothing in the frame says so
+        ("tip folded back on itself", 632, "TRACE_AMBIGUOUS"),  # 7 mm of it in contact, hardly out of round, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
         ("correlated noise, CNR 4 to 6", 470, "TRACE_AMBIGUOUS"),  # began 3.0 mm beyond its entry, and ok
         ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
@@ -137,3 +146,27 @@ def test_a_lumen_ends_too_early_before_a_vessel_or_a_wire_but_not_before_bone(be
     )  # fmt: skip
     line = np.stack([np.full(20, 7.0), np.full(20, 7.0), np.linspace(0.0, 5.5, 20)], axis=1)
     assert seen_outside(image, line) is seen
+
+
+def line_in_noise(seed, height, last_mm, size=(40, 40, 90), h=0.3, blur=0.95):
+    """White noise of 1 with a straight wire along z up to ``last_mm``, ``height`` noises bright, as tracing sees it."""
+    grey = np.random.default_rng(seed).normal(size=size).astype(np.float32)
+    x, y, z = (np.arange(n) * h for n in size)
+    across = np.exp(-((x[:, None] - 6.0) ** 2 + (y[None] - 6.0) ** 2) / (2 * (blur * h) ** 2))
+    grey += height * across[:, :, None] * ndtr((last_mm - z) / (blur * h))
+    smooth = ndimage.gaussian_filter(grey, CREST_VOXELS)
+    sd = float(np.std(ndimage.gaussian_filter(np.random.default_rng(0).normal(size=size), CREST_VOXELS)))
+    return SimpleNamespace(
+        voxel=h, spacing=np.full(3, h), grey=grey, noise=1.0, correlation=1.0, noise_in=lambda blur: sd,
+        along=lambda points: ndimage.map_coordinates(smooth, np.asarray(points).T / h, order=1),
+    )  # fmt: skip
+
+
+def test_the_range_of_an_end_holds_the_true_one_and_is_as_narrow_as_noise_allows():
+    """Wires that were fitted up to 0.3 mm too far. All voxels tell 2 voxels where the profile along the wire told 3."""
+    h, line = 0.3, np.stack([np.full(140, 6.0), np.full(140, 6.0), np.linspace(3.0, 18.3, 140)], axis=1)
+    controls = spline_through(line, 2.4)
+    tube = Tube(controls, np.full(tint_nodes(len(controls) - 3), 3.0), 0.95 * h, 0.0)
+    ranges = np.array([end_range(line_in_noise(seed, 3.0, 18.0), tube) for seed in range(60)])
+    assert np.mean(ranges[:, 0] > 0.26) > 0.97, "three standard deviations, in steps of a quarter of a voxel"
+    assert np.median(ranges.sum(axis=1)) < 2 * 1.3 * h, "1.06 / CNR voxel is the least standard deviation of an end"
