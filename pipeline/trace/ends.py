@@ -78,7 +78,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          "leave this frame out, or scan a larger field"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
-         f"{sure_mm:.1f} mm", "state the wire's opacity or insertion_mm, or scan with more dose"),
+         f"{sure_mm:.1f} mm", "scan with more dose, or leave this frame out: where the wire ends cannot be told"),
         (attempt.late_mm > LATE_MM + LATE_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that begins {attempt.late_mm:.1f} mm beyond the entry",
          f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
