@@ -20,10 +20,11 @@ MOST_APART = 3.0
 insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
 """A curve that begins so much beyond the plane of entry, in all, is shorter than the wire: 3 mm in correlated noise."""
-END_VOXELS, EVEN_END_VOXELS = 2.0, 3.0
+END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 2.0, 3.0, 1.5
 """How far off (voxel) an end may be possible, at three standard deviations. Of 229 dim ends on tuning seeds 3 were ok
 and 1.6 to 2.1 voxels off with 3.0 (86 refused), 2 with 2.25 (120), 1 with 2.0 (140). An even wire in correlated noise
-is refused by more than its end alone, and may have the second."""
+is refused by more than its end alone, and may have the second. A stated step shows the end to half a voxel: what is
+further off than the third contradicts it."""
 TIP_BESIDE = 3.5
 """Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
 
@@ -54,7 +55,8 @@ def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, floa
     All in mm.
     """
     stepped = len(attempt.tube.steps.edges) > 0
-    most_mm = (END_VOXELS if stepped else EVEN_END_VOXELS) * image.voxel
+    least = STATED_END_VOXELS if attempt.tube.steps.stated else END_VOXELS
+    most_mm = (least if stepped else EVEN_END_VOXELS) * image.voxel
     if not stepped and not image.correlated:
         return 0.0, 0.0, most_mm
     return *end_range(image, attempt.tube), most_mm
@@ -78,7 +80,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          "leave this frame out, or scan a larger field"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
-         f"{sure_mm:.1f} mm", "scan with more dose, or leave this frame out: where the wire ends cannot be told"),
+         f"{sure_mm:.1f} mm", "state the wire's opacity, whose steps tell where its end is, or scan with more dose"),
         (attempt.late_mm > LATE_MM + LATE_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that begins {attempt.late_mm:.1f} mm beyond the entry",
          f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
