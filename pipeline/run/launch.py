@@ -251,5 +251,5 @@ def last_line(totals: Totals, index: Path) -> str:
 def _with_interval(pooled: Mapping[str, Any]) -> str:
     """The pooled error with its interval, or why there is none."""
     ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
-    known = ends if np.isfinite(pooled["rms_low_mm"]) else ""
+    known = ends if np.isfinite(pooled["rms_high_mm"]) else ""
     return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"
