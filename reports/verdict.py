@@ -51,7 +51,7 @@ def _unknown_roll(statistics: Mapping[str, Any]) -> str:
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if standing(statistics) != NO_BETTER or not unknown < FAR_BELOW * rms:
         return ""
-    mend = 'try roll_deg = "fit"'
+    mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
     return f"It is worse than with an unknown roll ({number(unknown)} mm): {mend}."
 
 
