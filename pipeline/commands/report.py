@@ -35,7 +35,6 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.case_files import left_over_sentence, not_run_sentence
     from reports.html import render_index
     from reports.inside import links_out
 
@@ -55,11 +54,19 @@ def main(args: argparse.Namespace) -> int:
         from reports.pdf import write_pdf
 
         say(f"summary: {write_pdf(args.out)}")
-    missing = not_run_sentence(args.out)
-    for aside in filter(None, (left_over_sentence(args.out), missing)):
-        sys.stderr.write(f"{aside}\n")
+    whole = _all_there(args.out)
     say(last_line(totals, page))
-    return 0 if totals.all_ok and others_ok and drawn and not missing else 1
+    return 0 if totals.all_ok and others_ok and drawn and whole else 1
+
+
+def _all_there(out: Path, name: str = "") -> bool:
+    """Whether every case that the runs into a folder name has a result; cases that have none, or nobody names, said."""
+    from reports.case_files import find_cases, left_over_sentence, not_run_sentence
+
+    missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
+    for aside in filter(None, (left_over_sentence(out), missing)):
+        sys.stderr.write(f"{name}{aside}\n")
+    return not missing
 
 
 def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
@@ -108,7 +115,7 @@ def _others(out: Path, *, embed: bool) -> bool:
     folders = folders_in(out)
     good = []
     for name, folder in [*folders.items()][1:]:
-        good.append(aggregate(folder).all_ok)
+        good += [aggregate(folder).all_ok, _all_there(folder, f"{name}: ")]
         say(f"{name}: report: {render_index(folder, embed)}")
     for line in side_by_side(out, folders, embed) if folders else ():
         say(line)
