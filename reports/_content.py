@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ from reports.schema import SUMMARY, Column
 Grid = dict[str, Any]
 NOTHING = "–"
 _LEVEL = {"min", "median", "max"}
+MOST_TILES = 6
+"""Of the numbers at the head of a page so many are tiles, which a reader decides by; the others stand in a table."""
 
 
 def number(value: Any, digits: int = 3) -> str:
@@ -86,18 +89,19 @@ def size(n_bytes: int) -> str:
 def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -> list[dict[str, str]]:
     """The numbers at the head of a page; those that do not apply are left out.
 
-    entries : ``column`` and ``label`` of each, as in sections.toml; ``of`` names the column of a total, ``name`` that
-    of a word that follows the label.
+    entries : ``column`` and ``label`` of each, as in sections.toml; ``{name}`` within a column's name is the value of
+    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label.
     """
     shown = []
     for entry in entries:
-        column = SUMMARY[entry["column"]]
-        value = number(statistics.get(column.name))
+        name = entry["column"].format_map(defaultdict(str, statistics))
+        value = number(statistics.get(name)) if name in SUMMARY.names else NOTHING
         if value != NOTHING:
+            column = SUMMARY[name]
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            named = f" {statistics.get(entry['name'], '')}" if entry.get("name") else ""
+            named = " " + str(statistics.get(entry["name"], "")).replace("_", " ") if entry.get("name") else ""
             shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
 
@@ -109,6 +113,11 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     row = {str(name): value for name, value in table.iloc[0].items()}
     rests = f"insertions stand behind the intervals ({number(row['interval'])})"
     return [*cards(entries, row), {"value": number(row["insertions"]), "label": rests}]
+
+
+def in_tiles(numbers: Sequence[Mapping[str, str]]) -> dict[str, Sequence[Mapping[str, str]]]:
+    """The numbers at the head of a page, as ``tiles`` and ``others``."""
+    return {"tiles": numbers[:MOST_TILES], "others": numbers[MOST_TILES:]}
 
 
 def worst_first(summary: pd.DataFrame) -> pd.DataFrame:

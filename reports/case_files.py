@@ -1,7 +1,7 @@
 """The folder of one case, read: result.json, errors.csv, points.csv.gz, frames.h5. Any of them may be missing."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from reports.schema import ERRORS, POINTS, TIMINGS
 GOOD = ("ok", "simulated", "roll_fitted")
 WORST = "p95_mm"
 """The one metric by which a frame or a case is called worst, wherever that is said."""
+_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +55,16 @@ class CaseFiles:
         return frames_file.read_frame(self.folder / "frames.h5", frame)
 
 
-def read_case(folder: Path, points: bool = True) -> CaseFiles:
+def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles:
     """Read a case's folder; raises ValueError, naming the file, where one is damaged.
 
-    points : False leaves points.csv.gz unread, by far the largest table, where a page of the run needs none.
+    points, rest : False leaves points.csv.gz unread, by far the largest table; or the times and the scan's geometry.
+    The page of a run needs neither.
     """
     errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
     samples = tables.read_if_there(folder / POINTS.file if points else None, POINTS)
-    timings = tables.read_if_there(folder / TIMINGS.file, TIMINGS)
-    scan, numbers = _frames(folder / "frames.h5")
+    timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
+    scan, numbers = _frames(folder / "frames.h5", rest)
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)
 
 
@@ -87,6 +89,29 @@ def warnings_of(folder: Path) -> list[str]:
         return []
 
 
+def results_in(out_dir: Path) -> dict[str, dict[str, Any]]:
+    """result.json of every case, empty where there is none, or one that cannot be read, which is said elsewhere."""
+    found: dict[str, dict[str, Any]] = {}
+    for folder in find_cases(out_dir):
+        try:
+            found[folder.name] = read_json(folder / "result.json")
+        except ValueError:
+            found[folder.name] = {}
+    return found
+
+
+def said_by_cases(results: Mapping[str, Mapping[str, Any]], key: str) -> list[str]:
+    """What the cases of a run say under ``warnings`` or ``assumptions``, each text once, with the cases that say it.
+
+    results : result.json by case.
+    """
+    found: dict[str, list[str]] = {}
+    for case, result in results.items():
+        for text in result.get(key, ()):
+            found.setdefault(str(text), []).append(case)
+    return [text if len(results) == 1 else f"{listed(cases)}: {text}" for text, cases in found.items()]
+
+
 def find_cases(out_dir: Path) -> list[Path]:
     """Folders of the cases of a run, by name; those that no run into the folder names belong to another study."""
     return _folders(out_dir, named=True)
@@ -99,15 +124,39 @@ def left_over(out_dir: Path) -> list[Path]:
 
 def left_over_sentence(out_dir: Path) -> str:
     """What is not counted, and how to be rid of it; empty where everything is."""
-    names = ", ".join(folder.name for folder in left_over(out_dir))
+    names = listed([folder.name for folder in left_over(out_dir)])
     return f"not counted, since no manifest of this folder names them any more: {names}" * bool(names)
 
 
 def not_run_sentence(out_dir: Path) -> str:
     """Cases that the runs into a folder name and that have no result in it, as those of a shard that was not merged."""
-    planned = dict.fromkeys(str(name) for run in _runs(out_dir) for name in run.get("planned") or ())
-    names = ", ".join(name for name in planned if not (out_dir / "cases" / name / "result.json").exists())
+    names = listed([name for name, asked in _without_result(out_dir).items() if asked])
     return f"named by the manifest and without a result here: {names}" * bool(names)
+
+
+def left_out_sentence(out_dir: Path) -> str:
+    """Cases without a result that no run into a folder was to compute, since ``--only`` named others."""
+    names = listed([name for name, asked in _without_result(out_dir).items() if not asked])
+    return f"left out by --only and without a result here: {names}" * bool(names)
+
+
+def _without_result(out_dir: Path) -> dict[str, bool]:
+    """By case of the manifests without a result, whether a run was to compute it, or a shard that is not here.
+
+    A shard names all cases and leaves out what ``--only`` left out of all of them: what it left to others is asked.
+    """
+    named: dict[str, bool] = {}
+    for run in _runs(out_dir):
+        left_out = run.get("left_out") or ()
+        for name in map(str, run.get("planned") or ()):
+            named[name] = named.get(name, False) or name not in left_out
+    return {name: asked for name, asked in named.items() if not (out_dir / "cases" / name / "result.json").exists()}
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence, no more than a few."""
+    rest = len(names) - _MOST_NAMED
+    return ", ".join(names[:_MOST_NAMED]) + f" and {rest} more" * (rest > 0)
 
 
 def not_reached(out_dir: Path) -> str:
@@ -138,11 +187,11 @@ def thinned(count: int, most: int) -> NDArray[np.int_]:
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(int))
 
 
-def _frames(path: Path) -> tuple[ScanCrop | None, tuple[int, ...]]:
+def _frames(path: Path, scan: bool) -> tuple[ScanCrop | None, tuple[int, ...]]:
     if not path.exists():
         return None, ()
     try:
-        return frames_file.read_scan(path), frames_file.frame_numbers(path)
+        return frames_file.read_scan(path) if scan else None, frames_file.frame_numbers(path)
     except OSError as error:
         raise ValueError(
             f"{path}: not a readable HDF5 file ({error}); remove the folder and run the case again"

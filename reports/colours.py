@@ -15,6 +15,9 @@ BAD = "#B8336F"
 """What failed; no wire has this colour."""
 FAR = "#E5007D"
 """Where the simulated wire is farthest from the traced one: its colour runs from SIMULATED to this."""
+ERROR_SCALE_MM = (0.02, 2.0)
+"""Where colours of distances to the traced wire begin and end, on a logarithmic scale: the same in every figure, case
+and run, so that two pictures can be compared. What a trace knows no better is dark; 2 mm off is another vessel."""
 PAGE_LIGHT, PAGE_DARK = "#FFFFFF", "#15181C"
 
 

@@ -20,16 +20,22 @@ from reports.tables import read_if_there
 DEFAULT_TOLERANCE = Path(__file__).parent / "baseline" / "tolerance.toml"
 RATIO = "rms_ratio"
 """In a tolerance: how far above 1 the whole interval of the ratio of two runs' errors may lie."""
+BEFORE_COMPARE = {
+    *("insertion_mm", "max_penetration_mm", "push_force_N", "iterations", "num_mm"),
+    *("trace_sigma_mm", "trace_mean_mm", "trace_max_mm", "trace_tip_mm"),
+}
+"""What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""
 _HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
 Row = tuple[Any, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """rows: case, frame, column, before, after, change, allowed, verdict.
+    """rows: (simulator, of scores,) case, frame, column, before, after, change, allowed, verdict.
 
     verdict : same, within, better, regression, moved (a value that has no better side, by more than allowed), or new
-    (only the second run has it).     empty : cases of which the first run has no number to hold against.
+    (only the second run has it; of a frame, ``after`` is its status).     empty : cases of which the first run has no
+    number to hold against.
     """
 
     rows: pd.DataFrame
@@ -53,16 +59,22 @@ class Difference:
         return self.rows[self.rows["verdict"].isin(["regression", "moved"])]
 
     @property
+    def new(self) -> pd.DataFrame:
+        """The frames, and cases without any, that only the second run has: they are held against nothing."""
+        return self.rows[(self.rows["verdict"] == "new") & self.rows["column"].isin(["frame", "case"])]
+
+    @property
     def by_column(self) -> pd.DataFrame:
         """Per column: pairs, median change, worst change (in the bad direction, or either), regressions, moved."""
         paired = self.rows[self.rows["change"].notna()]
         worse = paired["change"] * paired["column"].map(_sign)
         marks = {name: paired["verdict"] == verdict for name, verdict in (("bad", "regression"), ("moved", "moved"))}
-        columns = paired.assign(worse=worse, **marks).groupby("column", sort=False)
+        by = [name for name in ("simulator", "column") if name in paired]
+        columns = paired.assign(worse=worse, **marks).groupby(by, sort=False)
         table = {
             "pairs": columns.size(),
             "median_change": columns["change"].median(),
-            "worst": columns["worse"].max() * columns.size().index.map(_sign) + 0.0,
+            "worst": columns["worse"].max() * columns.size().index.get_level_values("column").map(_sign) + 0.0,
             "regressions": columns["bad"].sum(),
             "moved": columns["moved"].sum(),
         }
@@ -71,22 +83,31 @@ class Difference:
     @property
     def sentence(self) -> str:
         """One line for the end of the command."""
-        n_cases = self.rows["case"].nunique()
-        n_bad = len(self.regressions)
+        n_bad, head = len(self.regressions), self._compared()
         names = ", ".join(self.moved["column"].unique())
-        moved = f"; {len(self.moved)} values have moved: {names}" if names else ""
+        tail = f"; {len(self.moved)} values have moved: {names}" if names else ""
         if self.empty:
-            moved += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
+            tail += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
+        if len(self.new):
+            failed = int((~self.new["after"].isin([*GOOD, "present"])).sum())
+            tail += f"; held against nothing, since only the second run has them: {len(self.new)} frames"
+            tail += f", {failed} of which failed" * bool(failed)
         if not n_bad:
-            return f"{n_cases} cases compared: no regression{moved}"
+            return f"{head}: no regression{tail}"
         worst = f"{n_bad} regression{'s' * (n_bad != 1)}"
         first = self.regressions.iloc[0]
-        place = f"case {first['case']}" + ("" if pd.isna(first["frame"]) else f" frame {first['frame']}")
+        whose = [str(first["simulator"])] if "simulator" in first else []
+        where = [f"case {first['case']}", *([] if pd.isna(first["frame"]) else [f"frame {first['frame']}"])]
+        place = ", ".join([*whose, " ".join(where)])
         was, now = (f"{v:.4g}" if isinstance(v, float) else v for v in first[["before", "after"]])
         allowed = "" if pd.isna(first["allowed"]) else f" (allowed {first['allowed']:.4g})"
-        return (
-            f"{n_cases} cases compared: {worst}; the worst: {place}, {first['column']} {was} -> {now}{allowed}{moved}"
-        )
+        return f"{head}: {worst}; the worst: {place}, {first['column']} {was} -> {now}{allowed}{tail}"
+
+    def _compared(self) -> str:
+        """How many cases were compared, of how many."""
+        both = self.rows.drop(self.new.index)
+        held, cases = (rows["case"][rows["column"] != "simulator"].nunique() for rows in (both, self.rows))
+        return f"{held} cases compared" if held == cases else f"{held} of {cases} cases compared"
 
 
 def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
@@ -94,11 +115,15 @@ def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
 
     Raises ValueError for a file without columns, an unknown column, and a negative, infinite or absent number.
     """
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; a tolerance is a TOML file of lines such as rms_mm = 0.03")
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     if not table:
         raise ValueError(f"{path}: it names no column, so that every change would be allowed")
     ERRORS.check(table.keys() - {RATIO}, str(path))
     for name, value in table.items():
+        if name != RATIO and ERRORS[name].kind == "text":
+            raise ValueError(f"{path}: {name} holds no number; a status that is worse always closes the gate")
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not 0 <= value < math.inf:
             raise ValueError(f"{path}: {name} = {value!r}; give the allowed change, a number from 0 up")
@@ -127,14 +152,16 @@ def diff_folders(
         raise ValueError(f"{out_a}: no cases/*/errors.csv; give a folder that `wireval run` wrote")
     empty = tuple(name for name, table in before.items() if not _has_numbers(table, tolerance))
     if len(empty) == len(before):
-        raise ValueError(f"{out_a}: nothing to hold against: no frame of it is ok and has a number of the tolerance")
+        what = "nothing to hold against: no frame of it is ok and has an error that the tolerance names"
+        raise ValueError(f"{out_a}: {what}; a run that ended before frames are compared has none")
     return replace(diff_tables(before, after, tolerance, damaged), empty=empty)
 
 
 def _has_numbers(table: pd.DataFrame, tolerance: Mapping[str, float]) -> bool:
-    """Whether a frame is ok and has a value that could become worse; a depth is told, not found."""
+    """Whether a frame is ok and has a value that could become worse: an error, where the tolerance names one."""
     names = [name for name in tolerance if name != RATIO]
-    names = [name for name in names if ERRORS[name].better] or names
+    directed = [name for name in names if ERRORS[name].better]
+    names = [name for name in directed if name not in BEFORE_COMPARE] or directed or names
     good = table[table["status"].isin(GOOD)]
     return bool(good[names].notna().to_numpy().any() if names else len(good))
 
@@ -153,8 +180,10 @@ def diff_tables(
             rows.append((case, pd.NA, "status", "whole", damaged[case], math.nan, math.nan, "regression"))
         elif case in before and case in after:
             rows += [(case, *row) for row in _case_rows(before[case], after[case], tolerance)]
+        elif case in before:
+            rows.append((case, pd.NA, "case", "present", "missing", math.nan, math.nan, "regression"))
         else:
-            rows.append((case, pd.NA, *_one_sided("case", case in before)))
+            rows += [(case, *row) for row in _new_rows(after[case])]
     return Difference(pd.DataFrame(rows, columns=_HEADER))
 
 
@@ -169,14 +198,19 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
                 pair = (old[frame][name], new[frame][name])
                 a, b = (math.nan if pd.isna(value) else float(value) for value in pair)
                 yield frame, name, a, b, b - a, allowed, _verdict(name, a, b, allowed)
+        elif frame in old:
+            yield frame, "frame", "present", "missing", math.nan, math.nan, "regression"
         else:
-            yield frame, *_one_sided("frame", frame in old)
+            yield frame, "frame", "missing", new[frame]["status"], math.nan, math.nan, "new"
 
 
-def _one_sided(what: str, was_there: bool) -> Row:
-    """A case or frame that only one of the runs has: column, before, after, change, allowed, verdict."""
-    sides = ("present", "missing") if was_there else ("missing", "present")
-    return what, *sides, math.nan, math.nan, "regression" if was_there else "new"
+def _new_rows(table: pd.DataFrame) -> Iterator[Row]:
+    """A case that only the second run has: a row a frame, or one where it has none."""
+    nothing = math.nan, math.nan, "new"
+    for frame, status in zip(table["frame"], table["status"], strict=True):
+        yield frame, "frame", "missing", status, *nothing
+    if table.empty:
+        yield pd.NA, "case", "missing", "present", *nothing
 
 
 def _verdict(name: str, old: float, new: float, allowed: float) -> str:

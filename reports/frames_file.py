@@ -2,6 +2,8 @@
 
     /scan                attributes spacing_mm (3), origin_mm (3), direction (3, 3), shape (3): the vessel's crop
     /scan/lumen_mip_A    optional uint8, projection of the lumen's mask along array axis A
+    /scan/entry_slab_A   optional uint8, where no lumen was found (the crop is the whole scan then): its maxima near the
+                         entry along array axis A
     /frames/NNN          datasets: the fields of ``FrameArrays`` that are not None
     /frames/NNN/mip_A    optional uint8, maximum-intensity projection along array axis A: (y, z), (x, z), (x, y)
     /frames/NNN/straightened    optional uint8, the scan along the traced wire: planes across it, ``along_mm`` apart,
@@ -29,13 +31,14 @@ Pictures = Mapping[int, NDArray[np.uint8]]
 
 @dataclass(frozen=True, eq=False)
 class ScanCrop:
-    """Geometry of the vessel's crop in LPS mm, and the lumen's projections by array axis."""
+    """Geometry of the vessel's crop in LPS mm, and by array axis projections of the lumen, or of slabs at the entry."""
 
     spacing_mm: Array
     origin_mm: Array
     direction: Array
     shape: tuple[int, int, int]
     lumen_mips: Pictures = field(default_factory=dict)
+    entry_slabs: Pictures = field(default_factory=dict)
 
     def to_index(self, points_mm: Array) -> Array:
         """Continuous voxel indices (n, 3) of LPS points (n, 3)."""
@@ -106,6 +109,7 @@ def write_frames(path: Path, scan: ScanCrop | None, frames: Iterable[FrameArrays
             for key in _GEOMETRY:
                 group.attrs[key] = np.asarray(getattr(scan, key))
             _write_pictures(group, "lumen_mip", scan.lumen_mips)
+            _write_pictures(group, "entry_slab", scan.entry_slabs)
         for frame in frames:
             group = everything.create_group(f"{frame.frame:03d}")
             for name in _ARRAYS:
@@ -127,8 +131,8 @@ def read_scan(path: Path) -> ScanCrop | None:
         group = file["scan"]
         spacing, origin, direction, shape = (np.array(group.attrs[key], float) for key in _GEOMETRY)
         nx, ny, nz = (int(n) for n in shape)
-        pictures = _read_pictures(group, "lumen_mip")
-        return ScanCrop(spacing, origin, direction.reshape(3, 3), (nx, ny, nz), pictures)
+        pictures = (_read_pictures(group, name) for name in ("lumen_mip", "entry_slab"))
+        return ScanCrop(spacing, origin, direction.reshape(3, 3), (nx, ny, nz), *pictures)
 
 
 def frame_numbers(path: Path) -> tuple[int, ...]:
@@ -144,6 +148,15 @@ def read_frame(path: Path, frame: int) -> FrameArrays:
         group = file["frames"][names[frame]]
         arrays = {name: np.array(group[name], float) for name in _ARRAYS if name in group}
         return FrameArrays(frame, mips=_read_pictures(group, "mip"), straightened=_read_straightened(group), **arrays)
+
+
+def read_arrays(path: Path, *names: str) -> dict[int, dict[str, Array]]:
+    """Of every frame these fields of ``FrameArrays`` alone, where it has them."""
+    with h5py.File(path, "r") as file:
+        return {
+            int(number): {name: np.array(group[name], float) for name in names if name in group}
+            for number, group in file.get("frames", {}).items()
+        }
 
 
 def _read_straightened(group: Any) -> Straightened | None:

@@ -16,11 +16,13 @@ from reports.case_files import (
     GOOD,
     CaseFiles,
     find_cases,
+    left_out_sentence,
     left_over_sentence,
     not_reached,
     not_run_sentence,
     read_case,
     read_json,
+    said_by_cases,
 )
 from reports.figures import RunFiles, declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
@@ -119,7 +121,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         **{key: result.get(key, "") for key in ("role", "group")},
         "failures": failures,
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
-        "cards": _content.cards(declared("cards"), case.statistics),
+        "numbers": _content.in_tiles(_content.cards(declared("cards"), case.statistics)),
         "points": (case_dir / "points.csv.gz").exists(),
         # of projections the assumptions say whether wires were shifted
         "compared": bool(errors["rms_mm"].notna().any()) and "projections" not in result.get("chosen", {}),
@@ -173,9 +175,10 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "failures": failures,
         "simulators": next(iter(read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"]), ""),
         "left_over": left_over_sentence(out_dir),
-        "not_run": not_run_sentence(out_dir),
+        "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
-        "cards": _content.overall(declared("overall"), whole),
+        "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
+        "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed, each), key=_is_tall),
         "cases": _content.cases(summary, links),
@@ -243,7 +246,7 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     cases, broken = [], []
     for folder in find_cases(out_dir):
         try:
-            cases.append(read_case(folder, points=False))
+            cases.append(read_case(folder, points=False, rest=False))
         except ValueError as error:
             row = dict.fromkeys((*FAILURES.names, "link"), "") | {"case": folder.name, "stage": "report"}
             row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": str(error)}

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from reports import _content, colours
 from reports.atomic import replacing
-from reports.case_files import WORST, not_reached, read_case, read_json
+from reports.case_files import WORST, not_reached, read_case, read_json, results_in, said_by_cases
 from reports.figures import declared
 from reports.html import draw_sections
 from reports.origin import mixed_settings
@@ -23,6 +23,7 @@ from reports.verdict import next_command, typed, unscored, verdict, worst_frames
 _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
+_MOST_NOTES, _LONGEST_NOTE = 4, 240  # texts, characters: two lines each
 _LEAST_WIDTH = 0.3  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
 _WIDE = 104  # characters of 9 points
 _LINE = 0.0165  # of the page's height, for type of 9 points
@@ -46,6 +47,16 @@ class _Page:
             self.figure.text(_LEFT, self.at, line, size=size, va="top", color=colour, **look)
             self.at -= step
         self.at -= 0.4 * step
+
+    def some(self, title: str, texts: Sequence[str], rest_stands: str) -> None:
+        """A few of many texts, and how many more there are; nothing without any."""
+        if not texts:
+            return
+        self.text(f"{title} ({len(texts)})", size=10, weight="bold")
+        for text in texts[:_MOST_NOTES]:
+            self.text(textwrap.shorten(text, _LONGEST_NOTE, placeholder="…"), size=8)
+        if len(texts) > _MOST_NOTES:
+            self.text(f"… and {len(texts) - _MOST_NOTES} more {rest_stands}", size=8)
 
     def picture(self, path: Path, entry: Mapping[str, str], most: float) -> None:
         """A figure with its title and caption, at full width or as high as ``most`` of the page and as its rest."""
@@ -99,7 +110,7 @@ def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[_Page]:
 
 
 def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
-    """Verdict, failures with the next command, tiles."""
+    """Verdict, failures with the next command, tiles, warnings, assumptions."""
     failures = read_if_there(out_dir / FAILURES.file, FAILURES)
     page = _Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
@@ -119,9 +130,13 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
         if len(failures) > _MOST_FAILURES:
             page.text(f"… and {len(failures) - _MOST_FAILURES} more in failures.csv")
         command = next_command(failures["case"], typed(out_dir))
-        page.text(f"Next: do what the message says, then {command}", weight="bold")
-    for card in _content.overall(declared("overall"), whole):
-        page.text(f"{card['value']}  {card['label']}")
+        page.text(f"Next: do what the message says, then {command}", width=_WIDE * 9 // 10, weight="bold")
+    for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
+        page.text(f"{tile['value']}  {tile['label']}")
+    results = results_in(out_dir)
+    page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases")
+    assumed = [str(text) for text in run.get("assumptions", ())]
+    page.some("Assumptions", [*assumed, *said_by_cases(results, "assumptions")], "on the pages")
     return _draw(page, out_dir, ("case_frame_map",))
 
 

@@ -16,13 +16,15 @@ from reports._content import Grid, grid
 from reports.atomic import write_text
 from reports.diff import Difference
 from reports.html import write_page
-from reports.junit import write_junit
+from reports.junit import add_suite, write_junit
 from reports.schema import ERRORS, SUMMARY, Column
+from reports.simulators import folders_in
 
 SHOWN, ON_PAGE = 30, 1000
 """Regressions that a text and a page name; JSON and JUnit have all."""
 
 _HEADS = {
+    "simulator": "whose wires they are",
     "what": "a setting, an input, the code",
     "column": "of overall.csv or errors.csv",
     "before": "in the first run",
@@ -47,6 +49,7 @@ class Verdict:
     runs : the two folders.     differs : rows (what, before, after) of where they come from; pooled : rows (column,
     before, after) of overall.csv.     paired : the sentence on the ratio of their errors with its interval.
     judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
+    caveat : what the last line has to add, as that the two were not measured alike.
     """
 
     runs: tuple[Path, Path]
@@ -55,6 +58,7 @@ class Verdict:
     paired: str
     judged: Judged
     frames: Difference
+    caveat: str = ""
 
     @property
     def closed(self) -> bool:
@@ -71,7 +75,7 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """The verdict in a line."""
-        pooled = "; over all frames it is worse" * (self.judged == "worse")
+        pooled = "; over all frames it is worse" * (self.judged == "worse") + f"; {self.caveat}" * bool(self.caveat)
         return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
 
     def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:
@@ -129,16 +133,20 @@ class Verdict:
             columns = [Column(n, "-", _HEADS.get(n, ""), "text" if text else "float") for n, text in texts.items()]
             made = grid(shown, columns)
             if {"case", "frame"} <= set(shown):
-                self._link(made, path.parent)
+                self._link(made, [*shown], path.parent)
             grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": made})
         runs = [{"name": str(run), "link": _there(run / "index.html", path.parent)} for run in self.runs]
         return {"title": "Two runs beside each other - wireval", "grids": grids, "runs": runs}
 
-    def _link(self, made: Grid, place: Path) -> None:
-        """Link the first two cells of each row, case and frame, to the page of the second run, where it has one."""
+    def _link(self, made: Grid, names: Sequence[str], place: Path) -> None:
+        """Link case and frame of each row to the page of the second run, where it has one. names : of the cells."""
+        out = self.runs[1]
+        scores = folders_in(out) if "simulator" in names else {}
         for row in made["rows"]:
-            case, frame = row["cells"][0], row["cells"][1]
-            case["link"] = _there(self.runs[1] / "cases" / case["value"] / "report.html", place)
+            cells = dict(zip(names, row["cells"], strict=True))
+            case, frame = cells["case"], cells["frame"]
+            folder = scores.get(cells["simulator"]["value"], out) if scores else out
+            case["link"] = _there(folder / "cases" / case["value"] / "report.html", place)
             frame["link"] = f"{case['link']}#viewer={frame['value']}" if case["link"] and frame["value"] else ""
 
     def _plain(self) -> dict[str, Any]:
@@ -176,18 +184,8 @@ class Verdict:
             ET.SubElement(test, "failure", type="rms_ratio", message=self.paired)
         elif self.judged == "withheld":
             ET.SubElement(test, "skipped", message=self.paired or "no frame counts in both runs")
-        for case, mine in rows.groupby("case", sort=False):
-            groups = {f"frame {frame}": group for frame, group in mine.groupby("frame", dropna=False, sort=False)}
-            bad = {name: group[group["verdict"].isin(["regression", "moved"])] for name, group in groups.items()}
-            suite = ET.SubElement(root, "testsuite", name=str(case), tests=str(len(groups)))
-            suite.set("failures", str(sum(len(group) > 0 for group in bad.values())))
-            for name, group in bad.items():
-                test = ET.SubElement(suite, "testcase", classname=str(case), name=name.replace("frame <NA>", "case"))
-                if len(group):
-                    said = [f"{r.column}: {_cell(r.before)} -> {_cell(r.after)}" for r in group.itertuples()]
-                    ET.SubElement(test, "failure", type=group["verdict"].iloc[0], message=said[0]).text = "\n".join(
-                        said
-                    )
+        for case, mine in rows.groupby([n for n in ("simulator", "case") if n in rows], sort=False):
+            add_suite(root, ", ".join(map(str, case)), mine)
         return root
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from reports.case_files import GOOD, CaseFiles, thinned
+from reports.colours import ERROR_SCALE_MM
 from reports.export.vtp import Index, read_surface_vtp
 from reports.frames_file import Array, FrameArrays, ScanCrop, Straightened
 
@@ -23,11 +24,14 @@ _QUALITY = 60  # of JPEG: a wire of one voxel still shows
 _PLANES, _MOST_PLANES = 1_800, 60  # across the wires, of all frames and of one: 10 kB
 _MAX_FRAMES = 120
 _WINDOW_PERCENTILES = (2.0, 99.8)
+RANGES_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Offsets to which the strips along the wire may reach."""
+_RANGE_MM, _SEEN_PERCENT = 1.0, 95  # the first where nothing was compared
 _GEOMETRY = ("spacing_mm", "origin_mm", "direction", "shape")
 
 
 def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
-    """The JSON of the viewer; None where no frame has a curve or a picture."""
+    """The JSON of the viewer; None where no frame has a wire that was traced or simulated, or a picture."""
     rows = case.errors.set_index("frame")
     arrays = [case.read_frame(case.frames[place]) for place in thinned(len(case.frames), _MAX_FRAMES)]
     if not arrays:
@@ -38,20 +42,32 @@ def viewer_data(case: CaseFiles) -> dict[str, Any] | None:
         _frame(a, rows.loc[a.frame] if a.frame in rows.index else {}, shrink) | {"straight": one}
         for a, one in zip(arrays, straight, strict=True)
     ]
-    if not any(frame["curves"] or frame["pictures"] for frame in frames):
+    # a true wire alone, as of a case whose lumen was not found, is nothing of this study's
+    if not any(frame["curves"].keys() - {"true"} or frame["pictures"] for frame in frames):
         return None
     worst = [frame["p95_mm"] if frame["status"] == "ok" else None for frame in frames]
     start = max(range(len(frames)), key=lambda i: (worst[i] is not None, worst[i] or 0.0, i))
     errors = [e for frame in frames for e in frame["error_mm"] if e is not None]
-    top = float(np.percentile(errors, 99)) if errors else 0.0
+    least = max((one["across_mm"] for one in straight if one), default=0.0)
     return {
         "frames": frames,
         "start": start,
-        "top_mm": _round_up(max(top, 0.05)),
+        "scale_mm": ERROR_SCALE_MM,
+        "ranges_mm": RANGES_MM,
+        "range_mm": range_mm(errors, least),
         "scan": None if case.scan is None else _scan(case.scan),
         "lumen": _lumen(case),
         "left_out": len(case.frames) - len(arrays),
     }
+
+
+def range_mm(errors_mm: Sequence[float], least: float) -> float:
+    """To which offset the strips along the wire reach at first, the same in every frame of a page: 95 % of its errors.
+
+    least : what they show at least, mm, a sample of the scan that is seen behind.
+    """
+    wanted = max(float(np.percentile(errors_mm, _SEEN_PERCENT)) if errors_mm else _RANGE_MM, least)
+    return next((mm for mm in RANGES_MM if mm >= wanted), RANGES_MM[-1])
 
 
 def decimate(points_mm: Array, corners: Index, max_triangles: int = _MAX_TRIANGLES) -> tuple[Array, Index]:
@@ -121,12 +137,6 @@ def _flat(values: Array) -> list[float | None]:
 def _number(value: Any) -> float | None:
     number = np.nan if value is None else float(value)
     return round(float(number), 3) + 0.0 if np.isfinite(number) else None
-
-
-def _round_up(value: float) -> float:
-    """The next of 1, 2 and 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= value * (1 - 1e-9)))
 
 
 def _scan(scan: ScanCrop) -> dict[str, Any]:

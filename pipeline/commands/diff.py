@@ -3,10 +3,14 @@
 import argparse
 import math
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.commands import add_quiet, say, unwritable
+
+if TYPE_CHECKING:
+    from pipeline.run.overall import Found
 
 HELP = "paired differences of two outputs; exit 1 on a regression"
 FILES = {
@@ -47,41 +51,66 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _verdict(args: argparse.Namespace) -> Any:
-    """Both folders read and compared; ValueError where they cannot be."""
-    import pandas as pd
-
+    """Both folders read and compared, two scores simulator by simulator; ValueError where they cannot be."""
     import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
-    from pipeline.run.ledger import RESULT
-    from pipeline.run.overall import damaged, found_cases, overall, ratio
-    from reports.case_files import find_cases
-    from reports.diff import DEFAULT_TOLERANCE, RATIO, diff_folders, load_tolerance
-    from reports.origin import what_differs
-    from reports.schema import SUMMARY
-    from reports.two_runs import Judged, Verdict
+    from reports.diff import DEFAULT_TOLERANCE, load_tolerance
+    from reports.simulators import folders_in
+    from reports.two_scores import together
 
-    for out in (args.first, args.second):
+    runs = args.first, args.second
+    for out in runs:
         if not out.is_dir():
             raise ValueError(f"{out}: no such folder; give one that `wireval run` wrote")
     tolerance = load_tolerance(args.tolerance or DEFAULT_TOLERANCE)
+    old, new = map(folders_in, runs)
+    if not (old and new):
+        return _compared(*runs, tolerance)
+    parts = {name: _compared(old[name], new[name], tolerance) for name in old if name in new}
+    if not parts:
+        raise ValueError(f"no simulator in common: {', '.join(old)} in {runs[0]}, {', '.join(new)} in {runs[1]}")
+    return together(runs, parts, [n for n in old if n not in new], [n for n in new if n not in old])
+
+
+def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
+    """The verdict on two runs."""
+    from pipeline.run.ledger import RESULT
+    from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
+    from reports.case_files import find_cases
+    from reports.diff import RATIO, diff_folders
+    from reports.origin import what_differs
+    from reports.two_runs import Judged, Verdict
+
     allowed = 1.0 + tolerance[RATIO]
-    before, after = found_cases(args.first), found_cases(args.second)
+    before, after = found_cases(first), found_cases(second)
     if bad := damaged(before):
         case, why = next(iter(bad.items()))
         raise ValueError(f"case {case!r} of the first run cannot be held against: {why}")
     there = {case.result.case for case in before}
-    unread = {folder.name for folder in find_cases(args.second)} & there - {case.result.case for case in after}
+    unread = {folder.name for folder in find_cases(second)} & there - {case.result.case for case in after}
     lost = dict.fromkeys(sorted(unread), f"{RESULT} is missing") | damaged(after)
-    frames = diff_folders(args.first, args.second, tolerance, lost)
-    old, new = overall(before), overall(after)
-    names = [column.name for column in SUMMARY if column.better and column.name in old and column.name in new]
-    rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
-    pooled = [row for row in rows if row["before"] != row["after"] and pd.notna(row["before"])]
-    paired = ratio(before, after)
+    frames = diff_folders(first, second, tolerance, lost)
+    paired = ratio([*before, *golden_cases(first)], after)
     judged: Judged = "holds"
     if paired is None or math.isnan(paired.low):
         judged = "withheld"
     elif paired.low > allowed:
         judged = "worse"
-    differs = what_differs(args.first, args.second)
-    runs = args.first, args.second
-    return Verdict(runs, differs, pooled, paired.verdict(allowed) if paired else "", judged, frames)
+    differs = what_differs(first, second)
+    ruler = ", ".join(row["what"] for row in differs if row["what"].startswith("compare."))
+    caveats = [f"errors are measured otherwise in the second run ({ruler})"] * bool(ruler)
+    caveats += ["over all frames nothing is judged: no frame has points in both runs"] * (paired is None)
+    said = paired.verdict(allowed, ruler) if paired else ""
+    return Verdict((first, second), differs, _pooled(before, after), said, judged, frames, "; ".join(caveats))
+
+
+def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:
+    """The columns of overall.csv that have a better side and are not the same."""
+    import pandas as pd
+
+    from pipeline.run.overall import overall
+    from reports.schema import SUMMARY
+
+    old, new = overall(before), overall(after)
+    names = [column.name for column in SUMMARY if column.better and column.name in old and column.name in new]
+    rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
+    return [row for row in rows if row["before"] != row["after"] and pd.notna(row["before"])]

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 if all cases are ok, 1 if some failed or have not been run, 2 if there are none."""
+    """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out), 2 if there are none."""
     from pipeline.run.aggregate import aggregate
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
@@ -61,10 +61,10 @@ def main(args: argparse.Namespace) -> int:
 
 def _all_there(out: Path, name: str = "") -> bool:
     """Whether every case that the runs into a folder name has a result; cases that have none, or nobody names, said."""
-    from reports.case_files import find_cases, left_over_sentence, not_run_sentence
+    from reports.case_files import find_cases, left_out_sentence, left_over_sentence, not_run_sentence
 
     missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
-    for aside in filter(None, (left_over_sentence(out), missing)):
+    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing)):
         sys.stderr.write(f"{name}{aside}\n")
     return not missing
 

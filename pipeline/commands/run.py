@@ -116,7 +116,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
     guard_kept(args.out, {case.id for case in manifest.cases} - {case.id for case in cases}, settings)
     if not args.fresh:
         guard_stages(args.out, args.until)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes)
+    left_out = tuple(case.id for case in manifest.cases if args.only and case.id not in args.only)
+    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes, left_out)
 
 
 def _limits(args: argparse.Namespace) -> "Limits":

@@ -15,7 +15,7 @@ from pipeline.compare.metrics import point_to_curve
 from pipeline.compare.nulls import ANOTHER
 from pipeline.model import Array
 from pipeline.run.overall import Found
-from reports.frames_file import read_frame
+from reports.frames_file import read_arrays
 
 SAME_ENTRY_MM = 2.0
 """Insertions whose traces begin farther apart count their depths from different places."""
@@ -23,6 +23,7 @@ STEP_MM = 0.5
 MOST_OTHERS = 24
 """Insertions that a guess is the mean of, those that stopped nearest to the depth: with all of 500 cases in one phantom
 it would take ten minutes, and the mean of so many is known to a seventh of their spread."""
+NOTHING: Array = np.zeros(0)
 Trace = tuple[float, Array, float]
 """The depth in mm, the traced wire (n, 3) and the arc length in mm from which on it counts."""
 Traces = Mapping[int, Trace]
@@ -39,11 +40,11 @@ def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
 
 def _traces(out: Path, case: Found) -> Traces:
     path, found = out / "cases" / case.result.case / "frames.h5", {}
+    kept = read_arrays(path, "traced_mm", "arc_mm") if path.exists() else {}
     for number, frame in case.frames.items():
-        arrays = read_frame(path, number) if path.exists() else None
-        if arrays is not None and arrays.traced_mm is not None and len(arrays.traced_mm) > 1:
-            start = 0.0 if arrays.arc_mm is None or not len(arrays.arc_mm) else float(arrays.arc_mm[0])
-            found[number] = (float(frame.row["insertion_mm"]), arrays.traced_mm, start)
+        curve, arc = (kept.get(number, {}).get(name, NOTHING) for name in ("traced_mm", "arc_mm"))
+        if len(curve) > 1:
+            found[number] = (float(frame.row["insertion_mm"]), curve, float(arc[0]) if len(arc) else 0.0)
     return found
 
 
@@ -52,19 +53,33 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
     mine = {frame.insertion for frame in case.frames.values()}
     phantom = [c for c in shared if c.result.phantom == case.result.phantom]
     kin = [c for c in phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
-    others, frames = [list(traces[c.result.case].values()) for c in kin], dict(case.frames)
+    others, frames = Others([list(traces[c.result.case].values()) for c in kin]), dict(case.frames)
     for number, (depth, curve, start) in traces[case.result.case].items():
         arc = samples(depth, STEP_MM)
-        near = [at_arc(wire, arc[arc >= start - 1e-9]) for wire in _nearest(others, depth, curve)]
+        near = [at_arc(wire, arc[arc >= start - 1e-9]) for wire in others.nearest(depth, curve)]
         if near:
-            mean = np.mean([np.mean(point_to_curve(wire, curve)[0] ** 2) for wire in near])
+            mean = np.mean(point_to_curve(np.concatenate(near), curve)[0] ** 2)
             row = {**frames[number].row, f"null_{ANOTHER}_rms_mm": float(np.sqrt(mean))}
             frames[number] = frames[number]._replace(row=row)
     return replace(case, frames=frames)
 
 
-def _nearest(others: Sequence[Sequence[Trace]], depth_mm: float, curve: Array) -> list[Array]:
-    """Of each other insertion the trace of the nearest depth, of those that begin where the curve does."""
-    each = [min(traces, key=lambda trace: abs(trace[0] - depth_mm)) for traces in others if traces]
-    same = [(abs(depth - depth_mm), wire) for depth, wire, _ in each if math.dist(wire[0], curve[0]) < SAME_ENTRY_MM]
-    return [wire for _, wire in sorted(same, key=lambda item: item[0])[:MOST_OTHERS]]
+class Others:
+    """The traces of other insertions, each those of one, in a row."""
+
+    def __init__(self, insertions: Sequence[Sequence[Trace]]) -> None:
+        self.traces = [(owner, *trace) for owner, traces in enumerate(insertions) for trace in traces]
+        self.depths_mm = np.array([depth for _, depth, _, _ in self.traces])
+
+    def nearest(self, depth_mm: float, curve: Array) -> list[Array]:
+        """Of each other insertion the trace of the nearest depth, of those that begin where the curve does."""
+        near: list[Array] = []
+        seen: set[int] = set()
+        for place in np.argsort(np.abs(self.depths_mm - depth_mm), kind="stable"):
+            owner, _, wire, _ = self.traces[place]
+            if owner not in seen and math.dist(wire[0], curve[0]) < SAME_ENTRY_MM:
+                near.append(wire)
+            seen.add(owner)
+            if len(near) == MOST_OTHERS:
+                break
+        return near

@@ -53,6 +53,7 @@ class Plan:
 
     limits : what a case may take.
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
+    left_out : ids of the manifest's cases that --only does not name.
     """
 
     manifest: Manifest
@@ -64,6 +65,7 @@ class Plan:
     limits: Limits = NO_LIMITS
     shard: str = ""
     assumptions: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
 
     @property
     def out(self) -> Path:
@@ -119,8 +121,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
     info |= {"sweep": heads, "until": plan.template.until, "planned": [case.id for case in plan.manifest.cases]}
-    info["config"] = settings.as_dict()
     name = f"run.{plan.shard.replace('/', '-')}.json" if plan.shard else "run.json"
+    info |= {"left_out": _never_asked(out / name, plan.left_out), "config": settings.as_dict()}
     try:
         write_json(out / name, info | {"cases": []})
         write_text(out / "config.resolved.toml", to_toml(settings))
@@ -137,6 +139,15 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
+
+
+def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
+    """Of what this run leaves out, the cases that the one which wrote ``info`` before was not to compute either."""
+    before: Mapping[str, Any] = {}
+    with suppress(ValueError):  # damaged: it tells nothing, and is written anew
+        before = read_json(info)
+    asked = set(before.get("planned") or ()) - set(before.get("left_out") or ())
+    return [name for name in left_out if name not in asked]
 
 
 def _remove_others(out: Path, manifest: str) -> None:

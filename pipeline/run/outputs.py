@@ -152,8 +152,8 @@ def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
 
 
 def write_frames(path: Path, known: Known) -> None:
-    """frames.h5: curves of every frame, projections of its scan, and the lumen's outline."""
-    scan = None
+    """frames.h5: curves of every frame, projections of its scan, and the lumen's outline, or the scan without one."""
+    scan = known.at_entry
     if known.lumen is not None:
         grid = known.lumen.distance
         inside = Volume((grid.values < 0).astype(np.uint8), grid.spacing_mm, grid.origin_mm, grid.direction)

@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipeline.compare import intervals
 from pipeline.compare.pooled import Scored, by_insertion, is_pooled, numbers, pooled, skill, squares_of, within
-from pipeline.run.results import Result, found_results, lost
+from pipeline.run import ledger
+from pipeline.run.results import Result, found_results, lost, untold
 from reports import tables
+from reports.case_files import find_cases
 from reports.schema import ERRORS, POINTS
 
 ALL = "(all)"
@@ -33,6 +36,12 @@ def found_cases(out: Path) -> list[Found]:
     results = found_results(out)
     insertions = insertions_of(results)
     return [_found(out, result, insertions[result.case]) for result in results]
+
+
+def golden_cases(out: Path) -> list[Found]:
+    """Every case of a folder of tables alone, as a baseline is kept: errors.csv, points.csv.gz and no result."""
+    folders = [f for f in find_cases(out) if (f / POINTS.file).exists() and not (f / ledger.RESULT).exists()]
+    return [_found(out, untold(folder.name), folder.name) for folder in folders]
 
 
 def insertions_of(results: Iterable[Result]) -> dict[str, str]:
@@ -78,8 +87,9 @@ def _scored(folder: Path, insertion: str) -> dict[int, Scored]:
         return {}
     points, errors = tables.read(folder / POINTS.file, POINTS), tables.read(folder / ERRORS.file, ERRORS)
     frame, distance = points["frame"].to_numpy(dtype=int), points["error_mm"].to_numpy(dtype=float)
-    rows = errors.astype(object).where(errors.notna(), None).to_dict("records")
-    scored = [Scored({str(k): v for k, v in row.items()}, distance[frame == row["frame"]], insertion) for row in rows]
+    # field by field: pandas takes ten times as long for the few rows of a case
+    rows = [{str(k): None if v is pd.NA or v != v else v for k, v in row.items()} for row in errors.to_dict("records")]
+    scored = [Scored(row, distance[frame == row["frame"]], insertion) for row in rows]
     return {int(one.row["frame"]): one for one in scored if is_pooled(one.row, one.error_mm)}
 
 
@@ -126,16 +136,23 @@ class Ratio:
         known = f"95 %: {self.low:.3f} to {self.high:.3f}, " if np.isfinite(self.low) else ""
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
-    def verdict(self, allowed: float = 1.0) -> str:
-        """The sentence, and what may be concluded from it. allowed : the ratio up to which nobody calls it worse."""
-        if self.value == 1.0 and not self.low < self.high:
-            meaning = "no frame's error changed"
+    def verdict(self, allowed: float = 1.0, ruler: str = "") -> str:
+        """The sentence, and what may be concluded from it.
+
+        allowed : the ratio up to which nobody calls it worse.     ruler : settings by which the two measure otherwise.
+        """
+        if ruler:
+            meaning = f"says nothing, since errors are measured otherwise in the second run ({ruler})"
+        elif self.value == 1.0 and not self.low < self.high:
+            meaning = "the error of no validation frame changed"
         elif not np.isfinite(self.low):
             meaning = "too few insertions to say whether another study would show the same"
         elif self.low <= 1.0 <= self.high:
             meaning = "no difference is shown"
         elif 1.0 < self.low <= allowed:
-            meaning = f"the second's errors are larger, by no more than is allowed (ratio {allowed:g})"
+            more = "whether by more" if self.value > allowed else "by no more"
+            meaning = f"the second's errors are larger, {more} than is allowed (ratio {allowed:g})"
+            meaning += " is not shown" * (self.value > allowed)
         else:
             meaning = "the second is worse" if self.low > 1.0 else "the second is better"
         return f"{self.sentence}: {meaning}"

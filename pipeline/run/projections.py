@@ -3,7 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.model import Volume
+from pipeline.model import Array, Volume
+
+SLAB_MM = 3.0
+"""To either side of a point: a vessel of the head, not its neighbours."""
 
 
 def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np.uint8], ...]:
@@ -12,6 +15,20 @@ def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np
     scale = 255.0 / max(high - low, 1e-9)
     peaks = (volume.values.max(axis=axis).astype(np.float32) for axis in range(3))
     return tuple(np.clip((peak - low) * scale, 0, 255).astype(np.uint8) for peak in peaks)
+
+
+def slabs(volume: Volume, point_mm: Array) -> tuple[NDArray[np.uint8], ...]:
+    """Maximum-intensity projections of what lies within ``SLAB_MM`` of a point (3,) along each array axis, 8 bit.
+
+    Of a point outside the scan they show its nearest faces.
+    """
+    index = np.clip(np.rint(volume.to_index(point_mm)), 0, np.array(volume.values.shape) - 1).astype(int)
+    half = np.maximum(1, np.rint(SLAB_MM / volume.spacing_mm)).astype(int)
+    each = [slice(max(0, i - h), i + h + 1) for i, h in zip(index, half, strict=True)]
+    parts = [volume.values[tuple(s if a == axis else slice(None) for a in range(3))] for axis, s in enumerate(each)]
+    peaks = [part.max(axis=axis).astype(np.float32) for axis, part in enumerate(parts)]
+    low, high = np.percentile(np.concatenate([peak.ravel() for peak in peaks]), (1.0, 99.9))
+    return tuple(np.clip((peak - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8) for peak in peaks)
 
 
 def grey_window(volume: Volume) -> tuple[float, float]:

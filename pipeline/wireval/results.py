@@ -1,5 +1,6 @@
 """What a run left in its folder, as pandas frames."""
 
+from collections.abc import Sized
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,7 +46,8 @@ class Results:
         """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""
         rows = self.summary[_SHOWN].head(10).to_string(index=False) if len(self.summary) else "no summary.csv"
         more = f"\n... and {len(self.summary) - 10} more cases" if len(self.summary) > 10 else ""
-        counts = f"{len(self.cases)} cases, {len(self.errors)} frames, {len(self.failures)} failures"
+        counted: dict[str, Sized] = {"case": self.cases, "frame": self.errors, "failure": self.failures}
+        counts = ", ".join(f"{len(of)} {name}{'s' * (len(of) != 1)}" for name, of in counted.items())
         return f"Results of {self.out}: {counts}\n{rows}{more}"
 
     def _repr_html_(self) -> str:

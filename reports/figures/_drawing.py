@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import to_rgb
+from matplotlib.colors import LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from reports.atomic import write_bytes
-from reports.colours import SIMULATED, TRACED, TRUE
+from reports.colours import BAD, ERROR_SCALE_MM, SIMULATED, TRACED, TRUE
 from reports.figures._style import SEQUENTIAL, Look
 from reports.tables import write_csv
 
@@ -29,6 +29,7 @@ Array = NDArray[np.floating[Any]]
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
 LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
+_ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
 
@@ -135,19 +136,27 @@ def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
         axes.set_ylim(bottom=0.0)
 
 
+def error_scale() -> Normalize:
+    """The one scale of distances to the traced wire."""
+    return LogNorm(*ERROR_SCALE_MM)
+
+
 def heat_map(
-    axes: Axes, grid: Array, edges: tuple[Array, Array], label: str, clip: float, bar: Look, **cells: Any
+    axes: Axes, grid: Array, edges: tuple[Array, Array], label: str, scale: Normalize, bar: Look, **cells: Any
 ) -> None:
     """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left light grey.
 
-    clip : the percentile at which colours end: one wild value must not turn all others dark.
+    scale : of the colours; what lies outside has that of the nearer end.
     bar, cells : what else matplotlib is told of the colour bar and of the cells.
     """
-    top = max(float(np.nanpercentile(grid, clip)), 1e-9) if np.isfinite(grid).any() else 1.0
-    mesh = axes.pcolormesh(*edges, grid, cmap=SEQUENTIAL, vmin=0.0, vmax=top, **cells)
-    extend = "max" if (grid > top).any() else "neither"
+    logarithmic, least = isinstance(scale, LogNorm), float(scale.vmin or 0.0)
+    mesh = axes.pcolormesh(*edges, np.maximum(grid, least), cmap=SEQUENTIAL, norm=scale, **cells)
     figure: Any = axes.get_figure()
-    figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)
+    extend = "both" if logarithmic else "max"
+    shown = figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)
+    if logarithmic:
+        shown.set_ticks(_ERROR_TICKS_MM, labels=[f"{mm:g}" for mm in _ERROR_TICKS_MM])
+        shown.ax.minorticks_off()
     axes.set_facecolor("0.93")
     plain(axes)
     axes.grid(visible=False)
@@ -183,6 +192,6 @@ def _palette() -> NDArray[np.uint8]:
     """Greys of a scan, and the curves' colours mixed with them: a palette taken from the picture loses these."""
     greys = np.repeat(np.linspace(0.0, 255.0, _GREYS)[:, None], 3, axis=1)
     backgrounds = np.linspace(0.0, 255.0, 5)
-    colours = [255.0 * np.array(to_rgb(c)) for c in (TRACED, SIMULATED, TRUE)]
+    colours = [255.0 * np.array(to_rgb(c)) for c in (TRACED, SIMULATED, TRUE, BAD)]
     mixed = [share * c + (1 - share) * b for c in colours for b in backgrounds for share in (1.0, 0.75, 0.5, 0.25)]
     return np.concatenate([greys, mixed]).round().astype(np.uint8)

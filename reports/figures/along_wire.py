@@ -2,32 +2,36 @@
 
 import numpy as np
 import pandas as pd
+from matplotlib.colors import Normalize
 from scipy.interpolate import interp1d
 
 from reports.case_files import CaseFiles
-from reports.figures._drawing import Drawing, FrameAxis, heat_map, new_figure, whole_numbers
+from reports.figures._drawing import Drawing, FrameAxis, error_scale, heat_map, new_figure, whole_numbers
 from reports.tables import has
 
-_CLIP_PERCENTILE = 99.5  # one wild point must not turn the whole map dark
+_MOST_OVER_U = 4.0  # twice what counts as beyond
+_CLIP_PERCENTILE = 99.5  # of forces, which have no scale of their own: one wild point must not turn the whole map dark
 
 
 def error_along_wire(case: CaseFiles) -> Drawing | None:
     """Distance to the traced curve along the simulated wire, of frames that are ok."""
     failed = set(case.errors["frame"]) - set(case.good["frame"])
     points = case.points[~case.points["frame"].isin(failed)]
-    return _along_wire(points, "error_mm", "distance to the traced curve, mm")
+    return _along_wire(points, "error_mm", "distance to the traced curve, mm", error_scale())
 
 
 def error_over_u(case: CaseFiles) -> Drawing | None:
     """The error across the traced wire over its uncertainty, of frames that are ok."""
     points = case.points[case.points["frame"].isin(case.good["frame"])]
-    return _along_wire(points, "error_over_u", "error over u (beyond 2: the model's)")
+    return _along_wire(points, "error_over_u", "error over u (beyond 2: the model's)", Normalize(0.0, _MOST_OVER_U))
 
 
 def contact_along_wire(case: CaseFiles) -> Drawing | None:
     """Magnitude of the wall's force along the simulated wire."""
     points = case.points if has(case.points, "contact_force_N") else _joints(case)
-    return _along_wire(points, "contact_force_N", "contact force, N")
+    known = points["contact_force_N"].dropna()
+    most = float(np.percentile(known, _CLIP_PERCENTILE)) if len(known) else 0.0
+    return _along_wire(points, "contact_force_N", "contact force, N", Normalize(0.0, max(most, 1e-9)))
 
 
 def _joints(case: CaseFiles) -> pd.DataFrame:
@@ -44,7 +48,7 @@ def _joints(case: CaseFiles) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if len(parts) > 1 else case.points
 
 
-def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None:
+def _along_wire(points: pd.DataFrame, column: str, label: str, scale: Normalize) -> Drawing | None:
     kept = points[points[column].notna() & points["arc_mm"].notna()]
     if kept.empty:
         return None
@@ -60,7 +64,7 @@ def _along_wire(points: pd.DataFrame, column: str, label: str) -> Drawing | None
     figure = new_figure(float(np.clip(1.4 + 0.12 * len(frames), 2.9, 7.0)))
     axes = figure.subplots()
     edges = (np.arange(grid.shape[1] + 1) - 0.5) * step, np.append(frames, frames[-1] + 1) - 0.5
-    heat_map(axes, grid, edges, label, _CLIP_PERCENTILE, bar={}, rasterized=True)
+    heat_map(axes, grid, edges, label, scale, bar={}, rasterized=True)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("arc length from the entry along the simulated wire, mm")
     axes.set_ylabel("frame")

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
@@ -38,6 +39,7 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     names = [name.replace("_", " ") for name in table["source"]]
     axes.set_yticks(places, ["error" if n == "error" else "all: u val" if n == "u val" else n for n in names])
     axes.invert_yaxis()
+    axes.xaxis.set_major_locator(MaxNLocator(5))  # more of 0.025, 0.050, ... run into each other
     axes.set_xlabel("u across the wire, mm")
     plain(axes)
     legend(axes, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)

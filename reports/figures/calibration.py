@@ -16,6 +16,7 @@ from reports.figures._drawing import (
     plain,
     plain_decades,
     positive_axis,
+    whole_numbers,
 )
 from reports.figures._style import BROWN, GREY
 
@@ -93,6 +94,7 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
         axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
         axes.set_title(str(case), fontsize=9)
         axes.set_xlabel("frame")
+        whole_numbers(axes.xaxis)
         plain(axes)
         positive_axis(axes, [own["before_mm"].dropna(), own["after_mm"].dropna()])
     panels[0].set_ylabel("mm rms")

@@ -10,11 +10,10 @@ from matplotlib.figure import Figure
 
 from reports.case_files import GOOD
 from reports.colours import BAD, SIMULATED
-from reports.figures._drawing import Drawing, heat_map, legend, new_figure, plain, whole_numbers
+from reports.figures._drawing import Drawing, error_scale, heat_map, legend, new_figure, plain, whole_numbers
 from reports.figures._style import Look, predictors
 from reports.tables import has
 
-_CLIP_PERCENTILE = 98.0  # one lost frame must not turn the others dark
 _MAX_INCH = 24.0
 _BAR_INCH = 4.0
 _TOP_TICKS_FROM = 30  # rows from which the lower axis is out of sight
@@ -49,8 +48,8 @@ def case_frame_map(run: RunFiles) -> Drawing | None:
     # a colour bar of readable size at the top, however tall the figure is
     share = min(1.0, _BAR_INCH / figure.get_figheight())
     bar: Look = {"shrink": share, "anchor": (0.0, 1.0), "aspect": 12, "fraction": 0.04}
-    look: Look = {"edgecolors": "white", "linewidth": 0.4}
-    heat_map(axes, grid, edges, "95th percentile, mm", _CLIP_PERCENTILE, bar, **look)
+    look: Look = {"edgecolors": "white", "linewidth": 0.4 if len(cases) <= _MAX_NAMES else 0.0}
+    heat_map(axes, grid, edges, "95th percentile, mm", error_scale(), bar, **look)
     axes.plot(frames[failed], rows[failed], "x", color=BAD, markersize=5)
     axes.set_xlabel("frame")
     whole_numbers(axes.xaxis)
@@ -74,7 +73,7 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
     axes.plot(table[column], places, marker, color=colour, fillstyle="none", label=label)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
-    legend(axes, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    legend(figure, *axes.get_legend_handles_labels(), ncols=3, loc="outside upper right")
     plain(axes)
     return Drawing(figure, table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column]])
 

@@ -106,6 +106,7 @@
   const open = () => {
     const aim = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
     for (let part = aim && aim.closest("details"); part; part = part.parentElement.closest("details")) part.open = true;
+    if (aim) aim.scrollIntoView(); // what was unfolded has made room for it
   };
   addEventListener("hashchange", open);
   open();
@@ -123,12 +124,25 @@
     nav.append(link);
   }
   const links = new Map(all("nav.contents a[href^='#']").map((link) => [link.hash.slice(1), link]));
-  const watcher = new IntersectionObserver((seen) => {
-    for (const { target, isIntersecting } of seen) if (isIntersecting) {
-      links.forEach((link) => { link.classList.remove("here"); link.removeAttribute("aria-current"); });
-      links.get(target.id).classList.add("here");
-      links.get(target.id).setAttribute("aria-current", "true");
+  const parts = all([...links.keys()].map((id) => `[id="${id}"]`).join() || "nav.nothing"); // as they stand in the page
+  const HERE_PX = 80; // a heading that a link went to lies within
+  let asked = 0;
+  const mark = () => {
+    asked = 0;
+    const tops = parts.map((part) => part.getBoundingClientRect().top);
+    let here = Math.max(0, tops.findLastIndex((top) => top < HERE_PX));
+    if (scrollY > 0 && scrollY + innerHeight > document.documentElement.scrollHeight - 2) { // the last parts never reach the top
+      const aim = parts.findIndex((part) => `#${part.id}` === location.hash);
+      here = aim > here && tops[aim] < innerHeight ? aim : here;
     }
-  }, { rootMargin: "0px 0px -75% 0px" });
-  links.forEach((_, id) => { const part = document.getElementById(id); if (part) watcher.observe(part); });
+    links.forEach((link) => { link.classList.remove("here"); link.removeAttribute("aria-current"); });
+    const link = parts.length && links.get(parts[here].id);
+    if (!link) return;
+    link.classList.add("here");
+    link.setAttribute("aria-current", "true");
+    if (nav.scrollWidth > nav.clientWidth) nav.scrollLeft = link.offsetLeft - nav.offsetLeft - nav.clientWidth / 3; // on a phone
+  };
+  const soon = () => { asked ||= requestAnimationFrame(mark); };
+  for (const event of ["scroll", "resize", "hashchange"]) addEventListener(event, soon, { passive: true });
+  soon();
 })();

@@ -8,7 +8,7 @@
   const css = (name) => style.getPropertyValue(name).trim();
   const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), lumen: css("--lumen") };
   const ORDER = ["traced", "true", "simulated"];
-  const MARGIN_MM = 5, LEAST_OFFSET_MM = 0.1;
+  const MARGIN_MM = 5;
   const shown = (name) => all(`[data-show="${name}"]`).every((box) => box.checked);
   const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
@@ -30,7 +30,7 @@
   const NEAR = hex(COLOUR.simulated), FAR = hex(COLOUR.far);
   const colourOf = (error) => {
     if (error === null) return COLOUR.simulated;
-    const t = clamp(error / data.top_mm, 0, 1);
+    const [low, high] = data.scale_mm, t = clamp(Math.log(Math.max(error, low) / low) / Math.log(high / low), 0, 1);
     return `rgb(${NEAR.map((c, i) => Math.round(c + t * (FAR[i] - c))).join(",")})`;
   };
   // the error at arc length s, between the samples; none where nothing was compared (the clamp's reach)
@@ -169,7 +169,7 @@
       label.textContent = `across ${NAMES[a]}; ${turned < 0 ? "down" : "up"} ${NAMES[b]}`;
     };
   };
-  const nice = (x, steps = [1, 2, 5, 10]) => { const power = 10 ** Math.floor(Math.log10(x)); return steps.map((k) => k * power).find((k) => k >= x * 0.999); };
+  const nice = (x) => { const power = 10 ** Math.floor(Math.log10(x)); return [1, 2, 5, 10].map((k) => k * power).find((k) => k >= x * 0.999); };
   const ruler = (pen, width, height, scale) => {
     const length = nice(width / scale / 8), text = `${Number(length.toPrecision(3))} mm`;
     pen.strokeStyle = "#ffffff"; pen.fillStyle = "#ffffff"; pen.lineWidth = 2; pen.font = "11px system-ui, sans-serif"; pen.textAlign = "left";
@@ -267,10 +267,9 @@
   const straight = () => {
     const { pen, width, height } = cleared($("straight"), paper ? "#ffffff" : css("--card")), f = frame(), ink = paper ? "#000000" : css("--ink"), line = paper ? "#bbbbbb" : css("--line");
     pen.font = "12px system-ui, sans-serif"; pen.fillStyle = ink;
-    if (!f.offsets) { pen.textAlign = "left"; pen.fillText("No traced wire in this frame: nothing to measure offsets from.", 12, 28); return; }
-    const least = slabOf(f, 0) ? f.straight.across_mm : LEAST_OFFSET_MM; // of a scan, a voxel and a half at least
-    const { from, length, px, X } = seen(f, width), within = sizesOf(f).filter((o) => o[0] >= from && o[0] <= from + length);
-    const most = nice(Math.max(least, ...within.map((o) => Math.max(Math.abs(o[1]), Math.abs(o[2])))), [1, 1.5, 2, 3, 4, 5, 6, 8, 10]);
+    if (!f.offsets) { pen.textAlign = "left"; ["No traced wire in this frame:", "nothing to measure offsets from."].forEach((text, i) => pen.fillText(text, 12, 28 + 17 * i)); return; }
+    const { from, length, px, X } = seen(f, width), most = Number($("range").value); // the same in all frames
+    const beyond = (f.offsets.simulated ?? []).some((o) => o[0] >= from && o[0] <= from + length && Math.max(Math.abs(o[1]), Math.abs(o[2])) > most);
     const high = (STRIP / 2 - 4) / most;
     for (const k of [0, 1]) {
       const zero = TOP + (k + 0.5) * STRIP + k * GAP, Y = (o) => zero - o * high, image = slabOf(f, k);
@@ -300,7 +299,7 @@
     pen.fillStyle = ink; pen.textAlign = "center";
     for (let s = Math.ceil(from / step) * step; s <= from + length + 1e-9; s += step) { pen.strokeStyle = line; pen.lineWidth = 1; trail(pen, [[X(s), bottom], [X(s), bottom + 4]]); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
     pen.fillText("arc length along the traced wire, mm", LEFT + (width - LEFT - RIGHT) / 2, bottom + 33);
-    pen.textAlign = "left"; pen.fillText(`offset across the traced wire${high > 1.2 * px ? `, \u00d7 ${Number((high / px).toPrecision(2))}` : ""}`, LEFT, 13);
+    pen.textAlign = "left"; pen.fillText(`offset across the traced wire${high > 1.2 * px ? `, \u00d7 ${Number((high / px).toPrecision(2))}` : ""}${beyond ? "; the simulated wire goes beyond" : ""}`, LEFT, 13);
     if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; trail(pen, [[X(cursor.s), TOP], [X(cursor.s), bottom]]); }
   };
   const across = () => {
@@ -376,7 +375,7 @@
   function draw() { asked ||= requestAnimationFrame(paint); }
   const go = (i) => { now = clamp(i, 0, data.frames.length - 1); $("frame").value = now; draw(); };
   $("frame").addEventListener("input", () => go(Number($("frame").value)));
-  for (const id of ["place", "zoom"]) $(id).addEventListener("input", draw);
+  for (const id of ["place", "zoom", "range"]) $(id).addEventListener("input", draw);
   all("[data-show]").forEach((box) => box.addEventListener("input", draw));
   all("a[data-frame]").forEach((link) => link.addEventListener("click", () => index.has(link.dataset.frame) && go(index.get(link.dataset.frame))));
   let timer = 0;

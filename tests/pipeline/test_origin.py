@@ -129,6 +129,32 @@ def test_a_shard_that_was_not_merged_is_missed(study: Path, tmp_path: Path, caps
     assert main(["report", str(tmp_path / "out"), "--overview"]) == 0
 
 
+def test_a_case_that_only_left_out_is_said_and_is_no_failure(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was exit 1, as if a shard had been lost."""
+    out = tmp_path / "out"
+    run(study, out, "--only", "a")
+    capsys.readouterr()
+    assert main(["report", str(out), "--overview"]) == 0
+    assert "left out by --only and without a result here: b" in capsys.readouterr().err
+    assert "left out by --only" in (out / "index.html").read_text(encoding="utf-8")
+    run(study, out, "--shard", "1/2")
+    assert main(["report", str(out), "--overview"]) == 1, "of a study in shards the other one is missed"
+
+
+def test_a_case_that_an_earlier_run_was_to_compute_is_missed_after_only(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    run(study, out)
+    shutil.rmtree(out / "cases" / "b")  # as if that run had been ended before
+    run(study, out, "--only", "a")
+    capsys.readouterr()
+    assert main(["report", str(out), "--overview"]) == 1
+    assert "named by the manifest and without a result here: b" in capsys.readouterr().err
+
+
 def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_path: Path) -> None:
     run(study, tmp_path / "out")
     path = tmp_path / "out" / "cases" / "a" / "result.json"

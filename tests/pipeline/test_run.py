@@ -31,6 +31,7 @@ from pipeline.simulate import wall_of
 from pipeline.status import FrameStatus
 from reports import tables
 from reports.colours import TRACED, TRUE, rgb
+from reports.frames_file import read_scan
 from reports.html import render_index
 from reports.schema import ERRORS, POINTS, SUMMARY, TIMINGS
 from solver import Status
@@ -314,6 +315,31 @@ def test_nothing_of_an_earlier_run_stays_beside_a_new_result(
     left = {p.name for p in (out / "cases" / "bifurcation").iterdir()}
     assert not left & {"points.csv.gz", "report.html", "figures", "scene3d.html"}
     assert not list((out / "cases" / "bifurcation" / "view").glob("wire_simulated*"))
+
+
+def test_the_page_of_a_case_without_a_lumen_shows_the_scan_at_the_entry(study: Path, tmp_path: Path) -> None:
+    """It had no picture, where one would have shown that the entry lies beside the vessel."""
+    folder = Path(shutil.copytree(study, tmp_path / "study"))
+    scan = sitk.ReadImage(str(folder / "reference.mha"))
+    beside = [3, 5, 7]
+    manifest = folder / "manifest.toml"
+    text = re.sub(
+        r"entry_mm = .*",
+        f"entry_mm = {list(scan.TransformContinuousIndexToPhysicalPoint(beside))}",
+        manifest.read_text(encoding="utf-8"),
+    )
+    manifest.write_text(text, encoding="utf-8")
+    assert run(folder, tmp_path / "out") == 1
+    case = tmp_path / "out" / "cases" / "bifurcation"
+    assert json.loads((case / "result.json").read_text(encoding="utf-8"))["status"] == "segment_failed"
+    shown = read_scan(case / "frames.h5")
+    assert shown is not None
+    values, slab = sitk.GetArrayFromImage(scan).T, shown.entry_slabs[2]
+    assert slab.shape == values.shape[:2]
+    half = max(1, round(3.0 / scan.GetSpacing()[2]))
+    peaks = values[:, :, max(0, 7 - half) : 7 + half + 1].max(axis=2)
+    assert np.corrcoef(slab.ravel(), peaks.ravel())[0, 1] > 0.95
+    assert 'id="scan_at_entry"' in (case / "report.html").read_text(encoding="utf-8")
 
 
 def test_report_rebuilds_from_files_alone(finished: Path, tmp_path: Path) -> None:

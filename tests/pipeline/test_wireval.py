@@ -48,7 +48,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert rms == pytest.approx(results.errors["rms_mm"].iloc[1], rel=1e-6)
     assert results.cases["straight"].read_frame(1).simulated_mm is not None
     assert "straight" in results._repr_html_()
-    assert "1 cases, 2 frames, 0 failures" in repr(results)
+    assert "1 case, 2 frames, 0 failures" in repr(results)
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)

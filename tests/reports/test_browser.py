@@ -146,6 +146,33 @@ def test_a_twentieth_of_a_millimetre_is_seen_on_the_strips(run: Path, tmp_path: 
         assert 0.05 * pixels_per_mm >= 2.0, said
 
 
+def test_the_strips_keep_their_range_from_frame_to_frame(run: Path, tmp_path: Path, opened: Opener) -> None:
+    page = opened(copied(run, "good", tmp_path))
+    chosen = page.input_value("#range")
+    page.focus("#frame")
+    page.keyboard.press("Home")
+    page.wait_for_timeout(150)
+    assert page.input_value("#range") == chosen
+    before = page.evaluate("document.getElementById('straight').toDataURL()")
+    page.select_option("#range", "5.0")
+    page.wait_for_timeout(150)
+    assert page.evaluate("document.getElementById('straight').toDataURL()") != before
+
+
+@pytest.mark.parametrize("viewport", [WIDE, NARROW], ids=["1280", "390"])
+def test_the_contents_mark_where_the_reader_is(run: Path, opened: Opener, viewport: Any) -> None:
+    """At the top they marked what stood last on the first screen."""
+    page = opened(run / "cases" / CASES[1].name / "report.html", viewport)
+    here = "[...document.querySelectorAll('nav a.here')].map((a) => a.innerText)"
+    assert page.evaluate(here) == ["Result"]
+    for name in ("Tip", "Frames", "Files"):
+        page.locator("nav.contents a", has_text=name).last.click()
+        page.wait_for_function(f"{here}.join() === '{name}'", timeout=5000)
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(200)
+    assert page.evaluate(here) == ["Result"]
+
+
 def test_scans_stay_and_curves_turn_on_a_dark_page(run: Path, opened: Opener) -> None:
     page = opened(run / "cases" / "good" / "report.html", color_scheme="dark")
     filters = page.evaluate("""() => Object.fromEntries([...document.querySelectorAll('.plot img')].map(

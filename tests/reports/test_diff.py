@@ -67,7 +67,9 @@ def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None
     bad = found.regressions[["case", "column", "after"]].to_numpy().tolist()
     assert bad == [["a", "frame", "missing"], ["b", "case", "missing"]]
     assert found.rows[found.rows["verdict"] == "new"]["case"].tolist() == ["c"]
-    assert found.sentence.endswith("2 regressions; the worst: case a frame 1, frame present -> missing")
+    assert found.sentence.startswith(
+        "2 of 3 cases compared: 2 regressions; the worst: case a frame 1, frame present -> missing"
+    )
 
 
 @settings(max_examples=30, deadline=None)

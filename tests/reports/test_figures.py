@@ -15,8 +15,8 @@ from PIL import Image
 
 from reports import tables
 from reports.case_files import CaseFiles, read_case
-from reports.colours import TRACED
-from reports.figures import RunFiles, _drawing, _planes, figures_of
+from reports.colours import ERROR_SCALE_MM, TRACED
+from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
@@ -63,7 +63,15 @@ def test_very_short_insertions_are_drawn(count: int, tmp_path: Path) -> None:
     out = write_run(tmp_path / "out", (FakeCase("c", frames=count, truth=True), FakeCase("d", frames=count)))
     case = read_case(out / "cases" / "c")
     drawn = [name for name, draw in CASE_FIGURES.items() if draw(case) is not None]
-    absent = {"failed_projections", "simulated_wires", "views", "budget", "error_over_u", "release_frames"}
+    absent = {
+        "scan_at_entry",
+        "failed_projections",
+        "simulated_wires",
+        "views",
+        "budget",
+        "error_over_u",
+        "release_frames",
+    }
     assert set(CASE_FIGURES) - set(drawn) == absent
     run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
     assert RUN_FIGURES["case_frame_map"](run) is not None
@@ -109,6 +117,41 @@ def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     grid = np.ma.filled(np.ma.masked_invalid(mesh.get_array()), -1.0)
     assert grid.shape[0] == 3
     assert np.all(grid[1] == -1.0)
+
+
+def test_colours_of_errors_mean_the_same_in_every_run(tmp_path: Path) -> None:
+    """They were stretched to the largest of each run: two runs' pictures could not be compared."""
+    scales = set()
+    for name, error in (("near", 0.02), ("far", 3.0)):
+        out = write_run(tmp_path / name, [FakeCase("c", frames=3, error_mm=error)])
+        case = read_case(out / "cases" / "c")
+        run = RunFiles({"c": case.errors}, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
+        drawings = CASE_FIGURES["error_along_wire"](case), RUN_FIGURES["case_frame_map"](run)
+        meshes = [drawing.figure.axes[0].collections[0] for drawing in drawings if drawing is not None]
+        scales |= {(type(mesh.norm).__name__, mesh.norm.vmin, mesh.norm.vmax) for mesh in meshes}
+        assert len(meshes) == 2
+        assert all(np.nanmin(np.ma.filled(mesh.get_array(), np.nan)) >= ERROR_SCALE_MM[0] for mesh in meshes)
+    assert scales == {("LogNorm", *ERROR_SCALE_MM)}
+    said = "from {:g} mm and less to {:g} mm and more".format(*ERROR_SCALE_MM)
+    entries = {entry["figure"]: entry["read"] for page in ("case", "run") for entry in declared(page)}
+    assert all(said in entries[name] for name in ("error_along_wire", "case_frame_map"))
+
+
+def test_where_no_lumen_was_found_the_scan_is_shown_at_the_entry(tmp_path: Path) -> None:
+    """The page had no picture at all. The entry may lie beside the scan, which is then what is to be seen."""
+    slabs = {axis: np.full(np.delete((20, 24, 28), axis), 40 * axis + 40, np.uint8) for axis in range(3)}
+    scan = ScanCrop(np.full(3, 0.5), np.zeros(3), np.eye(3), (20, 24, 28), entry_slabs=slabs)
+    write_frames(tmp_path / "frames.h5", scan, [FrameArrays(0)])
+    for x in (5.0, 40.0):
+        entry = {"entry_mm": [x, 6.0, 0.0], "entry_direction": [0.0, 0.0, 2.0]}
+        read = read_scan(tmp_path / "frames.h5")
+        drawing = CASE_FIGURES["scan_at_entry"](_empty_case(tmp_path, scan=read, result={"entry": entry}))
+        assert drawing is not None
+        assert drawing.table.iloc[0][["x_mm", "y_mm", "z_mm"]].tolist() == [x, 6.0, 0.0]
+        front = drawing.figure.axes[0]
+        assert front.get_xlim()[0] < x < front.get_xlim()[1]
+        assert front.images[0].get_array().shape == (28, 20)
+        assert front.get_lines()[0].get_xydata()[0].tolist() == [x, 0.0]
 
 
 def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:

@@ -164,6 +164,22 @@ def test_numbers_on_the_page_are_those_of_the_files(run: Path) -> None:
     assert f"<td>{errors['p95_mm'][5]:.3f}</td>" in text
 
 
+def test_a_few_numbers_are_tiles_and_the_others_a_table(run: Path) -> None:
+    """There were fifteen tiles."""
+    for page in _pages(run):
+        text = page.read_text(encoding="utf-8")
+        assert len(re.findall(r'<div class="card">', text)) <= 6, page
+    text = (run / "cases" / "cow-seed-100" / "report.html").read_text(encoding="utf-8")
+    tiles = re.findall(r'<div class="card"><b>[^<]*</b><span>([^<(]*)', text)
+    assert [label.split(",")[0].strip() for label in tiles[:2]] == ["of 6 frames with a result", "mm rms"]
+    assert "mm, deepest overlap with the wall" in text
+
+
+def test_the_page_of_a_run_repeats_the_warnings_of_its_cases(run: Path) -> None:
+    text = (run / "index.html").read_text(encoding="utf-8")
+    assert "<li>phantom &lt;run&gt; 2: roll is unknown and was taken as 0</li>" in text
+
+
 def test_what_was_simulated_stands_on_the_page(run: Path) -> None:
     """Also the catheter, where down is, and the length of the segments that nobody typed, with its reason."""
     folder = next(

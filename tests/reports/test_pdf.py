@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -33,6 +34,27 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     )
     for page, words in zip(pages, (*said, ("solver.segment_mm", "frames_failed")), strict=True):
         assert not [word for word in words if word not in page], page
+
+
+def test_warnings_and_assumptions_stand_on_the_first_page(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", [FakeCase(name, frames=2) for name in "ab"])
+    for path in out.glob("cases/*/result.json"):
+        result = json.loads(path.read_text(encoding="utf-8"))
+        warnings = [f"warning {n} " + "of many words " * 40 for n in range(7)]
+        assumptions = ["the roll is 0", f"only {path.parent.name} says so"]
+        path.write_text(json.dumps(result | {"warnings": warnings, "assumptions": assumptions}), encoding="utf-8")
+    page = next(pdf._pages(out, tables.read(out / "summary.csv", SUMMARY)))
+    said = " ".join(text.get_text() for text in page.figure.texts)
+    for words in (
+        "Warnings (7)",
+        "a, b: warning 0",
+        "and 3 more",
+        "Assumptions (3)",
+        "a, b: the roll is 0",
+        "b: only b",
+    ):
+        assert words in said
+    assert page.at > 0.3, "room for more than that"
 
 
 @pytest.mark.parametrize("cases", [(), (FakeCase("s", frames=2, simulated_only=True),)], ids=["none", "simulated"])

@@ -15,7 +15,7 @@ from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
 from reports.junit import write_junit
-from reports.schema import ERRORS, POINTS
+from reports.schema import ERRORS, POINTS, SIMULATORS
 from reports.two_runs import Verdict
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -54,7 +54,7 @@ def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[
     assert main(["diff", str(first), str(first)]) == 0
     said = capsys.readouterr().out
     assert "What differs" not in said
-    assert "no frame's error changed" in said
+    assert "the error of no validation frame changed" in said
     assert said.splitlines()[-1].startswith("not worse")
 
 
@@ -163,12 +163,110 @@ def test_what_is_missing_is_worse(first: Path, second: Path, tmp_path: Path) -> 
     assert [f.text for f in ET.parse(junit).findall(".//failure")] == ["case: present -> missing"]
 
 
-def test_golden_tables_alone_are_enough(first: Path, tmp_path: Path) -> None:
-    """A baseline in a repository is errors.csv and no more: frame by frame is all that can be said."""
+def test_golden_tables_alone_are_enough(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With points.csv.gz a baseline of tables holds over all frames, too; without, that nothing is judged is said."""
     for name in GROUPS:
         (tmp_path / "golden" / "cases" / name).mkdir(parents=True)
         shutil.copy(first / "cases" / name / ERRORS.file, tmp_path / "golden" / "cases" / name)
-    assert main(["diff", str(tmp_path / "golden"), str(first)]) == 0
+    times(second, 1.1)
+    assert main(["diff", str(tmp_path / "golden"), str(second)]) == 0
+    said = capsys.readouterr().out
+    assert "over all frames nothing is judged: no frame has points in both runs" in said.splitlines()[-1]
+    assert said.count("(not kept)") == 1, "one row, not one a setting"
+    for name in GROUPS:
+        shutil.copy(first / "cases" / name / POINTS.file, tmp_path / "golden" / "cases" / name)
+    assert main(["diff", str(tmp_path / "golden"), str(second)]) == 1
+    assert "over all frames it is worse" in capsys.readouterr().out.splitlines()[-1]
+
+
+def test_what_only_the_second_run_has_is_told_apart(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its tests passed, and it was counted as compared."""
+    less, junit = shutil.copytree(first, tmp_path / "less"), tmp_path / "diff.xml"
+    shutil.rmtree(less / "cases" / "a")
+    for folder, change in ((less, "drop"), (second, "fail")):
+        path = folder / "cases" / "b" / ERRORS.file
+        rows = tables.read(path, ERRORS)
+        rows.loc[2, "status"] = "load_failed"
+        tables.write(path, ERRORS, rows.drop(index=2) if change == "drop" else rows)
+    assert main(["diff", str(less), str(second), "--junit", str(junit)]) == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert "2 of 3 cases compared: no regression" in said
+    assert "only the second run has them: 4 frames, 1 of which failed" in said
+    skipped = [str(test.get("message")) for test in ET.parse(junit).findall(".//skipped")]
+    new = [text for text in skipped if text.startswith("only the second run has it: ")]
+    assert sorted(text.rpartition(" ")[2] for text in new) == ["load_failed", "ok", "ok", "ok"]
+    assert not [t for t in ET.parse(junit).findall(".//testcase") if "nan" in str(t.get("name")).lower()]
+
+
+def test_another_ruler_makes_nothing_better(first: Path, second: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    times(second, 0.5)
+    for out, value in ((first, 10.0), (second, 0.0)):
+        for path in out.glob("cases/*/result.json"):
+            result = json.loads(path.read_text(encoding="utf-8"))
+            result["config"].setdefault("compare", {})["skip_mm"] = {"value": value, "source": "command line"}
+            path.write_text(json.dumps(result), encoding="utf-8")
+    assert main(["diff", str(first), str(second)]) == 0
+    said = capsys.readouterr().out
+    assert "the second is better" not in said
+    assert "errors are measured otherwise in the second run (compare.skip_mm)" in said.splitlines()[-1]
+
+
+def test_a_run_that_ended_before_frames_are_compared_is_no_baseline(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Depth, overlap and force were compared, and the errors were not worse."""
+    for name in GROUPS:
+        path = second / "cases" / name / ERRORS.file
+        rows = tables.read(path, ERRORS)
+        kept = ["frame", "status", "insertion_mm", "max_penetration_mm", "push_force_N"]
+        tables.write(path, ERRORS, rows[kept].assign(max_penetration_mm=0.1))
+    for candidate in (first, second):
+        assert main(["diff", str(second), str(candidate)]) == 2
+        assert "has an error that the tolerance names" in capsys.readouterr().err
+    own = tmp_path / "forces.toml"
+    own.write_text("max_penetration_mm = 0.02", encoding="utf-8")
+    assert main(["diff", str(second), str(second), "--tolerance", str(own)]) == 0, "asked for"
+
+
+@pytest.mark.parametrize(("text", "said"), [("status = 1", "status holds no number"), (None, "no such file")])
+def test_a_tolerance_that_cannot_be_used_is_named(
+    first: Path, tmp_path: Path, text: str | None, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "own.toml"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    assert main(["diff", str(first), str(first), "--tolerance", str(path)]) == 2
+    assert f"own.toml: {said}" in capsys.readouterr().err
+
+
+def test_two_scores_are_compared_simulator_by_simulator(
+    first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first simulator's wires alone were looked at."""
+    scores = [shutil.copytree(first, tmp_path / name) for name in ("old", "new")]
+    times(second, 3.0)
+    for score, own, names in zip(scores, (first, second), ("abc", "abd"), strict=True):
+        tables.write(score / SIMULATORS.file, SIMULATORS, [{"simulator": name} for name in names])
+        for name in names[1:]:
+            shutil.copytree(own, score / "simulators" / name)
+    junit, page = tmp_path / "diff.xml", tmp_path / "diff.html"
+    (scores[1] / "simulators" / "b" / "cases" / "b" / "report.html").touch()
+    assert main(["diff", *map(str, scores), "--junit", str(junit), "--html", str(page)]) == 1
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert "the worst: c, case (all), simulator present -> missing" in said
+    suites = {suite.get("name"): suite for suite in ET.parse(junit).findall("testsuite")}
+    assert {name: suite.get("failures") for name, suite in suites.items() if name != "all"} == {
+        **{f"a, {name}": "0" for name in GROUPS},
+        **{f"b, {name}": "3" for name in GROUPS},
+        "c, (all)": "1",
+        "d, (all)": "0",
+    }
+    assert 'href="new/simulators/b/cases/b/report.html"' in page.read_text(encoding="utf-8")
+    assert main(["diff", str(scores[0]), str(scores[0])]) == 0
 
 
 @pytest.mark.parametrize(
@@ -177,13 +275,20 @@ def test_golden_tables_alone_are_enough(first: Path, tmp_path: Path) -> None:
         (Ratio(1.2, 1.1, 1.3, 5, "over 6 insertions"), "the second is worse"),
         (Ratio(0.8, 0.7, 0.9, 5, "over 6 insertions"), "the second is better"),
         (Ratio(1.2, 0.9, 1.5, 5, "over 6 insertions"), "no difference is shown"),
+        (Ratio(1.11, 1.04, 1.2, 5, "over 6 insertions"), "the second is worse"),
         (Ratio(1.2, float("nan"), float("nan"), 5, "withheld"), "too few insertions"),
-        (Ratio(1.0, 1.0, 1.0, 5, "over 6 insertions"), "no frame's error changed"),
+        (Ratio(1.0, 1.0, 1.0, 5, "over 6 insertions"), "the error of no validation frame changed"),
     ],
 )
 def test_the_words_follow_the_interval(ratio: Ratio, meaning: str) -> None:
     assert meaning in ratio.verdict()
     assert "is worse" not in ratio.verdict(1.15), "as the gate has it"
+
+
+def test_larger_than_is_allowed_and_not_shown_to_be() -> None:
+    """Said to be larger "by no more than is allowed"."""
+    assert "whether by more than is allowed (ratio 1.05) is not shown" in Ratio(1.11, 1.04, 1.2, 5, "").verdict(1.05)
+    assert "by no more than is allowed" in Ratio(1.04, 1.01, 1.08, 5, "").verdict(1.05)
 
 
 def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:

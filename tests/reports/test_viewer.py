@@ -90,5 +90,17 @@ def test_the_scan_along_the_wire_goes_from_file_to_page(tmp_path: Path) -> None:
     assert np.corrcoef(last.ravel(), values[-1][::-1].astype(float).ravel())[0, 1] > 0.9
 
 
+def test_the_strips_of_a_page_reach_as_far_in_every_frame(tmp_path: Path) -> None:
+    """They reached to each frame's largest offset: 5 mm, where one point was so far off."""
+    assert viewer.range_mm([0.1] * 19 + [4.0], 0.0) == 0.5
+    assert viewer.range_mm([0.1] * 100 + [4.0], 0.0) == 0.1
+    assert viewer.range_mm([0.1], 0.3) == 0.5, "a sample of the scan behind"
+    assert viewer.range_mm([80.0], 0.3) == viewer.RANGES_MM[-1]
+    data = viewer.viewer_data(read_case(write_run(tmp_path, (FakeCase("c", frames=3),)) / "cases" / "c"))
+    assert data is not None
+    errors = [e for frame in data["frames"] for e in frame["error_mm"] if e is not None]
+    assert data["range_mm"] == viewer.range_mm(errors, data["frames"][0]["straight"]["across_mm"])
+
+
 def test_a_case_without_frames_has_no_viewer(tmp_path: Path) -> None:
     assert viewer.viewer_data(read_case(tmp_path)) is None

@@ -10,7 +10,7 @@ from pipeline.run.log import STAGES, Stage
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Context, Known
 from pipeline.run.stages.load import open_case
-from pipeline.run.stages.segment import segment_vessel
+from pipeline.run.stages.segment import scan_at_entry, segment_vessel
 from pipeline.run.stages.simulate import simulate_frames
 from pipeline.run.stages.trace import trace_frames
 from pipeline.status import StageError
@@ -37,5 +37,6 @@ def run_stages(run: Context, until: Stage = "report") -> Known:
             known = step(run, known)
         except StageError as error:
             frames = tuple(frame.failed(stage, error) for frame in known.frames)
-            return replace(known, frames=frames, failure=error, failed_stage=stage)
+            unseen = scan_at_entry(run, known) if known.lumen is None else None
+            return replace(known, frames=frames, failure=error, failed_stage=stage, at_entry=unseen)
     return known

@@ -22,7 +22,7 @@ from pipeline.simulate.resolution import AGREED_MM
 from pipeline.status import FrameStatus, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
-from reports.frames_file import Straightened
+from reports.frames_file import ScanCrop, Straightened
 from solver import Solution, Status
 
 
@@ -105,7 +105,7 @@ class Known:
     """What is known of a case so far.
 
     clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
-    failure : why the case went no further.
+    failure : why the case went no further.     at_entry : what the scan shows there, where no lumen was found.
     """
 
     scans: Scans | None = None
@@ -117,6 +117,7 @@ class Known:
     entries: tuple[dict[str, Any], ...] = ()
     failure: StageError | None = None
     failed_stage: str = ""
+    at_entry: ScanCrop | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,12 @@ import numpy as np
 
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
+from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
 from pipeline.segment.given import given_lumen
+from pipeline.status import StageError
+from reports.frames_file import ScanCrop
 
 
 def segment_vessel(run: Context, known: Known) -> Known:
@@ -29,3 +32,17 @@ def segment_vessel(run: Context, known: Known) -> Known:
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)
+
+
+def scan_at_entry(run: Context, known: Known) -> ScanCrop | None:
+    """What a reader looks at where no lumen was found: the scan about the entry; None where it cannot be read."""
+    scan = None if known.scans is None else known.scans.first
+    if scan is None:
+        return None
+    try:
+        volume = Crop(scan, scan.box, run.config.load).load()
+    except StageError:  # it is the very failure
+        return None
+    pictures = dict(enumerate(slabs(volume, np.array(run.case.entry_mm))))
+    shape = (scan.shape[0], scan.shape[1], scan.shape[2])
+    return ScanCrop(volume.spacing_mm, volume.origin_mm, volume.direction, shape, entry_slabs=pictures)

@@ -1,0 +1,47 @@
+"""The verdict on two scores: every simulator that both hold, each against itself, as one."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from reports.diff import Difference
+from reports.two_runs import Judged, Verdict
+
+
+def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[str], come: list[str]) -> Verdict:
+    """One verdict from those on simulators by name, whose worst it is.
+
+    gone, come : simulators that only the first run has, which is a regression, and only the second, which is new.
+    """
+    whole = {"case": "(all)", "frame": pd.NA, "column": "simulator", "change": math.nan, "allowed": math.nan}
+    lost = {"before": "present", "after": "missing", "verdict": "regression"}
+    found = {"before": "missing", "after": "present", "verdict": "new"}
+    lone = [{"simulator": n} | whole | what for names, what in ((gone, lost), (come, found)) for n in names]
+    tables = [part.frames.rows.assign(simulator=name) for name, part in parts.items()]
+    rows = pd.concat([*tables, *[pd.DataFrame(lone)] * bool(lone)], ignore_index=True)
+    rows = rows[["simulator", *rows.columns.drop("simulator")]]
+    empty = tuple(f"{name}: {case}" for name, part in parts.items() for case in part.frames.empty)
+    judged: Judged = "holds"
+    for word in ("withheld", "worse"):
+        judged = word if any(part.judged == word for part in parts.values()) else judged
+    return Verdict(
+        runs,
+        _differs(parts),
+        [{"simulator": name, **row} for name, part in parts.items() for row in part.pooled],
+        "; ".join(f"{name}: {part.paired}" for name, part in parts.items() if part.paired),
+        judged,
+        Difference(rows, empty),
+        "; ".join(dict.fromkeys(part.caveat for part in parts.values() if part.caveat)),
+    )
+
+
+def _differs(parts: Mapping[str, Verdict]) -> list[dict[str, Any]]:
+    """What differs for every simulator once, and the rest with the simulator's name before it."""
+    told = {name: [dict(row) for row in part.differs] for name, part in parts.items()}
+    first = next(iter(told.values()), [])
+    common = [row for row in first if all(row in rows for rows in told.values())]
+    own = [row | {"what": f"{name}: {row['what']}"} for name, rows in told.items() for row in rows if row not in common]
+    return [*common, *own]
