@@ -110,6 +110,41 @@ def test_no_number_is_pooled_from_a_table_that_was_changed(out: Path, capsys: py
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
 
 
+@pytest.mark.parametrize("how", ["gone", "cut short"])
+def test_a_page_stays_where_what_it_is_drawn_from_is_not_whole(
+    out: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was drawn again without its viewer, exit 0."""
+    path, page = case_of(out) / "frames.h5", (case_of(out) / "report.html").read_bytes()
+    content = path.read_bytes()
+    path.unlink()
+    if how == "cut short":
+        path.write_bytes(content[:-1])
+    assert main(["report", str(out)]) == 1
+    words = "is missing" if how == "gone" else "is not as it was written"
+    assert f"1/1 bifurcation: its page stays as it was: frames.h5 {words}; run" in capsys.readouterr().err
+    assert (case_of(out) / "report.html").read_bytes() == page
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok"], "its tables are whole"
+
+
+@pytest.mark.parametrize("how", ["gone", "half"])
+def test_tables_without_their_ledger_are_not_believed(
+    study: Path, whole: Path, out: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was the way round every check."""
+    path = case_of(out) / "ledger.json"
+    _ = path.unlink() if how == "gone" else path.write_text('{"key": "', encoding="utf-8")
+    for more in ((), ("--overview",)):
+        assert main(["report", str(out), *more]) == 1
+        assert f"{case_of(out)}: ledger.json is missing or cannot be read; run the case" in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+    assert main(["diff", str(whole), str(out)]) == 1
+    with held(case_of(out), print):  # as between the result and its ledger
+        assert main(["report", str(out), "--overview"]) == 0
+    assert run(study, out) == 0
+    assert differences(whole, out) == []
+
+
 def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:
     shutil.rmtree(case_of(out) / "figures")
     (case_of(out) / "report.html").write_text("half a pa", encoding="utf-8")
