@@ -245,6 +245,8 @@ def last_line(totals: Totals, index: Path) -> str:
     parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+    elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
+        parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
     if totals.sweep_lost:
         parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):

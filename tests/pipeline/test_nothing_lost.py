@@ -106,7 +106,9 @@ def test_no_number_is_pooled_from_a_table_that_was_changed(out: Path, capsys: py
     path = case_of(out) / "errors.csv"
     path.write_text(path.read_text(encoding="utf-8").replace(",ok,", ",ok, "), encoding="utf-8")
     assert main(["report", str(out)]) == 1
-    assert "errors.csv is not as it was written" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "errors.csv is not as it was written" in said.err
+    assert "0 ok.  1 of the cases not ok (failures.csv)" in said.out
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
 
 
