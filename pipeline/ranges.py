@@ -14,6 +14,11 @@ def _number(value: Any) -> Any:
     return value
 
 
+def reason(said: str) -> str:
+    """Why a value is refused: what pydantic says, without the kind of its error."""
+    return said.removeprefix("Value error, ").replace("Input should be", "expected")
+
+
 Number = BeforeValidator(_number)
 Finite = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False), Number]
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False), Number]

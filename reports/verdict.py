@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from math import isnan, nan
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,8 @@ def _unknown_roll(statistics: Mapping[str, Any]) -> str:
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if standing(statistics) != NO_BETTER or not unknown < FAR_BELOW * rms:
         return ""
-    return f'It is worse than with an unknown roll ({number(unknown)} mm): try roll_deg = "fit".'
+    mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
+    return f"It is worse than with an unknown roll ({number(unknown)} mm): {mend}."
 
 
 def tips_off(statistics: Mapping[str, Any]) -> str:
@@ -108,6 +109,8 @@ def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float]:
     """A rival in words, the skill against it and the lower end of its interval; NaN for what is not known."""
     for column, name in (("skill_strongest", statistics.get("strongest_null")), ("skill", "centreline")):
         skill, least = (_number(statistics.get(key)) for key in (column, f"{column}_low"))
+        if isnan(least) and f"{column}_low" in str(statistics.get("interval")):  # named there: it has no lower end
+            least = -inf
         if not isnan(skill) and name:
             return _rival(str(name)) if column != "skill" else "the lumen's centreline", skill, least
     return "", nan, nan
@@ -121,9 +124,13 @@ def _against(statistics: Mapping[str, Any]) -> str:
     said = {
         TIPS_OFF: f"By rms_mm alone it would be better (skill {number(skill)})",
         NO_BETTER: f"That is no better (skill {number(skill)})",
-        NOT_SHOWN: f"It is not shown to be better (the skill's interval reaches {number(least)})",
+        NOT_SHOWN: f"It is not shown to be better (the skill's interval {_down_to(least)})",
     }
     return f"{said.get(standing(statistics), f'That is better (skill {number(skill)})')} than {rival}."
+
+
+def _down_to(least: float) -> str:
+    return "has no lower end" if least == -inf else f"reaches {number(least)}"
 
 
 def _rival(name: str) -> str:

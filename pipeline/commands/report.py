@@ -35,7 +35,6 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.launch import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
-    from reports.case_files import left_out_sentence, left_over_sentence, not_run_sentence
     from reports.html import render_index
     from reports.inside import links_out
 
@@ -55,11 +54,23 @@ def main(args: argparse.Namespace) -> int:
         from reports.pdf import write_pdf
 
         say(f"summary: {write_pdf(args.out)}")
-    missing = not_run_sentence(args.out)
-    for aside in filter(None, (left_over_sentence(args.out), left_out_sentence(args.out), missing)):
-        sys.stderr.write(f"{aside}\n")
+    whole = _all_there(args.out, found if args.overview else ())
     say(last_line(totals, page))
-    return 0 if totals.all_ok and others_ok and drawn and not missing else 1
+    return 0 if totals.all_ok and others_ok and drawn and whole else 1
+
+
+def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
+    """Whether every case that the runs into a folder name has a result; cases that have none, or nobody names, said.
+
+    found : results of which those that are damaged are still to be said, too.
+    """
+    from reports.case_files import find_cases, left_out_sentence, left_over_sentence, not_run_sentence
+
+    missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
+    damaged = [str(result.failures[0]["message"]) for result in found if result.status == "damaged"]
+    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing, *damaged)):
+        sys.stderr.write(f"{name}{aside}\n")
+    return not missing
 
 
 def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
@@ -80,7 +91,8 @@ def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
 
 
 def _drawn(out: Path, embed: bool, result: "Result") -> str:
-    """Draw the page of a case that has frames; why that cannot be, or nothing."""
+    """Draw the page of a case that has frames; why that cannot be, or nothing. What it is drawn from must be whole."""
+    from pipeline.run import ledger
     from pipeline.run.case import draw
     from pipeline.run.log import CaseProgress
     from pipeline.run.occupied import held
@@ -88,6 +100,10 @@ def _drawn(out: Path, embed: bool, result: "Result") -> str:
 
     folder = out / "cases" / result.case
     try:
+        written = ledger.read(folder)
+        wrong = written.amiss(folder, ledger.DATA) if written and result.frames else ""
+        if wrong:
+            return f"its page stays as it was: {wrong}; run the case again"
         if result.frames:
             with held(folder, CaseProgress(result.case, folder / "log.txt").warn):
                 draw(folder, "embedded" if embed else "linked")
@@ -101,6 +117,7 @@ def _drawn(out: Path, embed: bool, result: "Result") -> str:
 def _others(out: Path, *, embed: bool) -> bool:
     """In a score the tables and pages of the other simulators and of all side by side; whether all of them are ok."""
     from pipeline.run.aggregate import aggregate
+    from pipeline.run.results import found_results
     from pipeline.run.simulators import side_by_side
     from reports.html import render_index
     from reports.simulators import folders_in
@@ -108,7 +125,7 @@ def _others(out: Path, *, embed: bool) -> bool:
     folders = folders_in(out)
     good = []
     for name, folder in [*folders.items()][1:]:
-        good.append(aggregate(folder).all_ok)
+        good += [aggregate(folder).all_ok, _all_there(folder, found_results(folder), f"{name}: ")]
         say(f"{name}: report: {render_index(folder, embed)}")
     for line in side_by_side(out, folders, embed) if folders else ():
         say(line)

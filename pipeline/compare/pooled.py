@@ -54,7 +54,7 @@ def pooled(frames: Sequence[Scored]) -> dict[str, Any]:
     # by Pythagoras: one offset common to all frames is taken off, the part of the error along the wire that it explains
     left = result["arc_rms_mm"] ** 2 - result["depth_offset_mm"] ** 2
     result["arc_offset_rms_mm"] = float(np.sqrt(max(left, 0.0))) if np.isfinite(left) else float("nan")
-    return result | _releases(frames) | _with_intervals(frames, points)
+    return result | _releases(frames) | _with_intervals(frames, points, result)
 
 
 def _releases(frames: Sequence[Scored]) -> dict[str, Any]:
@@ -108,25 +108,31 @@ def by_insertion(frames: Sequence[Scored], *values: Array) -> list[Array]:
     return [np.array([float(of[rows].sum()) for rows in chosen]) for of in values]
 
 
-def _with_intervals(frames: Sequence[Scored], points: Array) -> dict[str, Any]:
-    """The statistics that have intervals (rms, median tip, skill), and what these rest on."""
+def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dict[str, Any]:
+    """The intervals of two statistics (rms, median tip), skill with its own, and what these rest on.
+
+    values : of the statistics.
+    """
     squares, nulls = squares_of(frames), points * numbers(frames, "null_centreline_rms_mm") ** 2
     names = list(dict.fromkeys(frame.insertion for frame in frames))
     own = [[frame for frame in frames if frame.insertion == name] for name in names]
-    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
+    ends = np.exp(0.5 * np.array(intervals.of_log_ratio(*by_insertion(frames, squares, points, points))))
+    rms_ends = intervals.holding(values["rms_mm"], *map(float, ends))
     tips = intervals.of_medians([numbers(part, "tip_mm") for part in own])
+    tips = intervals.holding(values["tip_median_mm"], *tips)
     mean_squares = [np.array([float(np.mean(f.error_mm**2)) for f in part]) for part in own]
-    return {
+    found = {
         "insertions": len(names),
-        "interval": intervals.note(len(names)),
         "effective_frames": intervals.effective_frames(mean_squares),
-        "rms_low_mm": float(low),
-        "rms_high_mm": float(high),
+        "rms_low_mm": rms_ends.low,
+        "rms_high_mm": rms_ends.high,
         "tip_low_mm": tips.low,
         "tip_high_mm": tips.high,
         **skill(frames, squares, nulls),
         **strongest(frames, squares, points),
     }
+    row, told = intervals.fields(found, intervals.note(len(names)))
+    return row | {"interval": told}
 
 
 def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill") -> dict[str, float]:
@@ -142,7 +148,8 @@ def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "s
     ends = intervals.of_log_ratio(*by_insertion(kept, squares[known], nulls[known], points))
     value = 1.0 - float(squares[known].sum() / nulls[known].sum())
     # less error is more skill: the ends change places
-    return {name: value, f"{name}_low": 1.0 - float(np.exp(ends.high)), f"{name}_high": 1.0 - float(np.exp(ends.low))}
+    low, high = intervals.holding(value, 1.0 - float(np.exp(ends.high)), 1.0 - float(np.exp(ends.low)))
+    return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
 LEAST_SHARE = 0.5

@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from pipeline.load.geometry import unusable
 from pipeline.model import Array
-from pipeline.ranges import Finite, Vector
+from pipeline.ranges import Finite, Vector, reason
 
 Row = tuple[Finite, Finite, Finite, Finite]
 
@@ -98,7 +98,7 @@ def read_views(path: Path, count: int) -> list[View]:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
-        raise unusable(path, f"{where}: {first['msg'].removeprefix('Value error, ')}") from None
+        raise unusable(path, f"{where}: {reason(first['msg'])}") from None
     except (OSError, ValueError) as error:
         raise unusable(path, f"cannot be read as projections: {error}") from None
     if len(file.frames) != count:

@@ -34,8 +34,8 @@ class Gate:
         value = float("nan") if found is None else float(found)
         if math.isnan(value):
             interval = str(overall.get("interval", ""))
-            withheld = self.column.endswith(("_low_mm", "_high_mm", "_low", "_high")) and "withheld" in interval
-            why = f": {interval}" * withheld
+            end = self.column.endswith(("_low_mm", "_high_mm", "_low", "_high"))
+            why = f": {interval}" * (end and ("withheld" in interval or self.column in interval))
             return f"gate closed: {self.asked}: {OVERALL_FILE} has no {self.column}{why}; it cannot be shown to hold"
         passed = not RELATIONS[self.relation](value, self.limit)
         return "" if passed else f"gate closed: {self.asked}: {self.column} is {value:.4g}"

@@ -245,6 +245,8 @@ def last_line(totals: Totals, index: Path) -> str:
     parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+    elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
+        parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
     if totals.sweep_lost:
         parts.append(f"{totals.sweep_lost} crashed in the sweep")
     if np.isfinite(totals.median_mm):
@@ -262,5 +264,5 @@ def last_line(totals: Totals, index: Path) -> str:
 def _with_interval(pooled: Mapping[str, Any]) -> str:
     """The pooled error with its interval, or why there is none."""
     ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
-    known = ends if np.isfinite(pooled["rms_low_mm"]) else ""
+    known = ends if np.isfinite(pooled["rms_high_mm"]) else ""
     return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"

@@ -75,6 +75,8 @@ def damaged(found: Sequence[Found]) -> dict[str, str]:
 
 
 def _found(out: Path, result: Result, insertion: str) -> Found:
+    if result.status == "damaged":  # it says why; altered tables are no numbers
+        return Found(result, {})
     folder = out / "cases" / result.case
     try:
         return Found(result, _scored(folder, insertion))

@@ -15,6 +15,7 @@ from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
+from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
@@ -104,10 +105,14 @@ def _found(folder: Path) -> Result:
     if wrong:
         return lost(folder.name, "damaged", f"{folder}: {wrong}; run the case again")
     try:
-        return read_result(path)
+        result = read_result(path)
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         return lost(folder.name, "damaged", f"{path}: {why}")
+    # a case that went through the stages has a key; its ledger comes last, after who is at work hashed all its files
+    if written is None and result.key and not owner_of(folder):
+        return lost(folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again")
+    return result
 
 
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:

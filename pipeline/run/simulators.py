@@ -48,7 +48,8 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
         both = ratio(studies[other], studies[one])
         if both is not None:
             values = {"rms_ratio": both.value, "rms_ratio_low": both.low, "rms_ratio_high": both.high}
-            rows.append({"simulator": one, "against": other, "common_frames": both.frames, **values})
+            row, told = intervals.fields(values, both.note)
+            rows.append({"simulator": one, "against": other, "common_frames": both.frames, "interval": told, **row})
             if other == OURS:
                 sentences.append(both.sentence.replace("the second run / the first", f"{one} / {OURS}"))
     off = {row["simulator"] for row in rows if tips_off(row)}
@@ -156,11 +157,14 @@ def _lead(first: Sequence[Piece], second: Sequence[Piece]) -> dict[str, Any]:
     under, over = (
         np.array([sum(p.squares for p in mine) / sum(p.points for p in mine) for mine in of]) * points for of in sums
     )
-    least = np.maximum([under.sum(), over.sum()], intervals.SMALLEST_MM2)
+    least = np.maximum([under.sum(), over.sum()], points.sum() * intervals.SMALLEST_MM2)
     value = float(np.sqrt(least[0] / least[1]))
-    low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(under, over, points)))
+    ends = np.exp(0.5 * np.array(intervals.of_log_ratio(under, over, points)))
+    low, high = intervals.holding(value, *map(float, ends))
     if abs(value - 1.0) < 1e-6:
         verdict = "tie"
     else:
-        verdict = "clear" if high < 1.0 else "not clear" if np.isfinite(high) else intervals.note(len(names))
-    return {"ratio_to_next": value, "ratio_to_next_low": float(low), "ratio_to_next_high": float(high), "lead": verdict}
+        verdict = "clear" if high < 1.0 else intervals.note(len(names)) if np.isnan(high) else "not clear"
+    found = {"ratio_to_next": value, "ratio_to_next_low": low, "ratio_to_next_high": high}
+    row, told = intervals.fields(found, verdict)
+    return row | {"lead": told}

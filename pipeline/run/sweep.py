@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pipeline.compare import intervals
 from pipeline.run.another import with_another
 from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
 from pipeline.run.results import LOST, Result
@@ -137,4 +138,5 @@ def _row(
     if found is not None:
         row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
     null = overall(before).get("strongest_null")
-    return row | (skill_beside(before, after, null) if null and found is not None else {})
+    row |= skill_beside(before, after, null) if null and found is not None else {}
+    return intervals.fields(row)[0]

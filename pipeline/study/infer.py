@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from pipeline.load import SUFFIXES, LoadError, load, read_header
+from pipeline.load import SUFFIXES, load, read_header
 from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import unusable
 from pipeline.load.guard import is_folder
@@ -55,15 +55,22 @@ def _is_dicom(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0 and path.name != "DICOMDIR" and is_dicom(path)
 
 
-def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path]]:
-    """The reference, stated or by its name, and the frames."""
+def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path], list[Path]]:
+    """The reference, stated or by its name, the frames, and what is neither: named as a reference beside a stated one.
+
+    Raises LoadError where two scans have such a name and none is stated.
+    """
     below = [p for p in (*folder.iterdir(), *folder.glob("frames/*")) if _is_scan(p)]
     if not below and _is_scan(folder):
-        return None, [folder]
+        return None, [folder], []
     below.sort(key=lambda p: natural_key(p.relative_to(folder).as_posix()))
-    named = (p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES)
-    reference = stated or next(named, None)
-    return reference, [p for p in below if reference is None or not p.samefile(reference)]
+    named = [p for p in below if p.name.lower().split(".")[0] in REFERENCE_NAMES]
+    if stated is None and len(named) > 1:
+        names = " and ".join(p.relative_to(folder).as_posix() for p in named)
+        raise unusable(folder, f"{names}: each has the name of a scan without wire; say which: --reference FILE")
+    reference = stated or next(iter(named), None)
+    others = [p for p in below if reference is None or not p.samefile(reference)]
+    return reference, [p for p in others if p not in named], [p for p in others if p in named]
 
 
 def _named(path: Path, base: Path | None) -> str:
@@ -85,16 +92,16 @@ def _wire_voxels(frame: Volume, reference: Volume | None) -> Array:
     return np.argwhere(labels == 1 + int(sizes.argmax())).astype(float)
 
 
-def infer_entry(frame: Volume, reference: Volume | None) -> tuple[Array, Array]:
+def infer_entry(frame: Volume, reference: Volume | None, file: Path) -> tuple[Array, Array]:
     """Entry (LPS mm) and direction: the wire's end nearest to the edge of the scan, and where it points from there.
 
-    Raises LoadError where no bright, connected structure is found.
+    Raises LoadError, naming the frame's file, where no bright, connected structure is found.
     """
     voxels = _wire_voxels(frame, reference)
     if len(voxels) < 5:
-        raise LoadError(
-            "no wire is visible in the first frame, so the entry cannot be inferred; give --entry and --direction"
-        )
+        why = "no wire is visible in it, the first frame, so the entry cannot be inferred"
+        do = "give --entry and --direction, or take the file out of the folder where it is no frame"
+        raise unusable(file, f"{why}; {do}")
     edge = np.minimum(voxels, np.array(frame.shape) - 1 - voxels).min(axis=1)
     points = frame.to_mm(voxels)
     entry = points[np.argmin(edge)]
@@ -112,7 +119,7 @@ def _stated_or_seen(
     if entry is not None and direction is not None:
         return entry, direction, ""
     empty = load(read_header(reference, config), config=config) if reference else None
-    at, towards = infer_entry(load(read_header(frame, config), config=config), empty)
+    at, towards = infer_entry(load(read_header(frame, config), config=config), empty, frame)
     guessed = " and ".join(name for name, of in (("entry_mm", entry), ("entry_direction", direction)) if of is None)
     where = f"{guessed}: {AT_EDGE}{'' if reference else UNSUBTRACTED}"
     return at if entry is None else entry, towards if direction is None else direction, where
@@ -132,13 +139,15 @@ def infer_manifest(
     base : folder from which scans are named; None names them in full.     reference : None looks for one.
     Raises LoadError where there is nothing to go by.
     """
-    reference, frames = _scans_in(folder, reference)
+    reference, frames, left_out = _scans_in(folder, reference)
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
-        raise unusable(folder, f"found no scans; allowed: {allowed}")
+        found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
+        raise unusable(folder, f"found {found}; allowed: {allowed}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",
+        *(f"left out: {path.name}, named as a scan without wire" for path in left_out),
     )
     entry, direction, where = _stated_or_seen(entry, direction, frames[0], reference, config)
     notes = _assumed(radius_mm, where)

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, fi
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_text, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive, reason
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.others import Others, written_out
@@ -248,7 +248,7 @@ def _sentences(data: dict[str, Any], error: dict[str, Any]) -> Iterator[str]:
         yield f"{where}: missing; this key is required"
     else:
         found = f"; found {error['input']!r}" if not isinstance(error["input"], (dict, list)) else ""
-        yield f"{where}: {error['msg'].removeprefix('Value error, ')}{found}"
+        yield f"{where}: {reason(error['msg'])}{found}"
 
 
 def _place(data: dict[str, Any], location: tuple[int | str, ...]) -> list[int | str]:

@@ -67,6 +67,8 @@ def named(texts: Sequence[str]) -> dict[str, Path]:
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
             raise InputError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
+        if not place:
+            raise InputError([f"--curves {text!r}: no place after the name; write NAME=DIR"])
         if name.lower() in map(str.lower, found):  # they name folders, which some disks do not tell apart
             raise InputError([f"--curves {text!r}: the name {name!r} is taken; write NAME={place}"])
         found[name] = Path(place)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile, reason
 from pipeline.status import InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _sentence(path: Path, error: Mapping[str, Any]) -> str:
         names = {field.alias or name for name, field in Parameters.model_fields.items()}
         return f"{path}: {where}: unknown key; {did_you_mean(where, names)}"
     found = f"; found {error['input']!r}" if not isinstance(error["input"], (dict, list)) else ""
-    return f"{path}: {where}: {error['msg']}{found}; write it as wireval calibrate did"
+    return f"{path}: {where}: {reason(error['msg'])}{found}; write it as wireval calibrate did"
 
 
 def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Case":

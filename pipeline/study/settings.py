@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
 from pipeline.load.config import LoadConfig
+from pipeline.ranges import reason
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
@@ -126,8 +127,8 @@ def _applied(config: Config, setting: Setting) -> Config:
     try:
         value = TypeAdapter(kinds[key]).validate_python(setting.value)
     except ValidationError as error:
-        reason = error.errors()[0]["msg"]
-        raise SettingsError([f"{setting.source}: {setting.name} = {setting.value!r}: {reason}"]) from None
+        why = reason(error.errors()[0]["msg"])
+        raise SettingsError([f"{setting.source}: {setting.name} = {setting.value!r}: {why}"]) from None
     return replace(config, **{table: replace(current, **{key: value})})
 
 

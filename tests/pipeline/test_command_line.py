@@ -156,6 +156,30 @@ def test_init_takes_what_is_said_of_the_scans(scans: Path, tmp_path: Path) -> No
     assert [text.partition(":")[0] for text in case["assumed"] if text.startswith("entry")] == ["entry_direction"]
 
 
+def test_two_references_are_a_question(scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The second one was a frame of the manifest."""
+    first = next(scans.glob("reference.*"))
+    shutil.copy(first, scans / "reference.MHA")
+    assert main(["init", str(scans)]) == 2
+    assert "reference.MHA and reference.mha: each has the name of a scan without wire" in capsys.readouterr().err
+    assert main(["init", str(scans), "--reference", str(first), "--to", str(tmp_path / "m.toml")]) == 0
+    assert "left out: reference.MHA" in capsys.readouterr().out
+    case = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
+    assert [Path(name).name for name in case["frames"]] == ["frame_000.mha", "frame_001.mha"]
+
+
+def test_a_stray_scan_and_one_that_stands_alone_are_named(scans: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Scans beside frames/ come before those in it: one without a wire is the first frame."""
+    reference = sitk.ReadImage(str(next(scans.glob("reference.*"))))
+    sitk.WriteImage(reference, str(scans / "after.mha"))
+    assert main(["init", str(scans)]) == 2
+    assert f"{scans / 'after.mha'}: no wire is visible in it, the first frame" in capsys.readouterr().err
+    (scans / "after.mha").unlink()
+    shutil.rmtree(scans / "frames")
+    assert main(["init", str(scans)]) == 2
+    assert "found reference.mha alone, a reference, and no frames" in capsys.readouterr().err
+
+
 def test_settings_are_a_file_that_reads_back_as_the_defaults(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -152,7 +152,7 @@ def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
     whole = tmp_path / "study"
     whole.mkdir()
     made = write(whole)
-    assert _scans_in(whole, None) == (None, [made])
+    assert _scans_in(whole, None) == (None, [made], [])
     below = tmp_path / "below"
     for k in (10, 2):
         (below / "frames" / f"f{k}").mkdir(parents=True)

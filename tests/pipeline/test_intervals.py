@@ -79,8 +79,41 @@ def test_an_error_in_other_units_and_frames_cut_in_two_change_nothing() -> None:
 def test_a_perfect_simulator_has_an_interval_of_nothing() -> None:
     frames = [Scored(f.row, 0 * f.error_mm, f.insertion) for f in scored(np.random.default_rng(3), 4)]
     result = pooled(frames)
-    assert result["rms_high_mm"] == pytest.approx(0.0, abs=1e-12)
+    assert (result["rms_low_mm"], result["rms_mm"]) == (0.0, 0.0)
+    assert result["rms_high_mm"] == pytest.approx(intervals.SMALLEST_MM)
     assert result["skill_low"] == pytest.approx(1.0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("scale", [0.0, 1e-17, 1e-7, 1.0, 1e7])
+@pytest.mark.parametrize("near", [0, 1, 2, 4], ids="{} near".format)
+def test_an_interval_holds_its_value_and_is_never_infinite(near: int, scale: float) -> None:
+    """Insertions handed in with two folders swapped: the errors of some are rounding, those of others centimetres."""
+    frames = []
+    for frame in scored(np.random.default_rng(6), 4, frames=3):
+        times = scale if int(frame.insertion[-1]) < near else 1.0
+        row = {**frame.row, "tip_mm": times * frame.row["tip_mm"]}
+        frames.append(Scored(row, times * frame.error_mm, frame.insertion))
+    result = pooled(frames)
+    assert not [name for name, value in result.items() if isinstance(value, float) and np.isinf(value)]
+    for name, low, high in (
+        ("rms_mm", "rms_low_mm", "rms_high_mm"),
+        ("tip_median_mm", "tip_low_mm", "tip_high_mm"),
+        ("skill", "skill_low", "skill_high"),
+    ):
+        for end, beyond in ((low, result[low] > result[name]), (high, result[high] < result[name])):
+            assert not beyond, end
+            assert np.isfinite(result[end]) != (end in result["interval"]), end
+    assert result["interval"].startswith("wide: 4 insertions")
+
+
+def test_an_error_of_nothing_beside_one_of_millimetres_bounds_nothing() -> None:
+    squares, points = np.array([0.0, 0.0, 400.0, 500.0]), np.full(4, 100.0)
+    ends = intervals.of_log_ratio(squares, points, points)
+    assert ends == (-np.inf, np.inf)
+    row, told = intervals.fields({"rms_low_mm": float(np.exp(0.5 * ends.low)), "rms_high_mm": ends.high}, "wide")
+    assert (row["rms_low_mm"], np.isnan(row["rms_high_mm"])) == (0.0, True)
+    assert told == "wide; not bounded: rms_high_mm"
 
 
 @pytest.mark.parametrize(

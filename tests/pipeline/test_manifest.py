@@ -66,7 +66,7 @@ def test_natural_order() -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
-        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "Input should be 'fit'; found 'fitted'"),
+        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "expected 'fit'; found 'fitted'"),
         (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "unknown key 'calibrated'; write parameters = FILE"),
         *(
             (("entry_mm", f"catheter = {{ {keys} }}\nentry_mm"), expected)

@@ -106,8 +106,59 @@ def test_no_number_is_pooled_from_a_table_that_was_changed(out: Path, capsys: py
     path = case_of(out) / "errors.csv"
     path.write_text(path.read_text(encoding="utf-8").replace(",ok,", ",ok, "), encoding="utf-8")
     assert main(["report", str(out)]) == 1
-    assert "errors.csv is not as it was written" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "errors.csv is not as it was written" in said.err
+    assert "0 ok.  1 of the cases not ok (failures.csv)" in said.out
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+
+
+@pytest.mark.parametrize("how", ["gone", "cut short"])
+def test_a_page_stays_where_what_it_is_drawn_from_is_not_whole(
+    out: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was drawn again without its viewer, exit 0."""
+    path, page = case_of(out) / "frames.h5", (case_of(out) / "report.html").read_bytes()
+    content = path.read_bytes()
+    path.unlink()
+    if how == "cut short":
+        path.write_bytes(content[:-1])
+    assert main(["report", str(out)]) == 1
+    words = "is missing" if how == "gone" else "is not as it was written"
+    assert f"1/1 bifurcation: its page stays as it was: frames.h5 {words}; run" in capsys.readouterr().err
+    assert (case_of(out) / "report.html").read_bytes() == page
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok"], "its tables are whole"
+
+
+@pytest.mark.parametrize("how", ["gone", "half"])
+def test_tables_without_their_ledger_are_not_believed(
+    study: Path, whole: Path, out: Path, how: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was the way round every check."""
+    path = case_of(out) / "ledger.json"
+    _ = path.unlink() if how == "gone" else path.write_text('{"key": "', encoding="utf-8")
+    for more in ((), ("--overview",)):
+        assert main(["report", str(out), *more]) == 1
+        assert f"{case_of(out)}: ledger.json is missing or cannot be read; run the case" in capsys.readouterr().err
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["damaged"]
+    assert main(["diff", str(whole), str(out)]) == 1
+    with held(case_of(out), print):  # as between the result and its ledger
+        assert main(["report", str(out), "--overview"]) == 0
+    assert run(study, out) == 0
+    assert differences(whole, out) == []
+
+
+@pytest.mark.parametrize("how", ["altered", "gone"])
+def test_a_damaged_case_is_pooled_nowhere_and_says_why(out: Path, how: str) -> None:
+    """overall.csv was made of an altered table; of one that was gone, points.csv.gz was blamed."""
+    path = case_of(out) / "errors.csv"
+    table = pd.read_csv(path)
+    path.unlink()
+    if how == "altered":
+        table.assign(rms_mm=0.01).to_csv(path, index=False)
+    assert main(["report", str(out), "--overview"]) == 1
+    assert pd.read_csv(out / "overall.csv").empty
+    words = "is not as it was written" if how == "altered" else "is missing"
+    assert f"errors.csv {words}; run" in pd.read_csv(out / "failures.csv")["message"][0]
 
 
 def test_report_heals_pages(study: Path, whole: Path, out: Path) -> None:

@@ -19,7 +19,7 @@ from PIL import Image
 
 from pipeline.cli import main
 from pipeline.model import Clamp, Curve
-from pipeline.run import cache
+from pipeline.run import cache, ledger
 from pipeline.run.aggregate import aggregate
 from pipeline.run.cache import decoded
 from pipeline.run.case import Job, run_case
@@ -390,7 +390,7 @@ def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
     result = json.loads(path.read_text(encoding="utf-8"))
     result |= {"role": "calibration", "summary": result["summary"] | {"role": "calibration"}}
     path.write_text(json.dumps(result), encoding="utf-8")
-    (path.parent / "ledger.json").unlink()
+    ledger.write(path.parent, "key")
     assert main(["report", str(out)]) == 0
     assert 'Nothing is scored: every case has role = "calibration"' in capsys.readouterr().out
     assert "Nothing is scored: every case has role" in (out / "index.html").read_text(encoding="utf-8")
@@ -404,7 +404,7 @@ def test_diff_is_a_gate(finished: Path, tmp_path: Path) -> None:
     table = pd.read_csv(path)
     table["rms_mm"] += 1.0
     table.to_csv(path, index=False)
-    (path.parent / "ledger.json").unlink()
+    ledger.write(path.parent, "key")
     assert main(["diff", str(finished), str(worse)]) == 1
     assert main(["diff", str(worse), str(finished)]) == 0
 
@@ -579,6 +579,7 @@ def test_pages_of_many_cases_are_drawn_with_a_line_each(
     assert main(["report", str(out)]) == 0
     assert capsys.readouterr().err == "1/1 bifurcation: drawn\n"
     (out / "cases" / "bifurcation" / "frames.h5").write_bytes(b"")
+    ledger.write(out / "cases" / "bifurcation", "key")
     assert main(["report", str(out)]) == 1
     assert "1/1 bifurcation: its page cannot be drawn: " in capsys.readouterr().err
 
@@ -639,7 +640,7 @@ def test_points_cut_short_hide_no_other_case(
     result.write_text(result.read_text(encoding="utf-8").replace('"bifurcation"', '"other"'))
     points = out / "cases" / "other" / "points.csv.gz"
     points.write_bytes(points.read_bytes()[:-200])
-    (out / "cases" / "other" / "ledger.json").unlink()
+    ledger.write(result.parent, "key")
     assert main(["report", str(out)]) == 1
     assert "other: its page cannot be drawn" in capsys.readouterr().err
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok", "damaged"]

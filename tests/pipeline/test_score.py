@@ -281,6 +281,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
         (tmp_path / "nowhere", "o", "no such file or folder"),
         (mixed, "o", ".csv and .vtp files"),
         (f"wireval={full}", "o", "the name 'wireval'"),
+        ("sofa=", "o", "no place after the name"),
         (full, "full", "holds no score"),
     ):
         assert main(["score", str(known[0]), "--curves", str(curves), "-o", str(tmp_path / out), *QUICK]) == 2

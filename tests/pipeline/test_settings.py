@@ -44,6 +44,7 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
         ("solver.segmnt_mm=1", "did you mean 'segment_mm'"),
         ("sovler.segment_mm=1", "did you mean 'solver'"),
         ("solver.segment_mm=wide", "valid number"),
+        ("budget.members=abc", "budget.members = 'abc': expected a valid number"),
         ("segment_mm=1", "no setting; write table.key=value"),
         ("simulate.entry=foo", "'traced' or 'manifest'"),
         ("solver.segment_mm=-3", "greater than"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -145,6 +146,25 @@ def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytes
     assert "Failures (1)" in page
     assert "bad: c1" in page
     assert "side by side" in capsys.readouterr().out
+
+
+def test_a_case_that_one_simulator_has_lost_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the first simulator it was; of the others nothing was said, and the rest stood there as ok."""
+    good, bad = (write_tree(folder, even(0.2)) for folder in (tmp_path, tmp_path / "simulators" / "bad"))
+    for folder in (good, bad):
+        planned = sorted(path.name for path in (folder / "cases").iterdir())
+        (folder / "run.json").write_text(json.dumps({"planned": planned, "cases": planned}), encoding="utf-8")
+    side_by_side(tmp_path, {"good": good, "bad": bad}, embed=False)
+    assert main(["report", str(tmp_path), "--overview"]) == 0
+    shutil.rmtree(bad / "cases" / "c1")
+    assert main(["report", str(tmp_path), "--overview"]) == 1
+    assert "bad: named by the manifest and without a result here: c1" in capsys.readouterr().err
+    page = (tmp_path / "simulators.html").read_text(encoding="utf-8")
+    assert "cases missing" in page[page.index(">bad</a>") :]
+    assert "cases missing" not in page[: page.index(">bad</a>")]
+    shutil.rmtree(bad)
+    assert main(["report", str(tmp_path), "--overview"]) == 1
+    assert f"bad: no case below {bad}" in capsys.readouterr().err
 
 
 def test_simulators_of_different_settings_are_not_compared(tmp_path: Path) -> None:

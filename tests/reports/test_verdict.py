@@ -61,8 +61,8 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
 
 def test_a_wrong_roll_is_guessed_at() -> None:
     row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
-    assert 'worse than with an unknown roll (0.820 mm): try roll_deg = "fit"' in verdict(row)
-    assert "try roll_deg" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
+    assert "worse than with an unknown roll (0.820 mm): check axes (LPS or RAS) and roll; roll_deg" in verdict(row)
+    assert "check axes" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
 
 
 def test_a_run_without_a_score_says_why() -> None:
@@ -75,6 +75,15 @@ def test_a_run_without_a_score_says_why() -> None:
 def test_no_error_no_verdict_and_intervals_where_there_are_any() -> None:
     assert verdict({"frames_ok": 0}) == ""
     assert "95 % interval 0.200 to 0.310 mm" in verdict({"rms_mm": 0.25, "rms_low_mm": 0.2, "rms_high_mm": 0.31})
+
+
+def test_an_end_that_nothing_bounds_is_no_better() -> None:
+    """The field is empty as that of an interval that is withheld, and means the opposite."""
+    row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "interval": "wide: 4 insertions"}
+    assert "That is better" in verdict(row)
+    row["interval"] += "; not bounded: rms_high_mm, skill_strongest_low"
+    assert "It is not shown to be better (the skill's interval has no lower end)" in verdict(row)
+    assert badge("ok", True, row)["look"] == "poor"
 
 
 def test_worst_frames_leave_out_what_failed() -> None:
