@@ -133,21 +133,21 @@ class Verdict:
             columns = [Column(n, "-", _HEADS.get(n, ""), "text" if text else "float") for n, text in texts.items()]
             made = grid(shown, columns)
             if {"case", "frame"} <= set(shown):
-                self._link(made, [*shown], path.parent)
+                self._link(made, path.parent)
             grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": made})
         runs = [{"name": str(run), "link": _there(run / "index.html", path.parent)} for run in self.runs]
         return {"title": "Two runs beside each other - wireval", "grids": grids, "runs": runs}
 
-    def _link(self, made: Grid, names: Sequence[str], place: Path) -> None:
-        """Link case and frame of each row to the page of the second run, where it has one. names : of the cells."""
-        out = self.runs[1]
+    def _link(self, made: Grid, place: Path) -> None:
+        """Link case and frame of each row to the page of the second run, where it has one."""
+        out, names = self.runs[1], [head["name"] for head in made["columns"]]
         scores = folders_in(out) if "simulator" in names else {}
         for row in made["rows"]:
             cells = dict(zip(names, row["cells"], strict=True))
-            case, frame = cells["case"], cells["frame"]
             folder = scores.get(cells["simulator"]["value"], out) if scores else out
-            case["link"] = _there(folder / "cases" / case["value"] / "report.html", place)
-            frame["link"] = f"{case['link']}#viewer={frame['value']}" if case["link"] and frame["value"] else ""
+            link = cells["case"]["link"] = _there(folder / "cases" / cells["case"]["value"] / "report.html", place)
+            if "frame" in cells:  # a column without any value is left out
+                cells["frame"]["link"] = f"{link}#viewer={cells['frame']['value']}" if link else ""
 
     def _plain(self) -> dict[str, Any]:
         # pandas writes what does not apply as null

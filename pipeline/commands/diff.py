@@ -73,6 +73,7 @@ def _verdict(args: argparse.Namespace) -> Any:
 
 def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     """The verdict on two runs."""
+    from pipeline.run.another import with_another
     from pipeline.run.ledger import RESULT
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
     from reports.case_files import find_cases
@@ -100,7 +101,8 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     caveats = [f"errors are measured otherwise in the second run ({ruler})"] * bool(ruler)
     caveats += ["over all frames nothing is judged: no frame has points in both runs"] * (paired is None)
     said = paired.verdict(allowed, ruler) if paired else ""
-    return Verdict((first, second), differs, _pooled(before, after), said, judged, frames, "; ".join(caveats))
+    pooled = _pooled(with_another(first, before), with_another(second, after))
+    return Verdict((first, second), differs, pooled, said, judged, frames, "; ".join(caveats))
 
 
 def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from pipeline.compare import intervals
 from pipeline.run.another import with_another
-from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
+from pipeline.run.overall import Found, found_cases, overall, pairs, ratio, skill_beside
 from pipeline.run.results import LOST, Result
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
@@ -132,11 +132,11 @@ def _rows(head: Head, before: Sequence[Found], after: Sequence[Found]) -> Iterat
 def _row(
     head: dict[str, str], summary: dict[str, Any], before: Sequence[Found], after: Sequence[Found]
 ) -> dict[str, Any]:
-    """A row of sweep.csv; the plain result is compared with itself by nobody."""
+    """A row of sweep.csv, its skill against one predictor for all; no ratio of the plain result to itself."""
     row = {name: summary.get(name) for name in SWEEP.names} | head | {"case": summary["case"]}
     found = None if head["parameter"] == PLAIN else ratio(before, after)
     if found is not None:
         row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
     null = overall(before).get("strongest_null")
-    row |= skill_beside(before, after, null) if null and found is not None else {}
+    row |= skill_beside(before, after, null) if null and pairs(before, after) else {}
     return intervals.fields(row)[0]

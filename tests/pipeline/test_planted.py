@@ -91,3 +91,21 @@ def test_planted_errors_cost_the_skill(out: Path) -> None:
         assert sweep.loc[name, "rms_ratio"] > 1.5, name
         assert sweep.loc[name, "skill_strongest"] < 0.0, name
         assert sweep.loc[name, "skill"] > sweep.loc[name, "skill_strongest"]
+
+
+def test_one_predictor_for_a_case_of_the_plain_run_and_of_every_point(out: Path) -> None:
+    """Lower error, lower skill: the plain run's row had its own case's strongest, without other insertions."""
+    sweep = pd.read_csv(out / "sweep.csv").query("case != '(all)'")
+    sweep["null_squared"] = sweep["rms_mm"] ** 2 / (1.0 - sweep["skill_strongest"])
+    for _, rows in sweep.groupby("case"):
+        assert set(rows["parameter"]) == {"(plain)", *WRONG}
+        np.testing.assert_allclose(rows["null_squared"], rows["null_squared"].iloc[0], rtol=0.05)
+
+
+def test_diff_quotes_the_row_over_all(out: Path, tmp_path: Path) -> None:
+    wrong = next((out / "sweep").iterdir())
+    main(["diff", str(out), str(wrong), "--json", str(tmp_path / "diff.json")])
+    pooled = {row["column"]: row for row in json.loads((tmp_path / "diff.json").read_text(encoding="utf-8"))["pooled"]}
+    whole = pd.read_csv(out / "overall.csv").iloc[0]
+    for name in ("rms_mm", "skill_strongest", "skill"):
+        assert abs(pooled[name]["before"] - whole[name]) < 1e-6, name

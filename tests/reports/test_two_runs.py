@@ -243,6 +243,15 @@ def test_a_tolerance_that_cannot_be_used_is_named(
     assert f"own.toml: {said}" in capsys.readouterr().err
 
 
+def test_a_page_of_two_runs_without_a_case_in_common(first: Path, second: Path, tmp_path: Path) -> None:
+    """No frame stands in its lists: a column without values is left out of a page."""
+    for name in GROUPS:
+        (second / "cases" / name).rename(second / "cases" / f"other-{name}")
+    page = tmp_path / "diff.html"
+    assert main(["diff", str(first), str(second), "--html", str(page)]) == 1
+    assert "present" in page.read_text(encoding="utf-8")
+
+
 def test_two_scores_are_compared_simulator_by_simulator(
     first: Path, second: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
