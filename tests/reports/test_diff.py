@@ -133,3 +133,10 @@ def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> N
 
 def test_the_shipped_tolerance_gates_shape_tip_and_skill() -> None:
     assert {"rms_mm", "tip_mm", "skill", "truth_rms_mm"} <= set(diff.load_tolerance())
+
+
+def test_a_frame_that_fails_counts_once() -> None:
+    """It was a regression in every column."""
+    lost = _row(status="no_wire") | dict.fromkeys(TOLERANCE, None)
+    found = diff.diff_tables({"c": _table([_row()])}, {"c": _table([lost])}, TOLERANCE)
+    assert found.regressions["column"].tolist() == ["status"]
