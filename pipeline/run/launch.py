@@ -133,8 +133,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
-    if heads:
-        write_sweep(out, found_heads(out))  # what other shards have done so far is among them
+    write_sweep(out, found_heads(out))  # what other shards have done so far is among them
+    (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
@@ -252,6 +252,7 @@ def last_line(totals: Totals, index: Path) -> str:
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         parts.append(_with_interval(totals.pooled))
+        parts += _skill(totals.pooled)
     if totals.unscored:
         parts.append(totals.unscored.rstrip("."))
     if totals.frames and totals.solver_s:
@@ -259,6 +260,14 @@ def last_line(totals: Totals, index: Path) -> str:
     sweep = index.parent / SWEEP.file
     parts += [f"sweep: {sweep}"] * sweep.exists()
     return ".  ".join([*parts, f"report: {index}"])
+
+
+def _skill(pooled: Mapping[str, Any]) -> list[str]:
+    """The number to quote: skill against the strongest predictor, and in a word where a guess is nearer."""
+    value, null = pooled.get("skill_strongest"), pooled.get("strongest_null")
+    if value is None or not null or not np.isfinite(value):
+        return []
+    return [f"skill {value:.3f} against the predictor {null}" + ", which is nearer" * bool(value < 0)]
 
 
 def _with_interval(pooled: Mapping[str, Any]) -> str:

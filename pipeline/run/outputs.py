@@ -4,6 +4,7 @@ A frame as a row of errors.csv, its points as points.csv.gz, the case as a row o
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -136,6 +137,15 @@ def _over_u(frame: Frame, count: int) -> dict[str, NDArray[Any]]:
     return {"u_val_mm": nothing if u is None else u, "error_over_u": nothing if ratio is None else ratio}
 
 
+def message_of(frame: Frame, known: Known) -> str:
+    """What went wrong with a frame, and in which scan: its number alone sends nobody to the file."""
+    if not frame.message or known.scans is None or frame.index >= len(known.scans.frames):
+        return frame.message
+    source = known.scans.frames[frame.index].source
+    name = str(replace(source, path=Path(source.path.name)))
+    return frame.message if name in frame.message else f"{frame.message} (scan {name})"
+
+
 def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
     """Rows of failures.csv: the case itself, or each frame that is not ok."""
     log = f"cases/{case}/log.txt"
@@ -143,9 +153,9 @@ def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
         status = known.failure.status
         row = {"case": case, "stage": known.failed_stage, "status": status.identifier, "log": log}
         return [row | {"sentence": status.value, "message": str(known.failure)}]
-    said = ("stage", "status", "sentence", "message")
     return [
-        {"case": case, "frame": f.index} | {name: getattr(f, name) for name in said} | {"log": log}
+        {"case": case, "frame": f.index, "stage": f.stage, "status": f.status, "sentence": f.sentence}
+        | {"message": message_of(f, known), "log": log}
         for f in known.frames
         if not f.ok
     ]

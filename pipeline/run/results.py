@@ -16,7 +16,7 @@ from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.occupied import owner_of
-from pipeline.run.outputs import failure_rows
+from pipeline.run.outputs import failure_rows, message_of
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest, file_hash
@@ -118,8 +118,13 @@ def _found(folder: Path) -> Result:
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
     frames = [
-        {name: getattr(f, name) for name in ("status", "sentence", "stage", "message")}
-        | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
+        {name: getattr(f, name) for name in ("status", "sentence", "stage")}
+        | {
+            "message": message_of(f, known),
+            "frame": f.index,
+            "registration": record(f.registration),
+            "trace": _marked(f),
+        }
         | _events(f)
         for f in known.frames
     ]

@@ -97,12 +97,11 @@ def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
 def write_sweep(out: Path, heads: Sequence[Head]) -> None:
     """sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
 
-    There is none of cases that were run with different settings.
+    There is none of cases that were run with different settings, nor where the last run had no points: an older table
+    belongs to an older result.
     """
-    if mixed_settings(out):
+    if not heads or mixed_settings(out):
         (out / SWEEP.file).unlink(missing_ok=True)
-        return
-    if not heads:
         return
     before = with_another(out, found_cases(out))
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))

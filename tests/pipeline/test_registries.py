@@ -104,7 +104,7 @@ def straight_on(clues: Clues, depth_mm: float, _seen: Seen) -> Array:
 
 def test_a_metric_and_a_predictor_from_outside(as_before: None, tmp_path: Path) -> None:
     study, out = tmp_path / "study", tmp_path / "out"
-    assert main(["synth", "bend", "-o", str(study), "--frames", "3", "--size", "48"]) == 0
+    assert main(["synth", "bend", "-o", str(study), "--frames", "3", "--size", "64"]) == 0
     assert main(["run", str(study / "manifest.toml"), "-o", str(out), "--no-cache"]) == 0  # what is kept must not stay
     meaning = "share of the points within 0.1 mm of the traced curve"
     shown = {"frames": ""}

@@ -204,6 +204,21 @@ def test_a_sweep_moves_the_result_and_traces_once(
     assert f'tests="{FRAMES}" failures="0"' in (tmp_path / "junit.xml").read_text(encoding="utf-8")
 
 
+def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nor a summary on paper: both stood beside the new numbers as if they were theirs."""
+    out = tmp_path / "out"
+    assert run(study, out, "--sweep", "simulate.wall_scale=2") == 0
+    (out / "summary.pdf").touch()
+    assert run(study, out, "--set", "simulate.friction=0.1", "--resume") == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert "sweep:" not in last
+    assert re.search(r"skill 0\.\d+ against the predictor \w+\.", last)
+    assert not (out / "sweep.csv").exists()
+    assert not (out / "summary.pdf").exists()
+
+
 def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And prepares its wall once: its points follow each other. The two cases here have one scan, and so one lumen."""
     both, out, read = two_cases(study, tmp_path / "study"), tmp_path / "out", []
@@ -748,3 +763,15 @@ def test_a_roll_is_fitted_where_frames_are_left_to_score(
     assert 'roll_deg = "fit" with frames: 1' in capsys.readouterr().err
     manifest.write_text(text.replace('role = "validation"', 'role = "calibration"'), encoding="utf-8")
     assert main(["check", str(folder)]) == 0
+
+
+def test_a_failed_frame_names_its_scan(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its number alone sends nobody to the file."""
+    folder = tmp_path / "study"
+    shutil.copytree(study, folder)
+    frames = sorted((folder / "frames").iterdir())
+    shutil.copy(folder / "reference.mha", frames[1])  # no wire
+    assert run(folder, tmp_path / "out", "--until", "trace") == 1
+    assert f"(scan {frames[1].name})" in capsys.readouterr().err
+    rows = pd.read_csv(tmp_path / "out" / "failures.csv").set_index("frame")
+    assert rows.loc[1, "message"].endswith(f"(scan {frames[1].name})")
