@@ -121,9 +121,13 @@ def in_tiles(numbers: Sequence[Mapping[str, str]]) -> dict[str, Sequence[Mapping
 
 
 def worst_first(summary: pd.DataFrame) -> pd.DataFrame:
-    """The rows of summary.csv, cases with failed frames first, then by WORST; equal ones as the manifest has them."""
-    order = summary.assign(failed=_failed(summary)).sort_values(["failed", WORST], ascending=False, kind="stable").index
-    return summary.loc[order]
+    """The rows of summary.csv, cases with failed frames first, of these the ones without any result, then by WORST.
+
+    Equal ones stand as the manifest has them.
+    """
+    failed = _failed(summary)
+    keys = summary.assign(failed=failed, nothing=failed & summary[WORST].isna())
+    return summary.loc[keys.sort_values(["failed", "nothing", WORST], ascending=False, kind="stable").index]
 
 
 def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":

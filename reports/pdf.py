@@ -91,7 +91,7 @@ class _Page:
 
 def write_pdf(out_dir: Path) -> Path:
     """Write summary.pdf beside index.html; returns its path. The figures are those of the pages."""
-    summary = _content.worst_first(read_if_there(out_dir / SUMMARY.file, SUMMARY))
+    summary = read_if_there(out_dir / SUMMARY.file, SUMMARY)
     path = out_dir / "summary.pdf"
     with replacing(path) as temporary, PdfPages(temporary, metadata={"CreationDate": None}) as pdf:
         for page in _pages(out_dir, summary):
@@ -101,7 +101,7 @@ def write_pdf(out_dir: Path) -> Path:
 
 
 def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[_Page]:
-    whole = read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     run = read_json(out_dir / "run.json")
     yield _first(out_dir, summary, whole, run)
     yield _figures("Over all cases", out_dir, ("planned_within", "cases_by_error"))
@@ -156,23 +156,25 @@ def _draw(page: _Page, folder: Path, names: Sequence[str]) -> _Page:
 
 
 def _worst_case(out_dir: Path, summary: pd.DataFrame) -> _Page:
-    """The case with the greatest pooled WORST of those with a result, by its own figures."""
+    """The first case with errors, in the order of the last page, by its own figures. summary : worst first."""
     known = summary[summary[WORST].notna()]
-    worst = (known.sort_values(WORST) if len(known) else summary)["case"]
-    name = str(worst.iloc[-1]) if len(worst) else ""
+    worst = (known if len(known) else summary)["case"]
+    name = str(worst.iloc[0]) if len(worst) else ""
+    before = "" if not name or name == summary["case"].iloc[0] else " of those with errors"
     folder = out_dir / "cases" / name
     case = read_case(folder)
     if not (folder / "figures").exists():
         draw_sections("case", case, folder, embed=False)
-    page = _figures(f"The worst case: {name}", folder, ("error_by_depth", "projections"))
+    page = _figures(f"The worst case{before}: {name}", folder, ("error_by_depth", "projections"))
     frames = [f"{row['frame']} ({row['text']} mm)" for row in worst_frames({name: case.errors}, {})]
     page.text(f"Worst frames by {WORST}: {', '.join(frames)}." if frames else "No frame has an error.")
     return page
 
 
 def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
-    """Cases, worst first; settings that are not defaults; versions."""
+    """Cases in their order, worst first; settings that are not defaults; versions."""
     page = _Page("Cases, worst first")
+    page.text(f"Cases with failed frames come first, of these the ones without any result; then the largest {WORST}.")
     heads = ("case", "status", "frames", "rms_mm", "p95_mm", "tip_median_mm", "skill_strongest")
     rows = [
         [str(row["case"]), str(row["status"]), f"{row['frames_ok']} of {row['frames']}"]

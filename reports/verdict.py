@@ -31,6 +31,7 @@ def verdict(statistics: Mapping[str, Any]) -> str:
     return " ".join(filter(None, (sentence, *remarks(statistics), _against(statistics))))
 
 
+WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
 TIPS_OFF = "the tips lie off"
 TIPS_OFF_RATIO, TIPS_OFF_MM = 3.0, 0.5
@@ -39,6 +40,8 @@ to the traced length, have ratios up to 2.4."""
 
 
 FAR_BELOW = 0.7
+WORSE_BELOW = -0.1
+"""Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
 
 
 def remarks(statistics: Mapping[str, Any]) -> list[str]:
@@ -49,7 +52,7 @@ def remarks(statistics: Mapping[str, Any]) -> list[str]:
 def _unknown_roll(statistics: Mapping[str, Any]) -> str:
     """That a roll which is stated does worse than none, where the wire is no better than a guess."""
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
-    if standing(statistics) != NO_BETTER or not unknown < FAR_BELOW * rms:
+    if standing(statistics) not in (NO_BETTER, WORSE) or not unknown < FAR_BELOW * rms:
         return ""
     mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
     return f"It is worse than with an unknown roll ({number(unknown)} mm): {mend}."
@@ -66,9 +69,14 @@ def tips_off(statistics: Mapping[str, Any]) -> str:
 
 
 def standing(statistics: Mapping[str, Any]) -> str:
-    """NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or no more is known."""
-    _, skill, least = _skill(statistics)
-    return NO_BETTER if skill <= 0.0 else TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
+    """WORSE, NO_BETTER, TIPS_OFF or NOT_SHOWN; empty where the wire beats the strongest predictor, or no more is known.
+
+    WORSE where the whole interval of the skill is below zero; without an interval where the skill is below WORSE_BELOW.
+    """
+    _, skill, least, most = _skill(statistics)
+    if skill <= 0.0:
+        return WORSE if most < 0.0 or (isnan(least) and isnan(most) and skill < WORSE_BELOW) else NO_BETTER
+    return TIPS_OFF if tips_off(statistics) else NOT_SHOWN if least <= 0.0 else ""
 
 
 def badge(status: str, good: bool, statistics: Mapping[str, Any]) -> dict[str, str]:
@@ -105,28 +113,40 @@ def _number(value: Any) -> float:
     return nan if number(value) == NOTHING else float(value)
 
 
-def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float]:
-    """A rival in words, the skill against it and the lower end of its interval; NaN for what is not known."""
+def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float, float]:
+    """A rival in words, the skill against it and the ends of its interval; NaN for what is not known."""
     for column, name in (("skill_strongest", statistics.get("strongest_null")), ("skill", "centreline")):
-        skill, least = (_number(statistics.get(key)) for key in (column, f"{column}_low"))
+        skill, least, most = (_number(statistics.get(key)) for key in (column, f"{column}_low", f"{column}_high"))
         if isnan(least) and f"{column}_low" in str(statistics.get("interval")):  # named there: it has no lower end
             least = -inf
         if not isnan(skill) and name:
-            return _rival(str(name)) if column != "skill" else "the lumen's centreline", skill, least
-    return "", nan, nan
+            return _rival(str(name)) if column != "skill" else "the lumen's centreline", skill, least, most
+    return "", nan, nan, nan
 
 
 def _against(statistics: Mapping[str, Any]) -> str:
-    """Whether the skill, and the lower end of its interval where there is one, is above zero."""
-    rival, skill, least = _skill(statistics)
+    """Whether the skill, and its interval where there is one, is above zero; of how many of the planned frames."""
+    rival, skill, least, _ = _skill(statistics)
     if not rival:
         return ""
     said = {
         TIPS_OFF: f"By rms_mm alone it would be better (skill {number(skill)})",
+        WORSE: f"That is worse (skill {number(skill)})",
         NO_BETTER: f"That is no better (skill {number(skill)})",
         NOT_SHOWN: f"It is not shown to be better (the skill's interval {_down_to(least)})",
     }
-    return f"{said.get(standing(statistics), f'That is better (skill {number(skill)})')} than {rival}."
+    how = said.get(standing(statistics), f"That is better (skill {number(skill)})")
+    return " ".join(filter(None, (f"{how} than {rival}.", _of_frames(statistics))))
+
+
+def _of_frames(statistics: Mapping[str, Any]) -> str:
+    """Over how many of the planned frames the verdict speaks, where it is not all of them."""
+    good, planned = (_number(statistics.get(key)) for key in ("frames_ok", "frames"))
+    if not good < planned:
+        return ""
+    # a lost half of an insertion took the partner of "another insertion": 0.926 instead of 0.563
+    weaker = "predictors that take wires of other frames or insertions are weaker without the others"
+    return f"This speaks of {good:.0f} of {planned:.0f} planned frames alone, and {weaker}: it may flatter."
 
 
 def _down_to(least: float) -> str:

@@ -19,6 +19,9 @@ from solver.grid import Grid
 LEAST_CONTRAST = 2.0
 """Contrast over the noise of one voxel below which no vessel is looked for (Dice falls below 0.97 at 2.2)."""
 
+_MOVE = "move entry_mm (or lumen_seed_mm, where the case gives it) well into the vessel"
+"""entry_mm first: it is the seed of every case that gives no other."""
+
 
 def _at(grid: Grid, seeds: Index) -> str:
     """Where the seeds lie, and the grey there: a seed beside the vessel is what most often goes wrong."""
@@ -37,7 +40,7 @@ def _start(grid: Grid, seeds: Index) -> tuple[GreyLevels, Index]:
         got = f"grey: got {levels.inside:.0f} at the seed, {levels.outside:.0f} around, noise {levels.noise:.0f}"
         got += _at(grid, seeds)
         allowed = "a lumen brighter than its surroundings by twice the noise"
-        raise failed(got, allowed, "move the seed (lumen_seed_mm) well into the vessel")
+        raise failed(got, allowed, _MOVE)
     return levels, np.array([f[1] for f in found], np.int64)
 
 
@@ -54,7 +57,7 @@ def _connected(
     if len(order) < config.least_voxels:
         allowed = f"at least {config.least_voxels} voxels (segment.least_voxels)"
         got = f"connected voxels: got {len(order)}{_at(grid, seeds)} (its wall would be at {levels.half:.0f})"
-        raise failed(got, allowed, "move the seed (lumen_seed_mm) or lower segment.threshold")
+        raise failed(got, allowed, f"{_MOVE}, or lower segment.threshold")
     return order, read
 
 

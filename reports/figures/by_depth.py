@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
@@ -74,12 +76,25 @@ def skill_by_depth(case: CaseFiles) -> Drawing | None:
     left, right = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
     left.axhline(0.0, color=BAD, linewidth=1.0, linestyle="--", label="no better")
     shown = _lines(left, good, "skill_by_depth")
-    left.set_ylim(min(-0.1, float(good["skill"].clip(lower=-1.0).min()) - 0.05), 1.02)
-    _finish({left: "skill (1 is perfect)"})
+    _finish({left: _skill_axis(left, float(good[shown].min().min()))})
     table = _pooled(case.statistics)
     _dots(right, table)
     numbers = pd.concat([good[["frame", "insertion_mm", *shown]], table])
     return Drawing(figure, numbers, frames=_depths(case, left))
+
+
+def _skill_axis(axes: Axes, least: float) -> str:
+    """Scale y from the least skill to 1; returns its label. Below -1, where it has no end, it is logarithmic."""
+    if least >= -1.0:
+        axes.set_ylim(min(-0.1, least - 0.05), 1.02)
+        return "skill (1 is perfect)"
+    axes.set_yscale("symlog", linthresh=1.0, linscale=2.0)
+    axes.set_ylim(1.5 * least, 1.02)
+    decades = [-(10.0**n) for n in range(int(np.log10(1.5 * -least)) + 1)]
+    axes.set_yticks([*reversed(decades), -0.5, 0.0, 0.5, 1.0])
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
+    return "skill (1 is perfect; below -1 logarithmic)"
 
 
 def forces_by_depth(case: CaseFiles) -> Drawing | None:

@@ -106,3 +106,4 @@ def test_a_seed_in_the_background_or_outside_is_refused_by_name():
             place = re.search(r"the seed is at \[(.*?)\] mm \(LPS\), grey \d", str(error.value))
             assert place is not None
             assert np.linalg.norm(np.array(place[1].split(","), float) - seed) < 3 * VOXEL
+            assert "move entry_mm (or lumen_seed_mm" in str(error.value), "most cases give no other seed"

@@ -205,7 +205,7 @@ def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -
         own = ["a faint frame", *["3 frames: with x and y turned most would not: are they RAS?"] * (name == "worse")]
         path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"warnings": own}), encoding="utf-8")
     page = render_simulators(compared).read_text(encoding="utf-8")
-    assert '<span class="status poor">no better than a guess</span>' in page
+    assert '<span class="status poor">worse than a guess</span>' in page
     assert page.count('<span class="status good">ok</span>') == 2
     assert "c0: 3 frames: with x and y turned most would not: are they RAS?" in page
     assert "a faint frame" not in page

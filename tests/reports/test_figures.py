@@ -19,6 +19,7 @@ from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
+from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
@@ -102,6 +103,56 @@ def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
     lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
     assert lines["to the traced wire"].get_xydata().tolist() == [[-15.0, 0.25], [0.0, 0.1], [15.0, 0.25]]
     assert lines["unchanged"].get_xydata().tolist() == [[0.0, 0.1]]
+
+
+def test_no_case_of_a_sweep_is_cut_off_and_an_interval_that_goes_on_says_so(tmp_path: Path) -> None:
+    """The axis ended above the pooled values: a case that was far off left the panel, as ends of intervals did."""
+    rows = [{"parameter": "(plain)", "value": "", "case": c, "rms_mm": 0.1} for c in ("a", "b", "(all)")]
+    for value, high in (("-15", 2.0), ("5", 700.0), ("15", np.nan)):
+        changed = {"parameter": "simulate.roll_offset_deg", "value": value, "unchanged": "0"}
+        rows += [{**changed, "case": "a", "rms_mm": 0.1}, {**changed, "case": "b", "rms_mm": 3.0}]
+        rows.append({**changed, "case": "(all)", "rms_mm": 0.25, "rms_ratio_low": 1.5, "rms_ratio_high": high})
+    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
+    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
+    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
+    assert drawing is not None
+    axes = drawing.figure.axes[0]
+    top = axes.get_ylim()[1]
+    assert top > 3.0
+    bars = {float(bar[0, 0]): bar[:, 1].tolist() for bar in axes.collections[0].get_segments()}
+    assert bars == {
+        -15.0: pytest.approx([0.15, 0.2]),
+        5.0: pytest.approx([0.15, top]),
+        15.0: pytest.approx([0.15, top]),
+    }
+    (arrows,) = [line for line in axes.get_lines() if line.get_marker() == "^"]
+    assert arrows.get_xydata().tolist() == [[5.0, top], [15.0, top]]
+    drawing.figure.canvas.draw()
+    assert axes.get_position().width > 0.7
+
+
+def test_a_skill_below_minus_one_is_drawn(tmp_path: Path) -> None:
+    """The axis ended at -1, and the panel of a wire with skill -38.6 was empty."""
+    out = write_run(tmp_path / "out", [FakeCase("c", frames=3)])
+    path = out / "cases" / "c" / "errors.csv"
+    errors = tables.read(path, ERRORS)
+    for values in ([-38.6, -2.0, 0.5], [-0.9, 0.1, 0.5], [-1.2, -1.1, -1.05]):
+        tables.write(path, ERRORS, errors.assign(skill=values, skill_strongest=np.nan))
+        drawing = CASE_FIGURES["skill_by_depth"](read_case(path.parent))
+        assert drawing is not None
+        left = drawing.figure.axes[0]
+        low, high = left.get_ylim()
+        assert low < min(values)
+        assert high > 1.0
+        drawing.figure.canvas.draw()
+        ticks = [label.get_text() for label in left.get_yticklabels()]
+        assert "-1" in ticks or min(values) > -1.0
+        assert ("logarithmic" in left.get_ylabel()) == (min(values) < -1.0)
+
+
+def test_the_caption_says_where_colours_of_forces_end() -> None:
+    (entry,) = [entry for entry in declared("case") if entry["figure"] == "contact_along_wire"]
+    assert f"{_CLIP_PERCENTILE:g}th percentile" in entry["read"]
 
 
 def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:

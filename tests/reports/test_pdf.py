@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
 import pytest
 
 from reports import pdf, tables
+from reports._content import worst_first
 from reports.case_files import find_cases
 from reports.html import render_case, render_index
 from reports.pdf import write_pdf
@@ -34,6 +36,20 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     )
     for page, words in zip(pages, (*said, ("solver.segment_mm", "frames_failed")), strict=True):
         assert not [word for word in words if word not in page], page
+
+
+def test_worst_is_the_same_on_every_page(tmp_path: Path) -> None:
+    """One page called the only case that was ok the worst, and the next had it last, below one without any result."""
+    cases = (FakeCase("far", frames=3, error_mm=0.9), FakeCase("poor", frames=3, failed=(1,)))
+    cases += (FakeCase("fine", frames=3, error_mm=0.1), FakeCase("none", frames=3, failed=(1,)))
+    out = write_run(tmp_path / "out", cases)
+    summary = tables.read(out / "summary.csv", SUMMARY)
+    summary.loc[summary["case"] == "none", "p95_mm"] = math.nan
+    summary = worst_first(summary)
+    assert summary["case"].tolist() == ["none", "poor", "far", "fine"]
+    pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
+    assert "The worst case of those with errors: poor" in pages[2]
+    assert re.findall("none|poor|far|fine", pages[3].partition("skill_strongest")[2])[:4] == summary["case"].tolist()
 
 
 def test_warnings_and_assumptions_stand_on_the_first_page(tmp_path: Path) -> None:

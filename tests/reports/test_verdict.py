@@ -17,6 +17,8 @@ from reports.verdict import badge, next_command, typed, unscored, verdict, worst
         (0.9, None, "That is better (skill 0.900) than "),
         (0.4, -0.1, "It is not shown to be better (the skill's interval reaches -0.100) than "),
         (-0.2, -0.5, "That is no better (skill -0.200) than "),
+        (-0.05, None, "That is no better (skill -0.0500) than "),
+        (-38.6, None, "That is worse (skill -38.6) than "),
     ],
 )
 def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None, said: str) -> None:
@@ -35,7 +37,8 @@ def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None
         (0.9, None, "ok", "good"),
         (None, None, "ok", "good"),
         (0.4, -0.1, "not shown to be better than a guess", "poor"),
-        (-0.2, None, "no better than a guess", "poor"),
+        (-0.1, None, "no better than a guess", "poor"),
+        (-0.2, None, "worse than a guess", "poor"),
     ],
 )
 def test_no_green_badge_beside_a_negative_skill(skill: float | None, low: float | None, text: str, look: str) -> None:
@@ -57,6 +60,27 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     assert "That is better" not in verdict(row)
     assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
     assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [(-0.5, -0.01, "worse"), (-0.5, 0.1, "no better"), (-0.5, None, "no better"), (None, -0.01, "worse")],
+)
+def test_worse_is_said_where_the_whole_interval_is(low: float | None, high: float | None, text: str) -> None:
+    """A skill of -38.6 was called "no better"."""
+    row = {"rms_mm": 0.25, "skill_strongest": -0.04, "skill_strongest_low": low, "skill_strongest_high": high}
+    row |= {"strongest_null": "previous"}
+    assert badge("ok", True, row) == {"text": f"{text} than a guess", "look": "poor"}
+    assert f"That is {text} (skill -0.0400)" in verdict(row)
+
+
+def test_the_verdict_says_of_how_many_planned_frames_it_speaks() -> None:
+    """Half the frames lost took the partners of a predictor: the verdict became better (0.926 instead of 0.563)."""
+    row = {"rms_mm": 0.2, "skill_strongest": 0.9, "strongest_null": "centreline", "frames": 12, "frames_ok": 6}
+    assert "That is better" in verdict(row)
+    assert "This speaks of 6 of 12 planned frames alone" in verdict(row)
+    assert "weaker without the others" in verdict(row)
+    assert "planned" not in verdict(row | {"frames_ok": 12})
 
 
 def test_a_wrong_roll_is_guessed_at() -> None:
