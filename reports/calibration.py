@@ -82,7 +82,7 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
         "parameter": row["name"],
         "value": number(float(row["value"])),
         "sd": spread,
-        "used": f"{row['used']:g}",
+        "used": number(float(row["used"])),
         "seen": "yes" if row["seen"] else "NO",
         "prior": f"{number(float(row['prior']))} ± {number(float(row['prior_sd']), 2)}",
         "bounds": bounds,

@@ -73,7 +73,7 @@ def correlations(record: Mapping[str, Any]) -> Drawing | None:
     axes.imshow(values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     for i, j in np.ndindex(*values.shape):
         shade = "white" if abs(values[i, j]) > 0.6 else "black"
-        axes.text(j, i, f"{values[i, j]:.2f}", ha="center", va="center", fontsize=8, color=shade)
+        axes.text(j, i, f"{values[i, j].round(2) + 0.0:.2f}", ha="center", va="center", fontsize=8, color=shade)
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=8)
     axes.set_yticks(range(len(names)), names, fontsize=8)
     return Drawing(figure, pd.DataFrame(values, columns=names).assign(parameter=names))
