@@ -6,7 +6,7 @@
   const all = (selector) => [...document.querySelectorAll(selector)];
   const style = getComputedStyle(document.documentElement);
   const css = (name) => style.getPropertyValue(name).trim();
-  const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), lumen: css("--lumen") };
+  const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), unscored: css("--unscored"), lumen: css("--lumen") };
   const ORDER = ["traced", "true", "simulated"];
   const MARGIN_MM = 5;
   const shown = (name) => all(`[data-show="${name}"]`).every((box) => box.checked);
@@ -28,8 +28,9 @@
   };
   const hex = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
   const NEAR = hex(COLOUR.simulated), FAR = hex(COLOUR.far);
+  const scored = data.frames.some((f) => f.good); // a case without any error has no scale of them
   const colourOf = (error) => {
-    if (error === null) return COLOUR.simulated;
+    if (error === null) return scored ? COLOUR.unscored : COLOUR.simulated;
     const [low, high] = data.scale_mm, t = clamp(Math.log(Math.max(error, low) / low) / Math.log(high / low), 0, 1);
     return `rgb(${NEAR.map((c, i) => Math.round(c + t * (FAR[i] - c))).join(",")})`;
   };
