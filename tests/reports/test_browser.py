@@ -132,6 +132,10 @@ def test_the_viewer_of_a_copied_case_goes_by_keys(run: Path, tmp_path: Path, ope
     assert float(mark.evaluate("line => line.style.left")[:-1]) > float(before[:-1]) + 5
     for canvas in ("canvas[data-axis='0']", "canvas[data-axis='2']", "#wires", "#straight", "#across"):
         assert painted(page, canvas) > 500, canvas
+    for key, said in (("PageDown", "frame 0 (1 of 6)"), ("PageUp", "frame 5 (6 of 6)")):  # ten: it moved one of six
+        page.keyboard.press(key)
+        page.wait_for_timeout(150)
+        assert page.inner_text("#frame-text").startswith(said)
     page.focus("#wires")
     turned = page.evaluate("document.getElementById('wires').toDataURL()")
     page.keyboard.press("ArrowLeft")
