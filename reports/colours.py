@@ -15,6 +15,8 @@ BAD = "#B8336F"
 """What failed; no wire has this colour."""
 FAR = "#E5007D"
 """Where the simulated wire is farthest from the traced one: its colour runs from SIMULATED to this."""
+UNSCORED = "#767676"
+"""Simulated wire that was compared with nothing: the clamp's reach, failed frames. Grey is on no scale of errors."""
 ERROR_SCALE_MM = (0.02, 2.0)
 """Where colours of distances to the traced wire begin and end, on a logarithmic scale: the same in every figure, case
 and run, so that two pictures can be compared. What a trace knows no better is dark; 2 mm off is another vessel."""

@@ -6,7 +6,7 @@
   const all = (selector) => [...document.querySelectorAll(selector)];
   const style = getComputedStyle(document.documentElement);
   const css = (name) => style.getPropertyValue(name).trim();
-  const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), lumen: css("--lumen") };
+  const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), unscored: css("--unscored"), lumen: css("--lumen") };
   const ORDER = ["traced", "true", "simulated"];
   const MARGIN_MM = 5;
   const shown = (name) => all(`[data-show="${name}"]`).every((box) => box.checked);
@@ -28,8 +28,9 @@
   };
   const hex = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
   const NEAR = hex(COLOUR.simulated), FAR = hex(COLOUR.far);
+  const scored = data.frames.some((f) => f.good); // a case without any error has no scale of them
   const colourOf = (error) => {
-    if (error === null) return COLOUR.simulated;
+    if (error === null) return scored ? COLOUR.unscored : COLOUR.simulated;
     const [low, high] = data.scale_mm, t = clamp(Math.log(Math.max(error, low) / low) / Math.log(high / low), 0, 1);
     return `rgb(${NEAR.map((c, i) => Math.round(c + t * (FAR[i] - c))).join(",")})`;
   };
@@ -376,6 +377,10 @@
   const go = (i) => { now = clamp(i, 0, data.frames.length - 1); $("frame").value = now; draw(); };
   $("frame").addEventListener("input", () => go(Number($("frame").value)));
   for (const id of ["place", "zoom", "range"]) $(id).addEventListener("input", draw);
+  all(".viewer input[type=range]").forEach((slider) => slider.addEventListener("keydown", (e) => {
+    const way = { PageUp: 10, PageDown: -10 }[e.key]; // of its own accord a slider moves a tenth of its range
+    if (way) { e.preventDefault(); slider.value = Number(slider.value) + way * Number(slider.step); slider.dispatchEvent(new Event("input")); }
+  }));
   all("[data-show]").forEach((box) => box.addEventListener("input", draw));
   all("a[data-frame]").forEach((link) => link.addEventListener("click", () => index.has(link.dataset.frame) && go(index.get(link.dataset.frame))));
   let timer = 0;

@@ -6,6 +6,7 @@ Skipped without playwright (extra ``browser``) or a Chromium on the path.
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
@@ -96,6 +97,26 @@ def painted(page: Any, canvas: str) -> int:
     return int(page.evaluate(count, canvas))
 
 
+def with_viewer(page: Path, change: Callable[[Any], None]) -> Path:
+    """The page, with what its viewer shows changed."""
+    data = re.compile(r'(?<=id="viewer-data">).*?(?=</script>)', re.DOTALL)
+    text = page.read_text(encoding="utf-8")
+    shown = json.loads(data.findall(text)[0])
+    change(shown)
+    page.write_text(data.sub(lambda _: json.dumps(shown), text), encoding="utf-8")
+    return page
+
+
+def pixels_of(page: Any, canvas: str, colour: str) -> int:
+    """How many pixels of a canvas have the colour of that variable of the page's style."""
+    count = """([name, colour]) => { const c = document.querySelector(name), pixels = c.getContext("2d");
+        const hex = getComputedStyle(document.documentElement).getPropertyValue(colour).trim();
+        const [r, g, b] = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+        const seen = new Uint32Array(pixels.getImageData(0, 0, c.width, c.height).data.buffer);
+        return seen.filter((v) => v === ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0).length }"""
+    return int(page.evaluate(count, [canvas, colour]))
+
+
 def test_the_viewer_of_a_copied_case_goes_by_keys(run: Path, tmp_path: Path, opened: Opener) -> None:
     page = opened(copied(run, "good", tmp_path))
     page.focus("#frame")
@@ -111,11 +132,34 @@ def test_the_viewer_of_a_copied_case_goes_by_keys(run: Path, tmp_path: Path, ope
     assert float(mark.evaluate("line => line.style.left")[:-1]) > float(before[:-1]) + 5
     for canvas in ("canvas[data-axis='0']", "canvas[data-axis='2']", "#wires", "#straight", "#across"):
         assert painted(page, canvas) > 500, canvas
+    for key, said in (("PageDown", "frame 0 (1 of 6)"), ("PageUp", "frame 5 (6 of 6)")):  # ten: it moved one of six
+        page.keyboard.press(key)
+        page.wait_for_timeout(150)
+        assert page.inner_text("#frame-text").startswith(said)
     page.focus("#wires")
     turned = page.evaluate("document.getElementById('wires').toDataURL()")
     page.keyboard.press("ArrowLeft")
     page.wait_for_timeout(150)
     assert page.evaluate("document.getElementById('wires').toDataURL()") != turned
+
+
+def test_wire_that_was_not_scored_has_the_colour_of_no_error(run: Path, tmp_path: Path, opened: Opener) -> None:
+    """The clamp's reach had the colour of the least error."""
+
+    def reach(data: Any) -> None:
+        for frame in data["frames"]:
+            frame["error_mm"][: len(frame["error_mm"]) // 2] = [None] * (len(frame["error_mm"]) // 2)
+
+    page = opened(with_viewer(copied(run, "good", tmp_path), reach))
+    assert "not scored: the clamp's reach" in page.inner_text(".viewer")
+    for canvas in ("#wires", "#straight", "canvas[data-axis='0']"):
+        assert pixels_of(page, canvas, "--unscored") > 20, canvas
+    page.fill("#place", "0.1")
+    page.wait_for_timeout(150)
+    assert pixels_of(page, "#across", "--unscored") > 20
+    dry = opened(run / "cases" / "dry" / "report.html")
+    assert pixels_of(dry, "#wires", "--simulated") > 20, "a case without any error has one colour"
+    assert "not scored" not in dry.inner_text(".viewer")
 
 
 def test_the_place_on_the_wire_and_the_zoom_drive_all_views(run: Path, tmp_path: Path, opened: Opener) -> None:

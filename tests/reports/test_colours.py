@@ -7,7 +7,7 @@ import pytest
 
 from reports import colours
 
-THINGS = {name: getattr(colours, name) for name in ("TRACED", "SIMULATED", "TRUE", "BAD", "FAR")}
+THINGS = {name: getattr(colours, name) for name in ("TRACED", "SIMULATED", "TRUE", "BAD", "FAR", "UNSCORED")}
 
 
 def luminance(colour: str) -> float:
