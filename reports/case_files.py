@@ -43,6 +43,11 @@ class CaseFiles:
         return self.errors[self.errors["status"].isin(GOOD)]
 
     @property
+    def handed_in(self) -> bool:
+        """Whether the simulated wires are another simulator's: what our solver gave stands in the same folder."""
+        return any(str(item.get("key", "")).startswith("simulated") for item in self.result.get("inputs", ()))
+
+    @property
     def statistics(self) -> Mapping[str, Any]:
         """The case's row of summary.csv as its result.json has it, as in the last line on the terminal.
 

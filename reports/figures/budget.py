@@ -16,10 +16,13 @@ _ROW_INCH, _REST_INCH = 0.24, 1.1
 
 
 def budget(case: CaseFiles) -> Drawing | None:
-    """Uncertainty by source, and the error with the clamp and the depth taken from elsewhere."""
+    """Uncertainty by source, and the error with the clamp and the depth taken from elsewhere.
+
+    Both are of our solver's wire, so that there is none beside another simulator's.
+    """
     sources, entries = (read_if_there(case.folder / table.file, table) for table in (BUDGET, ENTRIES))
     shown = [table for table in (sources, entries) if len(table)]
-    if not shown:
+    if not shown or case.handed_in:
         return None
     figure = new_figure(max(_REST_INCH + _ROW_INCH * max(map(len, shown)), 2.6))
     panels = iter(figure.subplots(1, len(shown), squeeze=False, width_ratios=[1.5, 1.0][-len(shown) :]).ravel())

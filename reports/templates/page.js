@@ -27,9 +27,11 @@
 
   const textOf = (cell) => (cell.querySelector("button") ?? cell).innerText.replace(/[\u2191\u2193]/g, "").replace(/\s*\n\s*/g, " ").trim();
   const headOf = (cell) => cell.dataset.name ?? textOf(cell);
+  // a number's interval has columns of its own
+  const ownOf = (cell) => (cell.querySelector("small") ? (cell.querySelector("a") ?? cell.firstChild).textContent.trim() : textOf(cell));
   const contentOf = (table) => [
     [...table.tHead.rows[0].cells].map(headOf),
-    ...[...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => [...row.cells].map(textOf)),
+    ...[...table.tBodies[0].rows].filter((row) => !row.hidden).map((row) => [...row.cells].map(ownOf)),
   ];
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text);
   const tex = (text) => text.replace(/\\/g, "\\textbackslash ").replace(/[&%$#_{}]/g, "\\$&").replace(/~/g, "\\textasciitilde ").replace(/\^/g, "\\textasciicircum ");

@@ -279,6 +279,8 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     both = CASE_FIGURES["budget"](case)
     assert both is not None
     assert len(both.figure.axes) == 2
+    handed_in = replace(case, result={"inputs": [{"key": "simulated.files[0]", "path": "a.csv", "sha256": ""}]})
+    assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
 
 
 def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
