@@ -25,6 +25,8 @@ BEFORE_COMPARE = {
     *("trace_sigma_mm", "trace_mean_mm", "trace_max_mm", "trace_tip_mm"),
 }
 """What a run has that ended before frames are compared: no number of it says how far a simulated wire is off."""
+CLOSING = ("regression", "moved")
+"""Verdicts on a row for which a gate must close."""
 _HEADER = ["case", "frame", "column", "before", "after", "change", "allowed", "verdict"]
 Row = tuple[Any, ...]
 
@@ -56,7 +58,7 @@ class Difference:
     @property
     def closing(self) -> pd.DataFrame:
         """The rows for which a gate must close, in their order."""
-        return self.rows[self.rows["verdict"].isin(["regression", "moved"])]
+        return self.rows[self.rows["verdict"].isin(CLOSING)]
 
     @property
     def new(self) -> pd.DataFrame:
@@ -183,7 +185,8 @@ def diff_tables(
         elif case in before:
             rows.append((case, pd.NA, "case", "present", "missing", math.nan, math.nan, "regression"))
         else:
-            rows += [(case, *row) for row in _new_rows(after[case])]
+            new = [*_case_rows(after[case].iloc[:0], after[case], tolerance)]
+            rows += [(case, *row) for row in new or [(pd.NA, "case", "missing", "present", math.nan, math.nan, "new")]]
     return Difference(pd.DataFrame(rows, columns=_HEADER))
 
 
@@ -203,15 +206,6 @@ def _case_rows(before: pd.DataFrame, after: pd.DataFrame, tolerance: Mapping[str
             yield frame, "frame", "present", "missing", math.nan, math.nan, "regression"
         else:
             yield frame, "frame", "missing", new[frame]["status"], math.nan, math.nan, "new"
-
-
-def _new_rows(table: pd.DataFrame) -> Iterator[Row]:
-    """A case that only the second run has: a row a frame, or one where it has none."""
-    nothing = math.nan, math.nan, "new"
-    for frame, status in zip(table["frame"], table["status"], strict=True):
-        yield frame, "frame", "missing", status, *nothing
-    if table.empty:
-        yield pd.NA, "case", "missing", "present", *nothing
 
 
 def _verdict(name: str, old: float, new: float, allowed: float) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from reports.atomic import write_bytes
+from reports.diff import CLOSING
 
 UNKNOWN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 does not allow (section 2.2, Char)."""
@@ -19,7 +20,7 @@ def add_suite(root: ET.Element, name: str, rows: pd.DataFrame) -> None:
     It fails where one closes the gate, and is skipped where only the second run has it.
     """
     tests = [
-        ("case" if pd.isna(frame) else f"frame {frame!s}", group, group[group["verdict"].isin(["regression", "moved"])])
+        ("case" if pd.isna(frame) else f"frame {frame!s}", group, group[group["verdict"].isin(CLOSING)])
         for frame, group in rows.groupby("frame", dropna=False, sort=False)
     ]
     suite = ET.SubElement(root, "testsuite", name=name, tests=str(len(tests)))

@@ -98,11 +98,12 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
         judged = "worse"
     differs = what_differs(first, second)
     ruler = ", ".join(row["what"] for row in differs if row["what"].startswith("compare."))
-    caveats = [f"errors are measured otherwise in the second run ({ruler})"] * bool(ruler)
-    caveats += ["over all frames nothing is judged: no frame has points in both runs"] * (paired is None)
-    said = paired.verdict(allowed, ruler) if paired else ""
+    otherwise = f"errors are measured otherwise in the second run ({ruler})" * bool(ruler)
+    unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
+    said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
-    return Verdict((first, second), differs, pooled, said, judged, frames, "; ".join(caveats))
+    caveat = "; ".join(filter(None, (otherwise, unpaired)))
+    return Verdict((first, second), differs, pooled, said, judged, frames, caveat)
 
 
 def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:

@@ -139,13 +139,13 @@ class Ratio:
         known = f"95 %: {self.low:.3f} {end}, " if np.isfinite(self.low) else ""
         return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
 
-    def verdict(self, allowed: float = 1.0, ruler: str = "") -> str:
+    def verdict(self, allowed: float = 1.0, caveat: str = "") -> str:
         """The sentence, and what may be concluded from it.
 
-        allowed : the ratio up to which nobody calls it worse.     ruler : settings by which the two measure otherwise.
+        allowed : the ratio up to which nobody calls it worse.     caveat : why nothing may be.
         """
-        if ruler:
-            meaning = f"says nothing, since errors are measured otherwise in the second run ({ruler})"
+        if caveat:
+            meaning = f"says nothing, since {caveat}"
         elif self.value == 1.0 and not self.low < self.high:
             meaning = "the error of no validation frame changed"
         elif not np.isfinite(self.low):
@@ -189,8 +189,13 @@ def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
 
 
 def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:
-    """Skill of ``after``, with its interval, against what a predictor left in ``before``: one rival for all points."""
-    both = pairs(before, after)
+    """Skill of ``after``, with its interval, against what a predictor left in ``before``: one rival for all points.
+
+    Nothing without a predictor, or without a frame that counts in both.
+    """
+    both = pairs(before, after) if null else []
+    if not both:
+        return {}
     second = [frame for _, frame in both]
     points = np.array([float(len(frame.error_mm)) for frame in second])
     nulls = points * numbers([frame for frame, _ in both], f"null_{null}_rms_mm") ** 2

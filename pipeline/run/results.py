@@ -118,13 +118,8 @@ def _found(folder: Path) -> Result:
 def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, details: dict[str, Any]) -> Result:
     """The result of a case that went through the stages."""
     frames = [
-        {name: getattr(f, name) for name in ("status", "sentence", "stage")}
-        | {
-            "message": message_of(f, known),
-            "frame": f.index,
-            "registration": record(f.registration),
-            "trace": _marked(f),
-        }
+        {"status": f.status, "sentence": f.sentence, "stage": f.stage, "message": message_of(f, known)}
+        | {"frame": f.index, "registration": record(f.registration), "trace": _marked(f)}
         | _events(f)
         for f in known.frames
     ]

@@ -11,7 +11,7 @@ from typing import Any
 
 from pipeline.compare import intervals
 from pipeline.run.another import with_another
-from pipeline.run.overall import Found, found_cases, overall, pairs, ratio, skill_beside
+from pipeline.run.overall import Found, found_cases, overall, ratio, skill_beside
 from pipeline.run.results import LOST, Result
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved, Setting, SettingsError, parse_assignment, resolve
@@ -104,9 +104,10 @@ def write_sweep(out: Path, heads: Sequence[Head]) -> None:
         (out / SWEEP.file).unlink(missing_ok=True)
         return
     before = with_another(out, found_cases(out))
-    rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before))
+    null = str(overall(before).get("strongest_null") or "")
+    rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before, null))
     for head in heads:
-        rows += _rows(head, before, _at(out, head))
+        rows += _rows(head, before, _at(out, head), null)
     tables.write(out / SWEEP.file, SWEEP, rows)
 
 
@@ -120,22 +121,22 @@ def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:
     return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _rows(head: Head, before: Sequence[Found], after: Sequence[Found]) -> Iterator[dict[str, Any]]:
+def _rows(head: Head, before: Sequence[Found], after: Sequence[Found], null: str) -> Iterator[dict[str, Any]]:
     """A row for each case of ``after``, and one over all where there are several."""
     for case in after:
-        yield _row(head, case.result.summary, before, [case])
+        yield _row(head, case.result.summary, before, [case], null)
     if len(after) > 1 and (whole := overall(after)):
-        yield _row(head, whole, before, after)
+        yield _row(head, whole, before, after, null)
 
 
 def _row(
-    head: dict[str, str], summary: dict[str, Any], before: Sequence[Found], after: Sequence[Found]
+    head: Head, summary: dict[str, Any], before: Sequence[Found], after: Sequence[Found], null: str
 ) -> dict[str, Any]:
-    """A row of sweep.csv, its skill against one predictor for all; no ratio of the plain result to itself."""
+    """A row of sweep.csv; no ratio of the plain result to itself. null : the predictor that all rows are held against,
+    the plain run's strongest.
+    """
     row = {name: summary.get(name) for name in SWEEP.names} | head | {"case": summary["case"]}
     found = None if head["parameter"] == PLAIN else ratio(before, after)
     if found is not None:
         row |= {"rms_ratio": found.value, "rms_ratio_low": found.low, "rms_ratio_high": found.high}
-    null = overall(before).get("strongest_null")
-    row |= skill_beside(before, after, null) if null and pairs(before, after) else {}
-    return intervals.fields(row)[0]
+    return intervals.fields(row | skill_beside(before, after, null))[0]
