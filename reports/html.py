@@ -71,7 +71,8 @@ def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed
     source = _link(path, folder, "image/png", embed)
     numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
     shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-    return {**entry, **shown, "read": _content.caption(entry["read"], drawing.table), "graded": drawing.graded}
+    said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
+    return {**entry, **shown, **said, "graded": drawing.graded}
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:

@@ -350,3 +350,22 @@ def test_a_narrow_window_prints_as_a_wide_one(run: Path, opened: Opener) -> None
         page = opened(run / "cases" / CASES[1].name / "report.html", viewport)
         sheets[name] = len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
     assert sheets["narrow"] == sheets["wide"]
+
+
+def test_figures_fit_a_phone_and_are_made_large_by_a_button(run: Path, opened: Opener) -> None:
+    """They were 620 pixels wide on a screen of 390."""
+    page = opened(run / "cases" / "good" / "report.html", NARROW)
+    figure = page.locator("figure").first
+    pane = figure.locator(".pan")
+    wide = "pane => pane.scrollWidth - pane.clientWidth"
+    assert pane.evaluate(wide) <= 0
+    for beyond in (True, False):
+        figure.locator("button.enlarge").click()
+        assert (pane.evaluate(wide) > 300) == beyond
+    assert not opened(run / "cases" / "good" / "report.html").locator("button.enlarge").first.is_visible()
+
+
+def test_a_copied_case_has_no_link_to_the_run(run: Path, tmp_path: Path, opened: Opener) -> None:
+    """It went to a page that is not there."""
+    assert opened(run / "cases" / "good" / "report.html").locator("a.up").is_visible()
+    assert not opened(copied(run, "good", tmp_path)).locator("a.up").is_visible()
