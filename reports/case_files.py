@@ -48,6 +48,11 @@ class CaseFiles:
         return any(str(item.get("key", "")).startswith("simulated") for item in self.result.get("inputs", ()))
 
     @property
+    def simulator(self) -> str:
+        """Whose wires they are in a score of several simulators; empty in a run."""
+        return str(self.result.get("simulator", ""))
+
+    @property
     def statistics(self) -> Mapping[str, Any]:
         """The case's row of summary.csv as its result.json has it, as in the last line on the terminal.
 

@@ -112,7 +112,8 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     failures = _case_failures(case)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
-        "title": f"{case.name} - wireval",
+        "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
+        "simulator": case.simulator,
         "name": case.name,
         "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case)),
         "verdict": _case_verdict(case),
@@ -164,17 +165,19 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
+    simulator = next((case.simulator for case in cases if case.simulator), "")
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        "title": "wireval",
+        "title": " - ".join(filter(None, (simulator, "wireval"))),
+        "simulator": simulator,
         **_headline(cases, "failures" if failures else "settings differ" if mixed else "ok", row),
-        "verdict": verdict(row) or why_none,
+        "verdict": verdict(row, simulator) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
         "failures": failures,
-        "simulators": next(iter(read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"]), ""),
+        "beside_others": (out_dir / SIMULATORS.file).exists(),
         "left_over": left_over_sentence(out_dir),
         "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
@@ -217,7 +220,7 @@ def _case_verdict(case: CaseFiles) -> str:
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     counts = f"{good} of {planned} frames have a result." if planned and good != planned else ""
     scored = _scored(case)
-    how = verdict(scored) if scored or not case.statistics else OF_CALIBRATION
+    how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
     return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", how)))
 
 

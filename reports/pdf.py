@@ -116,7 +116,9 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     cases = zip(summary["role"], summary["status"], strict=True)
-    said = verdict(row) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
+    results = results_in(out_dir)
+    simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
+    said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
     page.text(
         f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {said}", size=11
     )
@@ -133,7 +135,6 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
         page.text(f"Next: do what the message says, then {command}", width=_WIDE * 9 // 10, weight="bold")
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         page.text(f"{tile['value']}  {tile['label']}")
-    results = results_in(out_dir)
     page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases")
     assumed = [str(text) for text in run.get("assumptions", ())]
     page.some("Assumptions", [*assumed, *said_by_cases(results, "assumptions")], "on the pages")

@@ -15,16 +15,17 @@ from reports.schema import SUMMARY
 _MANY = 5
 
 
-def verdict(statistics: Mapping[str, Any]) -> str:
+def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
     """How far the simulated wire is from the traced one, and whether that beats what anybody would have guessed.
 
-    statistics : a row of summary.csv or overall.csv.
+    statistics : a row of summary.csv or overall.csv.     simulator : whose wire it is, where there are several.
     """
     rms = number(statistics.get("rms_mm"))
     if rms == NOTHING:
         return ""
     ends = interval(statistics.get("rms_low_mm"), statistics.get("rms_high_mm"))
-    sentence = f"The simulated wire lies {rms} mm (rms) from the traced one"
+    whose = f"The wire of {simulator}" if simulator else "The simulated wire"
+    sentence = f"{whose} lies {rms} mm (rms) from the traced one"
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
