@@ -169,6 +169,11 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_MOST_NAMED]) + f" and {rest} more" * (rest > 0)
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things: ``1 case``, ``2 cases``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def not_reached(out_dir: Path) -> str:
     """Why nothing is scored where every run into a folder was to end before frames are compared; else empty."""
     ends = [str(run.get("until", "")) for run in _runs(out_dir)]

@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from reports import _content, colours
 from reports.atomic import replacing
-from reports.case_files import WORST, not_reached, read_case, read_json, results_in, said_by_cases
+from reports.case_files import WORST, counted, not_reached, read_case, read_json, results_in, said_by_cases
 from reports.figures import declared
 from reports.html import draw_sections
 from reports.origin import mixed_settings
@@ -126,9 +126,7 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> _Page:
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
-    page.text(
-        f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {said}", size=11
-    )
+    page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
     if len(failures):
         page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
         rows = failures[["simulator", "case", "frame", "status", "message"]].head(_MOST_FAILURES)

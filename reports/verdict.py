@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import WORST, find_cases, read_json, warnings_of
+from reports.case_files import WORST, counted, find_cases, read_json, warnings_of
 from reports.schema import SUMMARY
 
 _MANY = 5
@@ -179,7 +179,7 @@ def warned(out_dir: Path) -> list[str]:
     """What was warned of in the cases of a run, a line each, no more than a few."""
     lines = [f"warning: {case.name}: {text}" for case in find_cases(out_dir) for text in warnings_of(case)]
     rest = len(lines) - _MANY
-    return [*lines[:_MANY], *[f"{rest} more warnings stand on the pages of the cases"] * (rest > 0)]
+    return [*lines[:_MANY], *[f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)]
 
 
 def typed(folder: Path) -> Sequence[str]:
