@@ -42,8 +42,9 @@ def main(args: argparse.Namespace) -> int:
 
     found = found_results(args.out)
     if not found:
-        problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
-        return complain([problem], "OUT")
+        above = [f"give {one}" for one in args.out.absolute().parents[:2] if found_results(one)]
+        hint = next(iter(above), "this is not an output of wireval run")
+        return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], "OUT")
     if links_out(args.out):
         return complain(links_out(args.out), "OUT")
     heads = found_heads(args.out)

@@ -292,3 +292,37 @@ def test_many_damaged_cases_are_a_line_and_few_a_line_each(tmp_path: Path, capsy
         said = [line for line in capsys.readouterr().err.splitlines() if "result.json" in line]
         assert len(said) == (2 if count == 2 else 1)
     assert said[0].startswith("60 cases have no new page: c00, c01, c02, c03, c04 and 55 more; the first: c00: ")
+
+
+def test_a_folder_that_is_no_output_is_told_with_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out" / "cases" / "a").mkdir(parents=True)
+    (tmp_path / "out" / "cases" / "a" / "result.json").write_text("{", encoding="utf-8")
+    for inner in ("out/cases", "out/cases/a"):
+        assert main(["report", str(tmp_path / inner)]) == 2
+        assert f"give {tmp_path / 'out'}" in capsys.readouterr().err
+    assert main(["report", str(tmp_path)]) == 2
+    assert "this is not an output of wireval run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("verb", "kept"), [("run", True), ("synth", False)])
+def test_what_keeps_nothing_does_not_say_that_it_goes_on(
+    verb: str, kept: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_args: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pipeline.cli.carried_out", interrupted)
+    assert main([verb, "straight", "-o", "y"]) == 130
+    assert ("goes on from there" in capsys.readouterr().err) == kept
+
+
+def test_diff_says_where_the_candidate_is_no_run(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder of scans was told as a run that has lost all cases."""
+    out = tmp_path / "out"
+    assert main(["run", str(study), "-o", str(out), "--until", "compare"]) == 0
+    for second, said in ((study, True), (out, False)):
+        capsys.readouterr()
+        assert main(["diff", str(out), str(second)]) == said
+        assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == said
