@@ -1,7 +1,7 @@
 """A scene of 3D Slicer (.mrml) that opens what lies in a case's folder ``view``, with names and colours.
 
 The lumen as a surface to look into and as a segmentation in the slices; every frame's wires, of which those of one
-frame are switched on, and scans, the first in the slices. Models are lines with arrays (error_mm, ...), curves have
+frame are switched on, and scans, the last in the slices. Models are lines with arrays (error_mm, ...), curves have
 measurements.
 """
 
@@ -49,7 +49,11 @@ def write_scene(folder: Path, shown: int, scans: Mapping[str, Path] | None = Non
     if said:
         ET.SubElement(root, "Text", id="vtkMRMLTextNode1", name="about the scans", text=said)
     for view in ("Red", "Green", "Yellow") if volumes else ():
-        behind = {"layoutName": view, "singletonTag": view, "references": f"backgroundVolume:{_id('Volume', 1)};"}
+        behind = {
+            "layoutName": view,
+            "singletonTag": view,
+            "references": f"backgroundVolume:{_id('Volume', len(volumes))};",
+        }
         ET.SubElement(root, "SliceComposite", {"id": f"vtkMRMLSliceCompositeNode{view}", **behind})
     ET.indent(root, " ")
     path = folder / "scene.mrml"

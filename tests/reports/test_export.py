@@ -242,7 +242,7 @@ def test_the_scene_shows_the_scans_behind_the_wires(tmp_path: Path) -> None:
         found[node.attrib["name"]] = nodes[parts["storage"]].attrib["fileName"]
     assert found == {"reference": str(Path("elsewhere/reference.mha").absolute()), "frame 2": "/scans/frame_002.nii.gz"}
     behind = {node.attrib["references"] for node in root.iter("SliceComposite")}
-    assert behind == {f"backgroundVolume:{next(root.iter('Volume')).get('id')};"}
+    assert behind == {f"backgroundVolume:{list(root.iter('Volume'))[-1].get('id')};"}, "the scan that shows a wire"
     assert [node.get("text") for node in root.iter("Text")] == ["frames 0 and 1 are opened by hand"]
 
 
