@@ -125,7 +125,8 @@ def _main(argv: Sequence[str] | None) -> int:
         return complain([str(error)], COMMAND_LINE)
     except KeyboardInterrupt as why:
         number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
-        print("\ninterrupted; what is finished is kept, the same command goes on from there", file=sys.stderr)
+        kept = "; what is finished is kept, the same command goes on from there"
+        print("\ninterrupted" + kept * (args.command in ("run", "score")), file=sys.stderr)
         return 128 + number
     except WriteError as error:
         print(error, file=sys.stderr)

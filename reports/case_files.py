@@ -48,6 +48,11 @@ class CaseFiles:
         return any(str(item.get("key", "")).startswith("simulated") for item in self.result.get("inputs", ()))
 
     @property
+    def simulator(self) -> str:
+        """Whose wires they are in a score of several simulators; empty in a run."""
+        return str(self.result.get("simulator", ""))
+
+    @property
     def statistics(self) -> Mapping[str, Any]:
         """The case's row of summary.csv as its result.json has it, as in the last line on the terminal.
 
@@ -162,6 +167,11 @@ def listed(names: Sequence[str]) -> str:
     """Names in a sentence, no more than a few."""
     rest = len(names) - _MOST_NAMED
     return ", ".join(names[:_MOST_NAMED]) + f" and {rest} more" * (rest > 0)
+
+
+def counted(count: int, noun: str) -> str:
+    """A number of things: ``1 case``, ``2 cases``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
 
 
 def not_reached(out_dir: Path) -> str:

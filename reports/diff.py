@@ -13,7 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from reports.case_files import GOOD, find_cases
+from reports.case_files import GOOD, counted, find_cases
 from reports.schema import ERRORS
 from reports.tables import read_if_there
 
@@ -87,16 +87,17 @@ class Difference:
         """One line for the end of the command."""
         n_bad, head = len(self.regressions), self._compared()
         names = ", ".join(self.moved["column"].unique())
-        tail = f"; {len(self.moved)} values have moved: {names}" if names else ""
+        have = "value has" if len(self.moved) == 1 else "values have"
+        tail = f"; {len(self.moved)} {have} moved: {names}" if names else ""
         if self.empty:
             tail += f"; the first run has nothing to hold against in {', '.join(self.empty)}"
         if len(self.new):
             failed = int((~self.new["after"].isin([*GOOD, "present"])).sum())
-            tail += f"; held against nothing, since only the second run has them: {len(self.new)} frames"
+            tail += f"; held against nothing, since only the second run has them: {counted(len(self.new), 'frame')}"
             tail += f", {failed} of which failed" * bool(failed)
         if not n_bad:
             return f"{head}: no regression{tail}"
-        worst = f"{n_bad} regression{'s' * (n_bad != 1)}"
+        worst = counted(n_bad, "regression")
         first = self.regressions.iloc[0]
         whose = [str(first["simulator"])] if "simulator" in first else []
         where = [f"case {first['case']}", *([] if pd.isna(first["frame"]) else [f"frame {first['frame']}"])]
@@ -109,7 +110,8 @@ class Difference:
         """How many cases were compared, of how many."""
         both = self.rows.drop(self.new.index)
         held, cases = (rows["case"][rows["column"] != "simulator"].nunique() for rows in (both, self.rows))
-        return f"{held} cases compared" if held == cases else f"{held} of {cases} cases compared"
+        all_of_them = counted(cases, "case")
+        return f"{all_of_them} compared" if held == cases else f"{held} of {all_of_them} compared"
 
 
 def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:

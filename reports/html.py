@@ -15,6 +15,7 @@ from reports.atomic import write_text
 from reports.case_files import (
     GOOD,
     CaseFiles,
+    counted,
     find_cases,
     left_out_sentence,
     left_over_sentence,
@@ -71,7 +72,8 @@ def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed
     source = _link(path, folder, "image/png", embed)
     numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
     shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-    return {**entry, **shown, "read": _content.caption(entry["read"], drawing.table), "graded": drawing.graded}
+    said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
+    return {**entry, **shown, **said, "graded": drawing.graded}
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
@@ -111,14 +113,14 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     failures = _case_failures(case)
     frames = _content.grid(errors, ERRORS.shown("frames", "work"), bad=~errors["status"].isin(GOOD))
     page = {
-        "title": f"{case.name} - wireval",
+        "title": " - ".join(filter(None, (case.name, case.simulator, "wireval"))),
         "name": case.name,
         "badge": badge(result.get("status", "no result.json"), result.get("status") in GOOD, _scored(case)),
         "verdict": _case_verdict(case),
         "worst": worst_frames({case.name: errors}, {}),
         "next": next_command([case.name], typed(case_dir)),
         **_drawn(case, embed, each),
-        **{key: result.get(key, "") for key in ("role", "group")},
+        **{key: result.get(key, "") for key in ("role", "group", "simulator")},
         "failures": failures,
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "numbers": _content.in_tiles(_content.cards(declared("cards"), case.statistics)),
@@ -166,14 +168,13 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        "title": "wireval",
         **_headline(cases, "failures" if failures else "settings differ" if mixed else "ok", row),
-        "verdict": verdict(row) or why_none,
+        "verdict": verdict(row, _simulator(cases)) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
         "failures": failures,
-        "simulators": next(iter(read_if_there(out_dir / SIMULATORS.file, SIMULATORS)["simulator"]), ""),
+        "beside_others": (out_dir / SIMULATORS.file).exists(),
         "left_over": left_over_sentence(out_dir),
         "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
@@ -214,9 +215,9 @@ def _case_verdict(case: CaseFiles) -> str:
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
-    counts = f"{good} of {planned} frames have a result." if planned and good != planned else ""
+    counts = f"{good} of {counted(planned, 'frame')} have a result." if planned and good != planned else ""
     scored = _scored(case)
-    how = verdict(scored) if scored or not case.statistics else OF_CALIBRATION
+    how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
     return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", how)))
 
 
@@ -254,6 +255,11 @@ def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     return cases, broken
 
 
+def _simulator(cases: list[CaseFiles]) -> str:
+    """Whose wires they are in a score of several simulators; empty in a run."""
+    return next((case.simulator for case in cases if case.simulator), "")
+
+
 def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too.
 
@@ -261,9 +267,12 @@ def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> di
     """
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
-    sentence = f"{len(cases)} case{'s' * (len(cases) != 1)}, {n_frames} frames: {n_good} ok"
+    sentence = f"{counted(len(cases), 'case')}, {counted(n_frames, 'frame')}: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
-    return {"sentence": sentence, "badge": badge(status if cases else "failures", bool(cases) and status == "ok", row)}
+    look = badge(status if cases else "failures", bool(cases) and status == "ok", row)
+    name = _simulator(cases)
+    title = " - ".join(filter(None, (name, "wireval")))
+    return {"sentence": sentence, "badge": look, "simulator": name, "title": title}
 
 
 def _files(case_dir: Path) -> list[dict[str, str]]:

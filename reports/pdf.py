@@ -12,7 +12,7 @@ from matplotlib.image import imread
 
 from reports import _content, colours
 from reports.atomic import replacing
-from reports.case_files import WORST, not_reached, read_case, read_json, results_in, said_by_cases
+from reports.case_files import WORST, counted, not_reached, read_case, read_json, results_in, said_by_cases
 from reports.figures import declared
 from reports.html import draw_sections
 from reports.origin import mixed_settings
@@ -23,8 +23,9 @@ from reports.verdict import next_command, typed, unscored, verdict, worst_frames
 _A4_INCH = (8.27, 11.69)
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.08, 0.92, 0.95, 0.05
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
-_MOST_NOTES, _LONGEST_NOTE = 4, 240  # texts, characters: two lines each
-_LEAST_WIDTH = 0.3  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
+_MOST_WARNINGS = 4
+_SCAN_SHARE = 0.62  # of the page: rows of scans are as high as wide, and wires in them thin
+_LEAST_WIDTH = 0.35  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
 _WIDE = 104  # characters of 9 points
 _LINE = 0.0165  # of the page's height, for type of 9 points
 
@@ -48,15 +49,20 @@ class _Page:
             self.at -= step
         self.at -= 0.4 * step
 
-    def some(self, title: str, texts: Sequence[str], rest_stands: str) -> None:
-        """A few of many texts, and how many more there are; nothing without any."""
+    def some(self, title: str, texts: Sequence[str], rest_stands: str, most: int | None = None) -> None:
+        """As many of the texts as ``most`` and the page allow, each whole, and how many more there are."""
         if not texts:
             return
         self.text(f"{title} ({len(texts)})", size=10, weight="bold")
-        for text in texts[:_MOST_NOTES]:
-            self.text(textwrap.shorten(text, _LONGEST_NOTE, placeholder="…"), size=8)
-        if len(texts) > _MOST_NOTES:
-            self.text(f"… and {len(texts) - _MOST_NOTES} more {rest_stands}", size=8)
+        for number, text in enumerate(texts[:most]):
+            high = (len(textwrap.wrap(text, _WIDE * 9 // 8)) + 2.4) * _LINE * 8 / 9  # and the line that counts the rest
+            if self.at - high < _BOTTOM:
+                texts, most = texts[number:], 0
+                break
+            self.text(text, size=8)
+        rest = len(texts) - len(texts[:most])
+        if rest:
+            self.text(f"… and {rest} more {rest_stands}", size=8)
 
     def picture(self, path: Path, entry: Mapping[str, str], most: float) -> None:
         """A figure with its title and caption, at full width or as high as ``most`` of the page and as its rest."""
@@ -103,23 +109,24 @@ def write_pdf(out_dir: Path) -> Path:
 def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[_Page]:
     summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     run = read_json(out_dir / "run.json")
-    yield _first(out_dir, summary, whole, run)
-    yield _figures("Over all cases", out_dir, ("planned_within", "cases_by_error"))
-    yield _worst_case(out_dir, summary)
-    yield _last(summary, run)
+    yield _first(out_dir, summary, whole)
+    yield _over_all(out_dir, run)
+    name = _worst(summary)
+    yield _worst_case(out_dir, summary, name)
+    yield _last(out_dir / "cases" / name, summary, run)
 
 
-def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
-    """Verdict, failures with the next command, tiles, warnings, assumptions."""
+def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> _Page:
+    """Verdict, failures with the next command, tiles, warnings."""
     failures = read_if_there(out_dir / FAILURES.file, FAILURES)
     page = _Page("Guide-wire validation")
     ok, planned = int(summary["frames_ok"].sum()), int(summary["frames"].sum())
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     cases = zip(summary["role"], summary["status"], strict=True)
-    said = verdict(row) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
-    page.text(
-        f"{len(summary)} case{'s' * (len(summary) != 1)}, {ok} of {planned} frames have a result. {said}", size=11
-    )
+    results = results_in(out_dir)
+    simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
+    said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
+    page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
     if len(failures):
         page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
         rows = failures[["simulator", "case", "frame", "status", "message"]].head(_MOST_FAILURES)
@@ -133,46 +140,55 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, run: Mappi
         page.text(f"Next: do what the message says, then {command}", width=_WIDE * 9 // 10, weight="bold")
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         page.text(f"{tile['value']}  {tile['label']}")
-    results = results_in(out_dir)
-    page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases")
-    assumed = [str(text) for text in run.get("assumptions", ())]
-    page.some("Assumptions", [*assumed, *said_by_cases(results, "assumptions")], "on the pages")
+    page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases", _MOST_WARNINGS)
     return _draw(page, out_dir, ("case_frame_map",))
 
 
-def _figures(title: str, folder: Path, names: Sequence[str]) -> _Page:
-    """A page of figures that a page on the screen has drawn, as far as there are any, with their captions."""
-    return _draw(_Page(title), folder, names)
+def _over_all(out_dir: Path, run: Mapping[str, Any]) -> _Page:
+    """Figures over all cases, and what was assumed."""
+    page = _draw(_Page("Over all cases"), out_dir, ("planned_within", "cases_by_error"))
+    assumed = [str(text) for text in run.get("assumptions", ())]
+    page.some("Assumptions", [*assumed, *said_by_cases(results_in(out_dir), "assumptions")], "on the pages")
+    return page
 
 
 def _draw(page: _Page, folder: Path, names: Sequence[str]) -> _Page:
+    """Figures that a page on the screen has drawn, as far as there are any, with their captions."""
     entries = {entry["figure"]: entry for part in ("run", "case") for entry in declared(part)}
     for name in names:
         path = folder / "figures" / f"{name}.png"
         if path.exists():
             read = _content.caption(entries[name]["read"], pd.read_csv(path.with_suffix(".csv")))
-            page.picture(path, {**entries[name], "read": read}, most=0.38)
+            most = _SCAN_SHARE if name == "projections" else 0.38
+            page.picture(path, {**entries[name], "read": read}, most)
     return page
 
 
-def _worst_case(out_dir: Path, summary: pd.DataFrame) -> _Page:
-    """The first case with errors, in the order of the last page, by its own figures. summary : worst first."""
+def _worst(summary: pd.DataFrame) -> str:
+    """The first case with errors. summary : worst first."""
     known = summary[summary[WORST].notna()]
     worst = (known if len(known) else summary)["case"]
-    name = str(worst.iloc[0]) if len(worst) else ""
+    return str(worst.iloc[0]) if len(worst) else ""
+
+
+def _worst_case(out_dir: Path, summary: pd.DataFrame, name: str) -> _Page:
+    """The worst case by its own figures."""
     before = "" if not name or name == summary["case"].iloc[0] else " of those with errors"
     folder = out_dir / "cases" / name
     case = read_case(folder)
     if not (folder / "figures").exists():
         draw_sections("case", case, folder, embed=False)
-    page = _figures(f"The worst case{before}: {name}", folder, ("error_by_depth", "projections"))
+    page = _draw(_Page(f"The worst case{before}: {name}"), folder, ("projections", "error_along_wire"))
     frames = [f"{row['frame']} ({row['text']} mm)" for row in worst_frames({name: case.errors}, {})]
     page.text(f"Worst frames by {WORST}: {', '.join(frames)}." if frames else "No frame has an error.")
     return page
 
 
-def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
-    """Cases in their order, worst first; settings that are not defaults; versions."""
+def _last(worst: Path, summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
+    """Cases in their order, worst first; settings that are not defaults; versions; more of the worst case.
+
+    worst : its folder.
+    """
     page = _Page("Cases, worst first")
     page.text(f"Cases with failed frames come first, of these the ones without any result; then the largest {WORST}.")
     heads = ("case", "status", "frames", "rms_mm", "p95_mm", "tip_median_mm", "skill_strongest")
@@ -193,4 +209,5 @@ def _last(summary: pd.DataFrame, run: Mapping[str, Any]) -> _Page:
     known = dict(_content.flatten(run.get("provenance", {})))
     names = [name for name in ("wireval", "git_commit", "python") if name in known]
     page.text("; ".join(f"{name} {known[name]}" for name in names), size=8)
-    return page
+    page.text(f"More of {worst.name}", size=10.5, weight="bold")
+    return _draw(page, worst, ("error_by_depth", "tip_by_depth"))

@@ -8,7 +8,7 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import find_cases, not_run_sentence, warnings_of
+from reports.case_files import counted, find_cases, not_run_sentence, warnings_of
 from reports.figures.simulators import OURS, SimulatorFiles, leads
 from reports.html import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
@@ -54,7 +54,7 @@ def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
-    rest = len(lines) - _MOST_WARNINGS
+    more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
     counts = f"On {row.get('frames_ok')} of {row.get('frames')} frames: " if row.get("frames_failed") else ""
     missing, failed = not_run_sentence(folder), row.get("frames_failed") != 0
     aside = f" Of the study {missing}." if missing else ""
@@ -63,7 +63,7 @@ def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
             "cases missing" if missing else "frames failed" if failed else "ok", not (missing or failed), row
         ),
         "verdict": (counts + said if (said := verdict(row)) else "No frame of it has a result.") + aside,
-        "warnings": [*lines[:_MOST_WARNINGS], *[f"{rest} more warnings stand on the pages of its cases"] * (rest > 0)],
+        "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
 
 

@@ -9,22 +9,23 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, interval, number
-from reports.case_files import WORST, find_cases, read_json, warnings_of
+from reports.case_files import WORST, counted, find_cases, read_json, warnings_of
 from reports.schema import SUMMARY
 
 _MANY = 5
 
 
-def verdict(statistics: Mapping[str, Any]) -> str:
+def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
     """How far the simulated wire is from the traced one, and whether that beats what anybody would have guessed.
 
-    statistics : a row of summary.csv or overall.csv.
+    statistics : a row of summary.csv or overall.csv.     simulator : whose wire it is, where there are several.
     """
     rms = number(statistics.get("rms_mm"))
     if rms == NOTHING:
         return ""
     ends = interval(statistics.get("rms_low_mm"), statistics.get("rms_high_mm"))
-    sentence = f"The simulated wire lies {rms} mm (rms) from the traced one"
+    whose = f"The wire of {simulator}" if simulator else "The simulated wire"
+    sentence = f"{whose} lies {rms} mm (rms) from the traced one"
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
@@ -178,7 +179,7 @@ def warned(out_dir: Path) -> list[str]:
     """What was warned of in the cases of a run, a line each, no more than a few."""
     lines = [f"warning: {case.name}: {text}" for case in find_cases(out_dir) for text in warnings_of(case)]
     rest = len(lines) - _MANY
-    return [*lines[:_MANY], *[f"{rest} more warnings stand on the pages of the cases"] * (rest > 0)]
+    return [*lines[:_MANY], *[f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)]
 
 
 def typed(folder: Path) -> Sequence[str]:

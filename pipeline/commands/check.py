@@ -19,6 +19,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.same_scans import shared
+    from reports.case_files import counted
 
     manifest, settings = given(args), resolved_settings(args)
     problems = check(manifest.cases, settings.config)
@@ -29,5 +30,5 @@ def main(args: argparse.Namespace) -> int:
     for note in shared(manifest.cases):
         say(f"warning: {note}")
     frames = sum(case.frame_count for case in manifest.cases)
-    say(f"{args.manifest}: {len(manifest.cases)} case(s), {frames} frames: no problem found")
+    say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")
     return 0

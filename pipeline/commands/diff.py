@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression; InputError on wrong input."""
     from pipeline.run.launch import UsageError
+    from reports.case_files import find_cases
 
     places = {name: getattr(args, name) for name in FILES}
     problems = [text for name, path in places.items() if path for text in unwritable(path, f"--{name}")]
@@ -45,6 +47,8 @@ def main(args: argparse.Namespace) -> int:
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
         raise UsageError([str(error)]) from None
     verdict.write(**places)
+    if not find_cases(args.second):
+        sys.stderr.write(f"{args.second}: no case below it: is this what `wireval run` wrote?\n")
     for line in [verdict.sentence] if args.quiet else verdict.lines():
         say(line)
     return 1 if verdict.closed else 0

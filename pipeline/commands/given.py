@@ -1,6 +1,8 @@
 """What MANIFEST stands for on the command line: a file, a folder that holds one, or a folder of scans."""
 
 import argparse
+import atexit
+import shutil
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -70,10 +72,12 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
         return read_manifest(path)
     text, seen, _ = inferred(args)
     say("\n".join([text, *seen]))
-    with tempfile.TemporaryDirectory() as passing:
-        written = Path(keep or passing) / "manifest.inferred.toml"
-        write_text(written, text)
-        return read_manifest(written)
+    if keep is None:
+        keep = Path(tempfile.mkdtemp())
+        atexit.register(shutil.rmtree, keep, ignore_errors=True)  # until then its hash may be asked for
+    written = keep / "manifest.inferred.toml"
+    write_text(written, text)
+    return read_manifest(written)
 
 
 def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:

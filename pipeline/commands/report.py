@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 HELP = "rebuild tables, figures and pages from result files"
 MANY = 10
 """Cases from which on each page that was drawn is a line: one takes seconds."""
+FEW = 5
+"""Cases up to which what is wrong is a line each."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,8 +42,9 @@ def main(args: argparse.Namespace) -> int:
 
     found = found_results(args.out)
     if not found:
-        problem = f"{args.out}: no cases/*/result.json below it; this is not an output of wireval run"
-        return complain([problem], "OUT")
+        above = [f"give {one}" for one in args.out.absolute().parents[:2] if found_results(one)]
+        hint = next(iter(above), "this is not an output of wireval run")
+        return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], "OUT")
     if links_out(args.out):
         return complain(links_out(args.out), "OUT")
     heads = found_heads(args.out)
@@ -67,9 +70,9 @@ def _all_there(out: Path, found: Sequence["Result"], name: str = "") -> bool:
     from reports.case_files import find_cases, left_out_sentence, left_over_sentence, not_run_sentence
 
     missing = not_run_sentence(out) or f"no case below {out}" * (not find_cases(out))
-    damaged = [str(result.failures[0]["message"]) for result in found if result.status == "damaged"]
-    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing, *damaged)):
+    for aside in filter(None, (left_over_sentence(out), left_out_sentence(out), missing)):
         sys.stderr.write(f"{name}{aside}\n")
+    _tell([(r.case, str(r.failures[0]["message"])) for r in found if r.status == "damaged"], name)
     return not missing
 
 
@@ -84,10 +87,22 @@ def _all_drawn(args: argparse.Namespace, found: Sequence["Result"]) -> bool:
             problem = outcome.error or outcome.result
             if outcome.status == "unwritable":
                 raise WriteError(outcome.error)
-            wrong += [problem] if problem else []
-            if problem or len(found) >= MANY:
-                sys.stderr.write(f"{count}/{len(found)} {outcome.job.case}: {problem or 'drawn'}\n")
+            wrong += [(outcome.job.case, problem)] if problem else []
+            if len(found) >= MANY and not problem:
+                sys.stderr.write(f"{count}/{len(found)} {outcome.job.case}: drawn\n")
+    _tell(wrong)
     return not wrong
+
+
+def _tell(wrong: Sequence[tuple[str, str]], name: str = "") -> None:
+    """What is wrong with which cases: a line each, or one line for many."""
+    from reports.case_files import listed
+
+    lines = [f"{case}: {problem}" for case, problem in wrong]
+    if len(wrong) > FEW:
+        lines = [f"{len(wrong)} cases have no new page: {listed([case for case, _ in wrong])}; the first: {lines[0]}"]
+    for line in lines:
+        sys.stderr.write(f"{name}{line}\n")
 
 
 def _drawn(out: Path, embed: bool, result: "Result") -> str:

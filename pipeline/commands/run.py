@@ -86,15 +86,18 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.guards import guard_kept, guard_out, guard_stages
+    from pipeline.run.guards import guard_apart, guard_kept, guard_out, guard_stages
     from pipeline.run.launch import Plan, UsageError, chosen
     from pipeline.run.log import STAGES
     from pipeline.run.sweep import points_of
     from pipeline.status import did_you_mean
+    from pipeline.study.sources import files_of
 
     if args.executor:  # workers elsewhere know nothing of this process's working folder
         args.manifest, args.out = args.manifest.absolute(), args.out.absolute()
+    guard_apart(args.out, [args.manifest])  # before an inferred manifest is written there
     manifest = given(args, None if args.dry_run else args.out)
+    guard_apart(args.out, (path.parent for case in manifest.cases for path in files_of(case).values()))
     settings = resolved_settings(args)
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])

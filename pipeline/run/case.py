@@ -79,7 +79,8 @@ class Job:
         # who registers a metric or a predictor gives its column
         registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
         given = self.settings.calibrated and self.settings.calibrated[0]
-        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered))
+        named = (self.simulator,) if self.simulator else ()  # the page says whose wires they are
+        return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered, *named))
 
 
 def clear(folder: Path) -> None:
@@ -207,7 +208,7 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
-    details = results.details_of(job.case, known, log)
+    details = results.details_of(job.case, known, log) | ({"simulator": job.simulator} if job.simulator else {})
     details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}
     results.result_of(job.case, known, summary, key, details).write(job.folder)
     ledger.write(job.folder, key)
@@ -221,8 +222,8 @@ def _kernels_loaded() -> float:
 
 
 def load_kernels(progress: CaseProgress) -> None:
-    """Compile or load the solver's kernels before anything is timed; says so where it is the first run."""
+    """Compile or load the solver's kernels before anything is timed; the first run says so, with -q and a bar, too."""
     cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
     if not cached:
-        progress.say("compiling the solver, once per installation: about half a minute")
+        progress.warn("compiling the solver, once per installation: half a minute to two")
     progress.write(f"kernels ready in {_kernels_loaded():.2f} s")

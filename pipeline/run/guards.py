@@ -1,7 +1,7 @@
 """Before a run writes into a folder: what lies there, and whether the new results may stand beside it."""
 
 import json
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,13 @@ from pipeline.run.store import file_hash
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases, read_json
 from reports.origin import ABSENT, settings_of
+
+
+def guard_apart(out: Path, folders: Iterable[Path]) -> None:
+    """Refuse an output folder that is one of the inputs': results would lie among the scans, --fresh clear there."""
+    if out.resolve() in {folder.resolve() for folder in folders}:
+        beside = out.resolve().with_name(f"{out.resolve().name}-out").name
+        raise UsageError([f"-o {out}: this is the folder of the inputs; name another one for the results, as {beside}"])
 
 
 def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:

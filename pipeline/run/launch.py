@@ -34,7 +34,7 @@ from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import left_over, left_over_sentence, read_json
+from reports.case_files import counted, left_over, left_over_sentence, read_json
 from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
@@ -211,9 +211,9 @@ def intention(plan: Plan) -> list[str]:
     lines = []
     for job in plan.jobs:
         known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
-        lines.append(f"{job.case.id}: {job.case.frame_count} frames, {known} -> {job.folder}")
+        lines.append(f"{job.case.id}: {counted(job.case.frame_count, 'frame')}, {known} -> {job.folder}")
     lines += [
-        f"sweep {point.parameter} = {point.value}: {len(plan.cases)} case(s) -> {plan.out / point.folder}"
+        f"sweep {point.parameter} = {point.value}: {counted(len(plan.cases), 'case')} -> {plan.out / point.folder}"
         for point in plan.points
     ]
     return [*lines, "dry run: nothing was computed"]
@@ -242,7 +242,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
 
 def last_line(totals: Totals, index: Path) -> str:
     """Counts, median error, time of the simulate stage, and where the sweep's table and the report lie."""
-    parts = [f"{totals.cases} case{'s' * (totals.cases != 1)}, {totals.frames} frames: {totals.frames_ok} ok"]
+    parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
     elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted

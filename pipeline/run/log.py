@@ -145,13 +145,6 @@ class CaseProgress:
             self.stream.write(line + "\n")
             self.stream.flush()
 
-    def say(self, text: str) -> None:
-        """A line for the reader and the log that belongs to no step."""
-        if self.quiet:
-            self.write(text)
-        else:
-            self.warn(text)
-
     def warn(self, text: str) -> None:
         """A line that every reader has to see."""
         self.write(text)

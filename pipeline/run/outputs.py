@@ -22,6 +22,7 @@ from pipeline.run.view import contact_at
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from reports import frames_file
+from solver import Solution
 
 BEYOND = 2.0
 """Times u, beyond which an error is the model's."""
@@ -40,10 +41,10 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]
     if case.compared:
         head["within_1mm"] = within(errors, len(planned))
-    wires = [frame.simulated for frame in known.frames if frame.simulated is not None]
+    wires = [wire for frame in known.frames if (wire := frame.simulated_wire) is not None]
     if wires:
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
-    solved = [frame.solved.push_force_N for frame in known.frames if frame.solved is not None]
+    solved = [wire.push_force_N for wire in wires if isinstance(wire, Solution)]
     head |= {"push_force_max_N": max(solved)} if solved else {}
     return head | pooled(scored)
 
@@ -73,9 +74,11 @@ def error_row(frame: Frame) -> dict[str, Any]:
     if frame.curve is not None and len(frame.curve.sigma_mm):
         row["trace_sigma_mm"] = rms(frame.curve.sigma_mm)
     if frame.simulated is not None:
-        row |= {"max_penetration_mm": frame.simulated.max_penetration_mm, "joints": len(frame.simulated.joints_mm)}
-    if frame.solved is not None:
-        wire = frame.solved
+        row["joints"] = len(frame.simulated.joints_mm)
+    wire = frame.simulated_wire
+    if wire is not None:
+        row["max_penetration_mm"] = wire.max_penetration_mm
+    if isinstance(wire, Solution):
         row |= {"push_force_N": wire.push_force_N, "iterations": wire.iterations, "num_mm": frame.num_mm}
         row |= {"snaps": len(wire.snaps), "uncertain": frame.uncertain, "least_pivot": wire.least_pivot}
     return row | budget_of(frame)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from pipeline.load.geometry import Header
 from pipeline.model import Array, Lumen, arc_length
 from pipeline.run.helpers import nothing, shared
 from pipeline.run.stages import Known
@@ -42,7 +43,39 @@ def write_view(folder: Path, known: Known, cores: int = 1, beside: Callable[[], 
     for kind in ("traced", "simulated", "true"):
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
-    export.write_scene(folder, shown=max(with_wire, default=0))
+    shown = max(with_wire, default=0)
+    export.write_scene(folder, shown, *_scans_of(known, shown))
+
+
+_SLICER = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
+
+
+def _scans_of(known: Known, shown: int) -> tuple[dict[str, Path], str]:
+    """The reference and the shown frame, by name, as far as 3D Slicer reads them as they were read here; what is not.
+
+    Not all frames: a scene is opened whole, and a hundred scans take more memory than a computer has.
+    """
+    if known.scans is None:
+        return {}, ""
+    frame = {f"frame {shown}": header for header in known.scans.frames[shown : shown + 1]}
+    headers = ({"reference": known.scans.reference} if known.scans.reference else {}) | frame
+    why = {name: _unlike(header) for name, header in headers.items()}
+    found = {name: header.source.path for name, header in headers.items() if not why[name]}
+    said = [f"{name} is not opened, since {reason}" for name, reason in why.items() if reason]
+    more = len(known.scans.frames) - len(frame)
+    said += ["other frames' scans are opened by hand: all lie in the same place (LPS)"] * (more > 0)
+    said += ["scans are found where they lay when the case was run"] * bool(found)
+    return found, "; ".join(said)
+
+
+def _unlike(header: Header) -> str:
+    """Why 3D Slicer would not show a scan as it was read here; empty where it would."""
+    source = header.source
+    if source.dataset or source.item is not None or header.item_count > 1:
+        return f"it is a part of {source.path.name}"
+    if not source.path.name.lower().endswith(_SLICER):
+        return f"{source.path.name} needs an import (DICOM: by the module of that name)"
+    return f"its header was completed here ({header.assumed[0]})" if header.assumed else ""
 
 
 def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:

@@ -218,14 +218,22 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
         return replace(given, warning=warning)
     if not used:
         return replace(found, warning="no frame tells where the wire is held: the manifest's entry was kept")
+    frames = f"{used} frame{'s' * (used != 1)}"
     note = (
-        f"the clamp was estimated from {used} frames: the solver's wire fitted to the first {REACH_MM:g} mm of the "
-        f"traces, with the manifest's entry as prior; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
+        f"the clamp was estimated from {frames}: the solver's wire fitted to the first {REACH_MM:g} mm of the traces, "
+        f"with the manifest's entry as prior; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
         f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
         "this off)"
     )
-    frames = ", ".join(map(str, out))
-    warning = (
-        f"the first {REACH_MM:g} mm of the traces of frames {frames} disagree with the others: left out of the clamp"
+    return replace(found, note=note, warning=_left_out(out, used) if out else "")
+
+
+def _left_out(out: Sequence[int], used: int) -> str:
+    """A warning that names the frames that were left out; where they are as many as the others, what may be wrong."""
+    what = f"the first {REACH_MM:g} mm of the traces of frame{'s' * (len(out) != 1)} {', '.join(map(str, out))}"
+    if len(out) < used:
+        return f"{what} disagree with the others: left out of the clamp"
+    return (
+        f"the simulated wire fits {what} from no clamp that also fits the other {used}: left out of it; check roll, "
+        "material_axis and the wire's tip and stiffness before the traces"
     )
-    return replace(found, note=note, warning=warning if out else "")

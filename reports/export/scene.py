@@ -1,12 +1,13 @@
 """A scene of 3D Slicer (.mrml) that opens what lies in a case's folder ``view``, with names and colours.
 
 The lumen as a surface to look into and as a segmentation in the slices; every frame's wires, of which those of one
-frame are switched on. Models are lines with arrays (error_mm, ...), curves have measurements.
+frame are switched on, and scans, the last in the slices. Models are lines with arrays (error_mm, ...), curves have
+measurements.
 """
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,10 @@ from reports.atomic import write_bytes
 
 _COLOURS = {"traced": colours.TRACED, "simulated": colours.SIMULATED, "true": colours.TRUE}
 _WIRE = re.compile(r"wire_(traced|simulated|true)_(\d+)\.(vtp|mrk\.json)")
+_DISPLAY = {"MarkupsCurve": "MarkupsDisplay"}  # of the others: their own name with "Display" behind it
+_CLASS = {"Volume": "ScalarVolume", "VolumeDisplay": "ScalarVolumeDisplay"}
+"""Nodes whose class has another name than their tag."""
+_GREY = {"references": "color:vtkMRMLColorTableNodeGrey;", "autoWindowLevel": "1", "visibility": "true"}
 
 
 class _Thing(NamedTuple):
@@ -27,14 +32,29 @@ class _Thing(NamedTuple):
     display: dict[str, str]
 
 
-def write_scene(folder: Path, shown: int) -> Path | None:
-    """Write scene.mrml over the files of ``folder``, frame ``shown`` switched on; None where there is none of them."""
+def write_scene(folder: Path, shown: int, scans: Mapping[str, Path] | None = None, said: str = "") -> Path | None:
+    """Write scene.mrml over the files of ``folder``, frame ``shown`` switched on; None where there is none of them.
+
+    scans : by name, which 3D Slicer reads as they are.     said : what a reader of the scene should know of them.
+    """
     things = list(_things(folder, shown))
     if not things:
         return None
     root = ET.Element("MRML", version="Slicer5.0.0", userTags="")
-    for number, thing in enumerate(things, start=1):
+    # by their whole path: the folder of results is copied and moved without the scans
+    files = {name: str(path.absolute()) for name, path in (scans or {}).items()}
+    volumes = [_Thing("Volume", "VolumeArchetypeStorage", name, file, _GREY) for name, file in files.items()]
+    for number, thing in enumerate([*volumes, *things], start=1):
         _add(root, thing, number)
+    if said:
+        ET.SubElement(root, "Text", id="vtkMRMLTextNode1", name="about the scans", text=said)
+    for view in ("Red", "Green", "Yellow") if volumes else ():
+        behind = {
+            "layoutName": view,
+            "singletonTag": view,
+            "references": f"backgroundVolume:{_id('Volume', len(volumes))};",
+        }
+        ET.SubElement(root, "SliceComposite", {"id": f"vtkMRMLSliceCompositeNode{view}", **behind})
     ET.indent(root, " ")
     path = folder / "scene.mrml"
     write_bytes(path, ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
@@ -63,14 +83,18 @@ def _things(folder: Path, shown: int) -> Iterator[_Thing]:
 
 def _add(root: ET.Element, thing: _Thing, number: int) -> None:
     """The three nodes of a thing, which find each other by their identifiers: storage, display, the thing itself."""
-    display = {"MarkupsCurve": "MarkupsDisplay"}.get(thing.tag, f"{thing.tag}Display")
-    storage_id, display_id = (f"vtkMRML{tag}Node{number}" for tag in (thing.storage, display))
+    display = _DISPLAY.get(thing.tag, f"{thing.tag}Display")
+    storage_id, display_id = (_id(tag, number) for tag in (thing.storage, display))
     storage = {"id": storage_id, "name": f"{thing.name} file", "fileName": thing.file}
     space = {"coordinateSystem": "LPS"} if thing.tag == "Model" else {}  # the other files say it themselves
     ET.SubElement(root, thing.storage, storage | space)
     ET.SubElement(root, display, {"id": display_id, "name": f"{thing.name} display"} | thing.display)
     references = f"display:{display_id};storage:{storage_id};"
-    ET.SubElement(root, thing.tag, id=f"vtkMRML{thing.tag}Node{number}", name=thing.name, references=references)
+    ET.SubElement(root, thing.tag, id=_id(thing.tag, number), name=thing.name, references=references)
+
+
+def _id(tag: str, number: int) -> str:
+    return f"vtkMRML{_CLASS.get(tag, tag)}Node{number}"
 
 
 def _triple(colour: str) -> str:

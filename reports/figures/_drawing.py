@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import LogNorm, Normalize, to_rgb
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from reports.atomic import write_bytes
-from reports.colours import BAD, ERROR_SCALE_MM, SIMULATED, TRACED, TRUE
+from reports.colours import BAD, ERROR_SCALE_MM, FAR, SIMULATED, TRACED, TRUE
 from reports.figures._style import SEQUENTIAL, Look
 from reports.tables import write_csv
 
@@ -29,6 +29,8 @@ Array = NDArray[np.floating[Any]]
 DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
 LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
+LEAST_MM = 1e-3  # of a logarithmic axis: a trace is known to 0.01 mm at best, and equal curves differ by 1e-16
+_ERROR_COLOURS = LinearSegmentedColormap.from_list("error", (SIMULATED, FAR))  # the viewer's
 _ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
@@ -125,15 +127,30 @@ def plain_decades(axis: Axis, subs: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None
 
 
 def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
-    """Make y logarithmic with plain numbers where the values span decades, else linear from zero."""
+    """Make y logarithmic with plain numbers where the values, mm, span decades, else linear from zero.
+
+    What is less than LEAST_MM is drawn there, and the axis says so.
+    """
     numbers = np.concatenate([np.asarray(v, dtype=float).ravel() for v in values] or [np.zeros(0)])
-    kept = numbers[np.isfinite(numbers) & (numbers > 0)]
+    known = numbers[np.isfinite(numbers) & (numbers > 0)]
+    kept = np.maximum(known, LEAST_MM)
     if len(kept) and kept.max() > LOG_FROM_RATIO * kept.min():
         axes.set_yscale("log")
         axes.set_ylim(kept.min() / 1.5, kept.max() * 1.5)
         plain_decades(axes.yaxis)
+        if known.min() < LEAST_MM:
+            _end_at_least(axes)
     else:
-        axes.set_ylim(bottom=0.0)
+        # an axis of 1e-16 mm would make differences of nothing
+        axes.set_ylim(bottom=0.0, top=LEAST_MM if len(known) and known.max() < LEAST_MM else None)
+
+
+def _end_at_least(axes: Axes) -> None:
+    """Draw all lines that fall below LEAST_MM there, with a tick that says what lies on it."""
+    for line in axes.lines:
+        line.set_ydata(np.maximum(np.asarray(line.get_ydata(), dtype=float), LEAST_MM))
+    tick = FuncFormatter(lambda v, _: f"\u2264 {v:g}" if v < 1.01 * LEAST_MM else f"{v:g}")
+    axes.yaxis.set_major_formatter(tick)
 
 
 def error_scale() -> Normalize:
@@ -150,7 +167,8 @@ def heat_map(
     bar, cells : what else matplotlib is told of the colour bar and of the cells.
     """
     logarithmic, least = isinstance(scale, LogNorm), float(scale.vmin or 0.0)
-    mesh = axes.pcolormesh(*edges, np.maximum(grid, least), cmap=SEQUENTIAL, norm=scale, **cells)
+    colours = _ERROR_COLOURS if logarithmic else SEQUENTIAL
+    mesh = axes.pcolormesh(*edges, np.maximum(grid, least), cmap=colours, norm=scale, **cells)
     figure: Any = axes.get_figure()
     extend = "both" if logarithmic else "max"
     shown = figure.colorbar(mesh, ax=axes, label=label, extend=extend, pad=0.01, **bar)

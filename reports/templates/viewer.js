@@ -8,7 +8,7 @@
   const css = (name) => style.getPropertyValue(name).trim();
   const COLOUR = { traced: css("--traced"), simulated: css("--simulated"), true: css("--true"), far: css("--far"), unscored: css("--unscored"), lumen: css("--lumen") };
   const ORDER = ["traced", "true", "simulated"];
-  const MARGIN_MM = 5;
+  const MARGIN_MM = 5, PAPER_WIDTH = 760;
   const shown = (name) => all(`[data-show="${name}"]`).every((box) => box.checked);
   const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
@@ -109,7 +109,8 @@
   const NAMES = scan.aligned ? ["x, to left", "y, to back", "z, to head"] : ["array axis 0", "array axis 1", "array axis 2"];
 
   const fitted = (canvas) => {
-    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    // on paper the strips have one shape: a phone's, as high as wide, filled a sheet of their own and left one blank
+    const ratio = window.devicePixelRatio || 1, width = paper && canvas.id === "straight" ? PAPER_WIDTH : canvas.clientWidth, height = canvas.clientHeight;
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
     }
@@ -304,8 +305,9 @@
     if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; trail(pen, [[X(cursor.s), TOP], [X(cursor.s), bottom]]); }
   };
   const across = () => {
-    const { pen, width, height } = cleared($("across")), f = frame(), cursor = place();
-    if (!f.offsets || !cursor) return;
+    const { pen, width, height } = cleared($("across")), f = frame(), cursor = place(), title = $("across").previousElementSibling;
+    if (!f.offsets || !cursor) { title.textContent = "across the wire: no traced wire in this frame"; return; }
+    title.textContent = `across the wire at ${cursor.s.toFixed(1)} mm, seen from the entry`;
     const half = f.straight ? 0.5 * f.straight.samples[1] * f.straight.across_mm : 3, scale = (Math.min(width, height) / (2 * half)) * zoom();
     const spot = (o) => [width / 2 + o[2] * scale, height / 2 - o[1] * scale];
     const image = f.straight && shown("scan") && picture(f.straight.across);
@@ -320,11 +322,11 @@
     }
     for (const name of ["true", "simulated"]) if (f.offsets[name] && shown(name)) {
       const i = f.offsets[name].findIndex((o) => o[0] >= cursor.s);
-      const o = f.offsets[name][i < 0 ? f.offsets[name].length - 1 : i];
+      const o = f.offsets[name][i < 0 ? f.offsets[name].length - 1 : i], [x, y] = spot(o);
+      if (Math.abs(x - width / 2) > width / 2 || Math.abs(y - height / 2) > height / 2) title.textContent += `; the ${name} wire is beyond the frame, ${Math.hypot(o[1], o[2]).toFixed(2)} mm off`;
       disc(o, 4, f.lines[name].colours ? f.lines[name].colours[i < 0 ? f.lines[name].colours.length - 1 : i] : COLOUR[name]);
     }
     ruler(pen, width, height, scale);
-    $("across").previousElementSibling.textContent = `across the wire at ${cursor.s.toFixed(1)} mm, seen from the entry`;
   };
   // a click goes there; dragging follows the pointer, or pulls the zoomed strip along
   dragged($("straight"), (e, before) => {

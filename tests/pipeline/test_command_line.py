@@ -44,6 +44,8 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("check STUDY/reference.mha", "a scan is no manifest; give its folder"),
         ("run STUDY/reference.mha -o y", "wireval init"),
         ("run STUDY -o STUDY/reference.mha", "this is a file; name a folder"),
+        ("run STUDY -o STUDY", "this is the folder of the inputs; name another one"),
+        ("run STUDY/manifest.toml -o STUDY", "this is the folder of the inputs; name another one"),
         ("run STUDY -o STUDY/reference.mha/below", "cannot be written: Not a directory"),
         ("run STUDY -o /proc/none", "cannot be written: No such file or directory"),
         ("run STUDY -o y --junit STUDY", "this is a folder; name a file"),
@@ -91,6 +93,16 @@ def test_a_folder_is_checked_as_it_is_run(study: Path, scans: Path, capsys: pyte
     assert main(["check", str(scans)]) == 0
     assert "assumed, not confirmed: case 'own_scans': wire: radius 0.18 mm" in capsys.readouterr().out
     assert not list(scans.rglob("*.toml")), "check writes nothing"
+
+
+def test_a_dry_run_of_a_folder_needs_no_empty_out(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The inferred manifest was gone before its hash was asked for: a traceback."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine", encoding="utf-8")
+    assert main(["run", str(scans), "-o", str(tmp_path / "out"), "--dry-run"]) == 2
+    assert "is not empty and holds no run" in capsys.readouterr().err
 
 
 def test_init_leaves_what_run_infers_and_names_scans_from_there(
@@ -267,3 +279,50 @@ def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.Capture
 def test_check_does_not_say_that_nothing_was_run(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study / "none.toml")]) == 2
     assert "nothing was run" not in capsys.readouterr().err
+
+
+def test_many_damaged_cases_are_a_line_and_few_a_line_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for count in (2, 60):
+        out = tmp_path / str(count)
+        for number in range(count):
+            folder = out / "cases" / f"c{number:02d}"
+            folder.mkdir(parents=True)
+            (folder / "result.json").write_text("{", encoding="utf-8")
+        assert main(["report", str(out)]) == 1
+        said = [line for line in capsys.readouterr().err.splitlines() if "result.json" in line]
+        assert len(said) == (2 if count == 2 else 1)
+    assert said[0].startswith("60 cases have no new page: c00, c01, c02, c03, c04 and 55 more; the first: c00: ")
+
+
+def test_a_folder_that_is_no_output_is_told_with_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out" / "cases" / "a").mkdir(parents=True)
+    (tmp_path / "out" / "cases" / "a" / "result.json").write_text("{", encoding="utf-8")
+    for inner in ("out/cases", "out/cases/a"):
+        assert main(["report", str(tmp_path / inner)]) == 2
+        assert f"give {tmp_path / 'out'}" in capsys.readouterr().err
+    assert main(["report", str(tmp_path)]) == 2
+    assert "this is not an output of wireval run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("verb", "kept"), [("run", True), ("synth", False)])
+def test_what_keeps_nothing_does_not_say_that_it_goes_on(
+    verb: str, kept: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(_args: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pipeline.cli.carried_out", interrupted)
+    assert main([verb, "straight", "-o", "y"]) == 130
+    assert ("goes on from there" in capsys.readouterr().err) == kept
+
+
+def test_diff_says_where_the_candidate_is_no_run(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder of scans was told as a run that has lost all cases."""
+    out = tmp_path / "out"
+    assert main(["run", str(study), "-o", str(out), "--until", "compare"]) == 0
+    for second, said in ((study, True), (out, False)):
+        capsys.readouterr()
+        assert main(["diff", str(out), str(second)]) == said
+        assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == said

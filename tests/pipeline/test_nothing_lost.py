@@ -124,7 +124,7 @@ def test_a_page_stays_where_what_it_is_drawn_from_is_not_whole(
         path.write_bytes(content[:-1])
     assert main(["report", str(out)]) == 1
     words = "is missing" if how == "gone" else "is not as it was written"
-    assert f"1/1 bifurcation: its page stays as it was: frames.h5 {words}; run" in capsys.readouterr().err
+    assert f"bifurcation: its page stays as it was: frames.h5 {words}; run" in capsys.readouterr().err
     assert (case_of(out) / "report.html").read_bytes() == page
     assert list(pd.read_csv(out / "summary.csv")["status"]) == ["ok"], "its tables are whole"
 

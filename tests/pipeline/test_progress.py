@@ -8,7 +8,11 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.run.case import Job
+import pytest
+
+import solver
+from pipeline.run import case as case_module
+from pipeline.run.case import Job, load_kernels
 from pipeline.run.log import CaseProgress
 from pipeline.run.watch import EVERY_S, Watch, share_done
 from pipeline.study.manifest import Case
@@ -27,11 +31,21 @@ def test_lines_elsewhere_and_everything_in_the_log(tmp_path: Path) -> None:
     progress = CaseProgress("a", tmp_path / "log.txt", stream)
     progress("trace", 1, 2, "ok 12.0 mm")
     progress("simulate", 1, 2, "converged")
-    progress.say("compiling")
+    progress.warn("compiling")
     assert stream.getvalue() == "[a] trace 1/2  ok 12.0 mm\n[a] compiling\n"
     log = (tmp_path / "log.txt").read_text(encoding="utf-8")
     assert "simulate 1/2  converged" in log
     assert "compiling" in log
+
+
+def test_the_first_run_says_that_it_compiles_with_quiet_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With -q, or below a bar, the minute that machine code takes passed without a word."""
+    stream = io.StringIO()
+    monkeypatch.setattr(case_module, "_kernels_loaded", lambda: 0.0)
+    monkeypatch.setattr(solver, "__file__", str(tmp_path / "empty" / "__init__.py"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    load_kernels(CaseProgress("a", tmp_path / "log.txt", stream, quiet=True))
+    assert stream.getvalue().startswith("[a] compiling the solver, once per installation")
 
 
 def jobs(tmp_path: Path, count: int) -> list[Job]:
@@ -89,7 +103,6 @@ def test_quiet_means_the_log_alone(tmp_path: Path) -> None:
     stream = io.StringIO()
     progress = CaseProgress("a", tmp_path / "log.txt", stream, quiet=True)
     progress("trace", 1, 1, "ok")
-    progress.say("x")
     assert stream.getvalue() == ""
     CaseProgress("a", tmp_path / "verbose.txt", stream, verbose=True)("simulate", 1, 1, "converged")
     assert stream.getvalue() == "[a] simulate 1/1  converged\n"

@@ -596,7 +596,7 @@ def test_pages_of_many_cases_are_drawn_with_a_line_each(
     (out / "cases" / "bifurcation" / "frames.h5").write_bytes(b"")
     ledger.write(out / "cases" / "bifurcation", "key")
     assert main(["report", str(out)]) == 1
-    assert "1/1 bifurcation: its page cannot be drawn: " in capsys.readouterr().err
+    assert "bifurcation: its page cannot be drawn: " in capsys.readouterr().err
 
 
 def test_a_damaged_result_hides_no_other(

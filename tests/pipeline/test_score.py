@@ -101,6 +101,11 @@ def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:
     for page in ("simulators.html", "index.html", "simulators/wireval/index.html", "simulators/PyElastica/index.html"):
         assert (out / page).exists()
     assert "simulators.html" in (out / "index.html").read_text(encoding="utf-8")
+    for name, folder in (("ours", out), ("PyElastica", out / "simulators" / "PyElastica")):
+        for page in (folder / "index.html", folder / "cases" / "bend" / "report.html"):
+            text = page.read_text(encoding="utf-8")
+            assert f"{name} - wireval</title>" in text, "whose wires they are"
+            assert f"The wire of {name} lies " in text
     (out / "simulators.html").unlink()
     assert main(["report", str(out)]) == 0
     assert "straight-tip" in (out / "simulators.html").read_text(encoding="utf-8")

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from pipeline.compare.metrics import rms
 from pipeline.compare.pooled import Scored, is_pooled, pooled, skill_of
-from pipeline.run.stages.known import Frame
+from pipeline.model import OtherWire
+from pipeline.run.outputs import error_row, summary_row
+from pipeline.run.stages.known import Frame, Known
 from pipeline.status import FrameStatus
 
 
@@ -58,3 +63,15 @@ def test_skill() -> None:
     assert skill_of(2.0, 2.0) == 0.0
     assert skill_of(4.0, 2.0) == -3.0
     assert np.isnan(skill_of(1.0, float("nan")))
+
+
+@pytest.mark.parametrize("joints", [1, 3])
+def test_a_wire_of_one_point_has_neither_overlap_nor_force(joints: int) -> None:
+    """Nothing of it is beyond the entry: a depth of 0 mm would read as a wall that was never touched."""
+    wire = OtherWire(np.outer(np.arange(float(joints)), [0.0, 0.0, 1.0]), 0.0)
+    one = Frame(0, simulated=wire)
+    case: Any = SimpleNamespace(id="c", group="", role="validation", compared=False)
+    for row in (error_row(one), summary_row(case, Known(frames=(one,)), [error_row(one)])):
+        assert ("max_penetration_mm" in row) == (joints > 1)
+        assert "push_force_N" not in row
+    assert error_row(one)["joints"] == joints

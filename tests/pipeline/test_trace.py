@@ -12,6 +12,8 @@ from scipy.spatial import cKDTree
 from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve, Lumen, Volume, arc_length
 from pipeline.run.log import Log
+from pipeline.run.stages.known import Frame
+from pipeline.run.stages.trace import _in_plane
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import of_length, trace
@@ -183,6 +185,18 @@ def test_points_nearly_parallel_to_the_rotation_plane_are_marked():
         np.testing.assert_array_equal(curve.points_mm, plain.points_mm)
         assert curve.counters["in_plane_mm"] == pytest.approx(curve.in_plane.mean() * curve.length_mm)
     assert 0 < curve.in_plane.sum() < len(t)
+
+
+def test_a_bend_that_passes_through_the_rotation_plane_is_no_warning():
+    """5 % of a bend is so near to it, and half of the catalogue's scenes warned of that."""
+
+    def told(share):
+        marks = np.arange(100) < 100 * share
+        curve = Curve(np.zeros((100, 3)), np.zeros(100), in_plane=marks)
+        return _in_plane([Frame(0, curve=curve)], 10.0)
+
+    assert told(0.0) == told(0.05) == told(0.17) == []
+    assert told(0.5)[0].startswith("50 % of the traced points run within 10 degrees of the plane of rotation")
 
 
 def test_the_rotation_plane_of_a_ring_and_of_a_line():

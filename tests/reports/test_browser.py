@@ -310,3 +310,62 @@ def test_without_javascript_the_figures_and_tables_remain(run: Path, opened: Ope
     assert page.locator("#projections").is_visible()
     assert page.locator("table.grid tbody tr").count() == 6
     assert not page.locator("button[data-copy]").first.is_visible()
+
+
+@pytest.mark.parametrize("viewport", [WIDE, NARROW], ids=["1280", "390"])
+def test_a_failed_frame_moves_nothing_and_keeps_no_title(run: Path, opened: Opener, viewport: Any) -> None:
+    """The views jumped by a line of text, and the cross-section kept the place of the frame before."""
+    page = opened(run / "cases" / CASES[1].name / "report.html", viewport)
+    tops = "['#place', '#straight', '.views'].map((n) => document.querySelector('.viewer ' + n).offsetTop)"
+    title = "document.getElementById('across').previousElementSibling.textContent"
+    found, titles = [], []
+    for key in ("Home", "ArrowRight", "ArrowRight"):  # frame 2 has failed
+        page.focus("#frame")
+        page.keyboard.press(key)
+        page.wait_for_timeout(150)
+        found.append(page.evaluate(tops))
+        titles.append(page.evaluate(title))
+    assert found[0] == found[1] == found[2]
+    assert "mm" in titles[1]
+    assert titles[2] == "across the wire: no traced wire in this frame"
+
+
+def test_a_wire_beyond_the_cross_section_is_said(run: Path, tmp_path: Path, opened: Opener) -> None:
+    def away(data: Any) -> None:
+        for frame in data["frames"]:
+            wire = frame["curves"]["simulated"]
+            wire[:] = [x + 40.0 * (i % 3 < 2) for i, x in enumerate(wire)]
+
+    title = "document.getElementById('across').previousElementSibling.textContent"
+    page = opened(run / "cases" / "good" / "report.html")
+    assert "beyond" not in page.evaluate(title)
+    page = opened(with_viewer(copied(run, "good", tmp_path), away))
+    assert "the simulated wire is beyond the frame, " in page.evaluate(title)
+
+
+def test_a_narrow_window_prints_as_a_wide_one(run: Path, opened: Opener) -> None:
+    """The strips of a phone's window filled a sheet, so that the one before stayed blank."""
+    sheets = {}
+    for name, viewport in (("wide", WIDE), ("narrow", NARROW)):
+        page = opened(run / "cases" / CASES[1].name / "report.html", viewport)
+        sheets[name] = len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
+    assert sheets["narrow"] == sheets["wide"]
+
+
+def test_figures_fit_a_phone_and_are_made_large_by_a_button(run: Path, opened: Opener) -> None:
+    """They were 620 pixels wide on a screen of 390."""
+    page = opened(run / "cases" / "good" / "report.html", NARROW)
+    figure = page.locator("figure").first
+    pane = figure.locator(".pan")
+    wide = "pane => pane.scrollWidth - pane.clientWidth"
+    assert pane.evaluate(wide) <= 0
+    for beyond in (True, False):
+        figure.locator("button.enlarge").click()
+        assert (pane.evaluate(wide) > 300) == beyond
+    assert not opened(run / "cases" / "good" / "report.html").locator("button.enlarge").first.is_visible()
+
+
+def test_a_copied_case_has_no_link_to_the_run(run: Path, tmp_path: Path, opened: Opener) -> None:
+    """It went to a page that is not there."""
+    assert opened(run / "cases" / "good" / "report.html").locator("a.up").is_visible()
+    assert not opened(copied(run, "good", tmp_path)).locator("a.up").is_visible()

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from reports import _content
+from reports.case_files import counted
 
 
 @pytest.mark.parametrize(
@@ -69,3 +70,8 @@ def test_a_level_is_one_text_beside_plain_counts() -> None:
 def test_settings_keep_their_source() -> None:
     config = {"solver": {"segment_mm": {"value": 0.5, "source": "command line"}}, "odd": {"key": 1}}
     assert _content.settings(config) == [("solver.segment_mm", "0.5", "command line"), ("odd.key", "1", "")]
+
+
+def test_one_thing_is_no_plural() -> None:
+    """``1 cases compared``, ``1 frames: 1 ok``."""
+    assert [counted(n, "frame") for n in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]

@@ -50,7 +50,7 @@ def test_verdicts(change: dict[str, object], column: str, verdict: str) -> None:
     assert set(others["verdict"]) == {"same"}
     assert len(found.regressions) == (verdict == "regression")
     assert len(found.closing) == (verdict in ("regression", "moved"))
-    assert ("1 values have moved: insertion_mm" in found.sentence) == (verdict == "moved")
+    assert ("1 value has moved: insertion_mm" in found.sentence) == (verdict == "moved")
 
 
 def test_a_recovered_frame_is_no_regression() -> None:

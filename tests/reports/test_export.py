@@ -226,6 +226,26 @@ def test_the_scene_opens_everything_with_names_and_colours(tmp_path: Path) -> No
     assert export.write_scene(tmp_path / "nothing", 0) is None
 
 
+def test_the_scene_shows_the_scans_behind_the_wires(tmp_path: Path) -> None:
+    """Lumen and wires alone were opened, over nothing."""
+    scans = {"reference": Path("elsewhere/reference.mha"), "frame 2": Path("/scans/frame_002.nii.gz")}
+    path = export.write_scene(_view(tmp_path), 2, scans, "frames 0 and 1 are opened by hand")
+    assert path is not None
+    root = ET.parse(path).getroot()
+    nodes = {node.get("id"): node for node in root}
+    assert len(nodes) == len(root)
+    found = {}
+    for node in root.iter("Volume"):
+        assert str(node.get("id")).startswith("vtkMRMLScalarVolumeNode")
+        parts = dict(part.split(":") for part in node.attrib["references"].strip(";").split(";"))
+        assert nodes[parts["display"]].tag == "VolumeDisplay"
+        found[node.attrib["name"]] = nodes[parts["storage"]].attrib["fileName"]
+    assert found == {"reference": str(Path("elsewhere/reference.mha").absolute()), "frame 2": "/scans/frame_002.nii.gz"}
+    behind = {node.attrib["references"] for node in root.iter("SliceComposite")}
+    assert behind == {f"backgroundVolume:{list(root.iter('Volume'))[-1].get('id')};"}, "the scan that shows a wire"
+    assert [node.get("text") for node in root.iter("Text")] == ["frames 0 and 1 are opened by hand"]
+
+
 def test_vtk_reads_what_is_written(tmp_path: Path) -> None:
     vtk = pytest.importorskip("vtk", reason="vtk is not installed: no second reader of .vtp and .stl")
     vertices, triangles = _quad(tmp_path)

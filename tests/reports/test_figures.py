@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from PIL import Image
 
-from reports import tables
+from reports import colours, tables
 from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
-from reports.figures._drawing import positive_axis
+from reports.figures._drawing import LEAST_MM, positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
+from reports.html import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -283,6 +284,19 @@ def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     assert CASE_FIGURES["budget"](handed_in) is None, "it is of our solver's wire"
 
 
+def test_no_caption_speaks_of_u_val_where_no_bar_is_of_it(tmp_path: Path) -> None:
+    """What a bad one looks like was told of twice u val beside the marks of clamp and depth alone."""
+    entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.1, "distal10_rms_mm": 0.2}
+    tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.3}])
+    said = {s["figure"]: s["read"] + s["bad"] for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False)}
+    assert "from the manifest" in said["budget"]
+    assert "u val" not in said["budget"]
+    sources = [{"source": n, "sigma": "", "u_mm": 0.1, "distal_u_mm": 0.2} for n in ("roll", "u_val", "error")]
+    tables.write(tmp_path / "budget.csv", BUDGET, sources)
+    said = {s["figure"]: s["bad"] for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False)}
+    assert "twice u val" in said["budget"]
+
+
 def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
     errors = {"frame": [0, 1], "status": ["ok", "ok"], "insertion_mm": [5.0, 9.0], "release": [np.nan, 0.7]}
     tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(errors | {"release_real": [np.nan, 0.3]}))
@@ -366,6 +380,31 @@ def test_axes_are_logarithmic_only_where_values_span_decades(values: list[float]
     axes = Figure().subplots()
     positive_axis(axes, [values])
     assert axes.get_yscale() == scale
+
+
+def test_equal_curves_do_not_stretch_an_axis_down_to_rounding() -> None:
+    """Errors of 1e-16 mm took twelve decades of the axis."""
+    figure = Figure()
+    axes = figure.subplots()
+    (line,) = axes.plot([0, 1, 2], [1e-16, 0.01, 0.2])
+    positive_axis(axes, [[1e-16, 0.01, 0.2]])
+    assert axes.get_ylim()[0] > 5e-4
+    assert np.min(line.get_ydata()) == LEAST_MM
+    assert axes.yaxis.get_major_formatter()(LEAST_MM) == "\u2264 0.001"
+    assert axes.yaxis.get_major_formatter()(0.01) == "0.01"
+    axes = figure.subplots()
+    positive_axis(axes, [[1e-16, 3e-16]])
+    assert axes.get_ylim() == (0.0, LEAST_MM)
+
+
+def test_errors_have_the_colours_of_the_viewer_in_figures(tmp_path: Path) -> None:
+    """They had two scales: blue to pink in the viewer, dark to bright in the maps."""
+    case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
+    drawing = CASE_FIGURES["error_along_wire"](case)
+    assert drawing is not None
+    (mesh,) = (c for axes in drawing.figure.axes[:1] for c in axes.collections)
+    ends = [to_hex(mesh.cmap(end)) for end in (0.0, 1.0)]
+    assert ends == [colours.SIMULATED.lower(), colours.FAR.lower()]
 
 
 def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:

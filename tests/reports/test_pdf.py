@@ -32,9 +32,10 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     said = (
         ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
         ("planned frames",),
-        ("worst case: poor", "Error against insertion depth", "stands among the assumptions", "Worst frames by p95_mm"),
+        ("worst case: poor", "stands among the assumptions", "Worst frames by p95_mm"),
+        ("solver.segment_mm", "frames_failed", "More of poor", "Error against insertion depth"),
     )
-    for page, words in zip(pages, (*said, ("solver.segment_mm", "frames_failed")), strict=True):
+    for page, words in zip(pages, said, strict=True):
         assert not [word for word in words if word not in page], page
 
 
@@ -52,25 +53,32 @@ def test_worst_is_the_same_on_every_page(tmp_path: Path) -> None:
     assert re.findall("none|poor|far|fine", pages[3].partition("skill_strongest")[2])[:4] == summary["case"].tolist()
 
 
-def test_warnings_and_assumptions_stand_on_the_first_page(tmp_path: Path) -> None:
+def test_warnings_and_assumptions_are_whole(tmp_path: Path) -> None:
+    """They were cut off after two lines, and the pages beside them half empty."""
     out = write_run(tmp_path / "out", [FakeCase(name, frames=2) for name in "ab"])
     for path in out.glob("cases/*/result.json"):
         result = json.loads(path.read_text(encoding="utf-8"))
-        warnings = [f"warning {n} " + "of many words " * 40 for n in range(7)]
-        assumptions = ["the roll is 0", f"only {path.parent.name} says so"]
+        warnings = [f"warning {n} " + "of many words " * 20 + "to its end" for n in range(7)]
+        assumptions = ["the roll is 0 " + "and so on " * 40 + "to its end", f"only {path.parent.name} says so"]
         path.write_text(json.dumps(result | {"warnings": warnings, "assumptions": assumptions}), encoding="utf-8")
-    page = next(pdf._pages(out, tables.read(out / "summary.csv", SUMMARY)))
+    first, second, *_ = pdf._pages(out, tables.read(out / "summary.csv", SUMMARY))
+    said = [" ".join(text.get_text() for text in page.figure.texts) for page in (first, second)]
+    for words in ("Warnings (7)", "a, b: warning 0", "and 3 more"):
+        assert words in said[0]
+    for words in ("Assumptions (3)", "a, b: the roll is 0", "b: only b"):
+        assert words in said[1]
+    assert [text.count("to its end") for text in said] == [4, 1]
+    assert first.at > 0.3, "room for more than that"
+
+
+def test_texts_that_do_not_fit_a_page_are_counted() -> None:
+    page = pdf._Page("a page")
+    page.some("Assumptions", [f"assumption {n} " + "of words " * 60 for n in range(40)], "on the pages")
     said = " ".join(text.get_text() for text in page.figure.texts)
-    for words in (
-        "Warnings (7)",
-        "a, b: warning 0",
-        "and 3 more",
-        "Assumptions (3)",
-        "a, b: the roll is 0",
-        "b: only b",
-    ):
-        assert words in said
-    assert page.at > 0.3, "room for more than that"
+    shown = len(re.findall(r"assumption \d+ of", said))
+    assert 3 < shown < 40
+    assert f"and {40 - shown} more on the pages" in said
+    assert page.at > pdf._BOTTOM - 1e-9
 
 
 @pytest.mark.parametrize("cases", [(), (FakeCase("s", frames=2, simulated_only=True),)], ids=["none", "simulated"])

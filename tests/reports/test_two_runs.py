@@ -142,7 +142,7 @@ def test_a_depth_that_moved_closes_the_gate_and_is_not_called_worse(
     tables.write(path, ERRORS, rows)
     assert main(["diff", "-q", str(first), str(second), "--junit", str(tmp_path / "diff.xml")]) == 1
     said = capsys.readouterr().out
-    assert said == "MOVED: 3 cases compared: no regression; 1 values have moved: insertion_mm\n"
+    assert said == "MOVED: 3 cases compared: no regression; 1 value has moved: insertion_mm\n"
     assert [f.get("type") for f in ET.parse(tmp_path / "diff.xml").findall(".//failure")] == ["moved"]
 
 

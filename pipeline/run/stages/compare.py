@@ -97,11 +97,12 @@ def _compared(run: Context, known: Known, frame: Frame, clues: Clues | None, see
     if frame.ok and not run.case.compared:
         only = FrameStatus.SIMULATED
         return replace(frame, status=only.identifier, sentence=only.value)
-    if frame.curve is None or not frame.traced or frame.simulated is None or len(frame.simulated.joints_mm) < 2:
+    wire = frame.simulated_wire
+    if frame.curve is None or not frame.traced or wire is None:
         return frame
     assert known.lumen is not None
     settings, curve = run.config.compare, frame.curve
-    errors = compare(frame.simulated, curve, known.lumen, settings, None if clues is None else clues.way)
+    errors = compare(wire, curve, known.lumen, settings, None if clues is None else clues.way)
     if clues is None:
         return replace(frame, comparison=errors)
     nulls = score(clues, frame.depth_mm, seen, curve.points_mm, settings)

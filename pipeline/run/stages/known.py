@@ -84,6 +84,11 @@ class Frame:
         return self.simulated if isinstance(self.simulated, Solution) else None
 
     @property
+    def simulated_wire(self) -> Solution | OtherWire | None:
+        """The simulated wire where any of it is beyond the entry: a point alone touches nothing."""
+        return self.simulated if self.simulated is not None and len(self.simulated.joints_mm) > 1 else None
+
+    @property
     def uncertain(self) -> bool:
         """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
         return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)

@@ -13,6 +13,7 @@ from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity
 from pipeline.status import FrameStatus
+from reports.case_files import counted
 
 STEP_MM = 0.25
 MOST_OUTSIDE = 0.2
@@ -72,4 +73,4 @@ def _outside(known: Known, frames: Sequence[Frame], radius_mm: float) -> list[st
     turned = Counter(np.mean(_clearance(known, wires[n] * MIRROR) > radius_mm) < 0.5 * outside[n] for n in outside)
     hint = "; with x and y turned most would not: are they RAS?" if turned[True] > turned[False] else ""
     what = f"{100 * outside[worst]:.0f} % of the wire lies outside the lumen by more than its radius"
-    return [f"{len(outside)} frames: in frame {worst} {what}{hint}"]
+    return [f"{counted(len(outside), 'frame')}: in frame {worst} {what}{hint}"]

@@ -16,6 +16,7 @@ from pipeline.simulate import LEVELS, altered, insertion_of, simulate, wall_of
 from pipeline.simulate.clamp import depth_from
 from pipeline.simulate.resolution import LARGEST_JOINT_TURN_DEG, Resolved, lengths_mm, resolve
 from pipeline.status import FrameStatus, StageError
+from reports.case_files import counted
 from solver import Snap, Solution
 
 MOST_OVERLAP_RADII = 0.1
@@ -141,8 +142,8 @@ def _pressed_deep(frames: Sequence[Frame], wires: Sequence[Solution], radius_mm:
         return []
     worst = max(deep, key=lambda frame: deep[frame])
     return [
-        f"{len(deep)} frames: the simulated wire is pressed deeper into the wall than its radius of {radius_mm:g} mm, "
-        f"in frame {worst} by {deep[worst]:.2f} mm: the wall gives way more than a vessel may; "
+        f"{counted(len(deep), 'frame')}: the simulated wire is pressed deeper into the wall than its radius of "
+        f"{radius_mm:g} mm, in frame {worst} by {deep[worst]:.2f} mm: the wall gives way more than a vessel may; "
         "raise wall.stiffness_N_mm2, or check lumen and entry"
     ]
 
