@@ -23,7 +23,7 @@ TIGHTEST = 0.85
 
 def way_through(tree: Tree) -> Anatomy:
     """The way from the widest end of a tree along its widest long path as the first tube, then the branches near it."""
-    path = _widest_path(tree)
+    path = widest_path(tree)
     tube = smooth_tube("way", tree.points_mm[path], tree.radii_mm[path])
     middle = tube.points_mm.mean(axis=0)
     reach = np.max(np.linalg.norm(tube.points_mm - middle, axis=1)) + 15.0
@@ -61,7 +61,7 @@ def _smooth(points: Array, sigma: float) -> Array:
     return np.asarray(chord + smoothed[len(points) - 1 : 2 * len(points) - 1])
 
 
-def _widest_path(tree: Tree) -> Index:
+def widest_path(tree: Tree) -> Index:
     """Indices of the path to be taken: from a wide end, at least half of LONGEST_WAY_MM, its narrowest place widest."""
     n, (a, b) = len(tree.points_mm), tree.edges.T
     length = np.linalg.norm(tree.points_mm[a] - tree.points_mm[b], axis=1)
