@@ -34,8 +34,8 @@ SURROUNDINGS = 2, 5
 """From and to how many voxels outside a vessel its background is read."""
 BEFORE_MM = 5.0
 """Of the way that is left out where it begins: there the scan may cut the vessel off."""
-SHORTEST_WAY_MM = 22.0
-"""Of the vessel: less these ends it takes two frames, 10 and 14 mm deep."""
+SHORTEST_WAY_MM, LONGEST_WAY_MM = 22.0, 100.0
+"""Of the vessel: less its ends the shortest takes two frames, 10 and 14 mm deep; from the neck to beyond a siphon."""
 WIDEST_WAY_MM = 1.2
 """Radius of the way's tube at most: an aneurysm's own says nothing about the way past it."""
 
@@ -149,7 +149,7 @@ def find_way(vessel: Mask, grid: ScanGrid) -> Tube:
     edges = cKDTree(voxels).query_pairs(1.8, output_type="ndarray")  # neighbours share a corner at least
     corner = np.array([axis.start for axis in box]) - 1
     tree = Tree(grid.to_mm(voxels + corner), inside[tuple(voxels.T)], edges)
-    path = widest_path(tree)
+    path = widest_path(tree, LONGEST_WAY_MM)
     arc = arc_lengths(tree.points_mm[path])
     path = path[arc > BEFORE_MM]
     if arc[-1] < SHORTEST_WAY_MM:
