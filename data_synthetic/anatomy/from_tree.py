@@ -23,7 +23,7 @@ TIGHTEST = 0.85
 
 def way_through(tree: Tree) -> Anatomy:
     """The way from the widest end of a tree along its widest long path as the first tube, then the branches near it."""
-    path = _widest_path(tree)
+    path = widest_path(tree)
     tube = smooth_tube("way", tree.points_mm[path], tree.radii_mm[path])
     middle = tube.points_mm.mean(axis=0)
     reach = np.max(np.linalg.norm(tube.points_mm - middle, axis=1)) + 15.0
@@ -61,8 +61,8 @@ def _smooth(points: Array, sigma: float) -> Array:
     return np.asarray(chord + smoothed[len(points) - 1 : 2 * len(points) - 1])
 
 
-def _widest_path(tree: Tree) -> Index:
-    """Indices of the path to be taken: from a wide end, at least half of LONGEST_WAY_MM, its narrowest place widest."""
+def widest_path(tree: Tree, longest_mm: float = LONGEST_WAY_MM) -> Index:
+    """Indices of the path to be taken: from a wide end, at least half of ``longest_mm``, its narrowest place widest."""
     n, (a, b) = len(tree.points_mm), tree.edges.T
     length = np.linalg.norm(tree.points_mm[a] - tree.points_mm[b], axis=1)
     graph = coo_array((length, (a, b)), shape=(n, n))
@@ -80,10 +80,10 @@ def _widest_path(tree: Tree) -> Index:
             walk = [int(end)]
             while walk[-1] != root:
                 walk.append(int(before[walk[-1]]))
-            path = _usable(tree, np.array(walk[::-1], dtype=np.int64))
+            path = _usable(tree, np.array(walk[::-1], dtype=np.int64), longest_mm)
             if len(path) > 3:
                 length_mm = float(arc_lengths(tree.points_mm[path])[-1])
-                score = min(length_mm, LONGEST_WAY_MM) + 5.0 * float(tree.radii_mm[path].min())
+                score = min(length_mm, longest_mm) + 5.0 * float(tree.radii_mm[path].min())
                 best = max(best, (score, path), key=lambda found: found[0])
     if len(best[1]) < 4:
         raise ValueError(
@@ -92,14 +92,14 @@ def _widest_path(tree: Tree) -> Index:
     return best[1]
 
 
-def _usable(tree: Tree, path: Index) -> Index:
+def _usable(tree: Tree, path: Index, longest_mm: float) -> Index:
     """The part of a path that is neither too wide nor too narrow nor too long."""
     radius = tree.radii_mm[path]
     first = int(np.argmax(radius < WIDEST_MM))
     narrow = np.flatnonzero(radius[first:] < NARROWEST_MM)
     last = first + (int(narrow[0]) if len(narrow) else len(path) - first)
     kept = path[first:last]
-    return kept[arc_lengths(tree.points_mm[kept]) <= LONGEST_WAY_MM] if len(kept) else kept
+    return kept[arc_lengths(tree.points_mm[kept]) <= longest_mm] if len(kept) else kept
 
 
 def _chains(tree: Tree, path: Index) -> list[Index]:

@@ -5,7 +5,8 @@ A new scene is one function in ``plain``, ``hard`` or ``willis``, below the deco
 
 from data_synthetic.catalogue import hard, plain, willis
 from data_synthetic.catalogue.limits import Wanted
-from data_synthetic.catalogue.own_scenes import background_scene, from_anatomy
+from data_synthetic.catalogue.own_scenes import from_anatomy
+from data_synthetic.catalogue.real_background import background_scene
 from data_synthetic.catalogue.scene import NamedScene, ScannerFactory
 from data_synthetic.catalogue.study import Study, insertion_into, prepare
 from data_synthetic.scanner import PsfScanner

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from data_synthetic.anatomy.real_scan import IsoWall
+from data_synthetic.anatomy.iso_wall import IsoWall
 from data_synthetic.anatomy.tubes import Anatomy
 from data_synthetic.geometry import Array, Index, ends_of
 from data_synthetic.rod._kernels import Elastic, Shape, carry

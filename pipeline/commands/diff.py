@@ -37,6 +37,7 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression; InputError on wrong input."""
     from pipeline.run.launch import UsageError
     from reports.case_files import find_cases
+    from reports.two_runs_files import write
 
     places = {name: getattr(args, name) for name in FILES}
     problems = [text for name, path in places.items() if path for text in unwritable(path, f"--{name}")]
@@ -46,7 +47,7 @@ def main(args: argparse.Namespace) -> int:
         verdict = _verdict(args)
     except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
         raise UsageError([str(error)]) from None
-    verdict.write(**places)
+    write(verdict, **places)
     if not find_cases(args.second):
         sys.stderr.write(f"{args.second}: no case below it: is this what `wireval run` wrote?\n")
     for line in [verdict.sentence] if args.quiet else verdict.lines():
@@ -57,8 +58,8 @@ def main(args: argparse.Namespace) -> int:
 def _verdict(args: argparse.Namespace) -> Any:
     """Both folders read and compared, two scores simulator by simulator; ValueError where they cannot be."""
     import pipeline.compare.nulls  # noqa: F401 - registers metrics and predictors, whose columns may have tolerances
-    from reports.diff import DEFAULT_TOLERANCE, load_tolerance
     from reports.simulators import folders_in
+    from reports.tolerance import DEFAULT_TOLERANCE, load_tolerance
     from reports.two_scores import together
 
     runs = args.first, args.second
@@ -81,8 +82,9 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from pipeline.run.ledger import RESULT
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
     from reports.case_files import find_cases
-    from reports.diff import RATIO, diff_folders
+    from reports.diff import diff_folders
     from reports.origin import what_differs
+    from reports.tolerance import RATIO
     from reports.two_runs import Judged, Verdict
 
     allowed = 1.0 + tolerance[RATIO]

@@ -3,7 +3,6 @@
 And to a JUnit summary for CI: one test a frame, so that a build server shows which frame failed and why.
 """
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -17,8 +16,8 @@ from pipeline.run.another import with_another
 from pipeline.run.overall import found_cases, frames_of, overall, shared_scans, validation
 from pipeline.run.results import Result, write_json
 from reports import tables
-from reports.case_files import not_reached
-from reports.junit import write_junit
+from reports.case_files import GOOD, not_reached
+from reports.junit import Outcome, write_junit
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY, TIMINGS
 from reports.verdict import unscored
@@ -104,25 +103,18 @@ def write_tests(path: Path, found: Sequence[Result], gates: Mapping[str, str]) -
 
     gates : what was asked, and why it does not hold, empty where it does.
     """
-    root = ET.Element("testsuites", name="wireval")
-    for result in found:
-        whole = {"frame": "case", "status": result.status, "sentence": result.sentence, "message": result.sentence}
-        frames = result.frames or [whole]
-        bad = [f for f in frames if f["status"] not in ("ok", "simulated", "roll_fitted")]
-        suite = _suite(root, result.case, len(frames), len(bad))
-        for frame in frames:
-            test = ET.SubElement(suite, "testcase", classname=result.case, name=f"frame {frame['frame']}")
-            if frame in bad:
-                failure = ET.SubElement(test, "failure", type=frame["status"], message=frame["sentence"])
-                failure.text = frame["message"]
+    suites = [(result.case, [_outcome(frame) for frame in result.frames or [_whole(result)]]) for result in found]
     if gates:
-        suite = _suite(root, "gates", len(gates), sum(map(bool, gates.values())))
-        for asked, why in gates.items():
-            test = ET.SubElement(suite, "testcase", classname="gates", name=asked)
-            if why:
-                ET.SubElement(test, "failure", type="gate", message=why)
-    write_junit(path, root)
+        suites.append(("gates", [Outcome(n, "failed" if why else "passed", why, "gate") for n, why in gates.items()]))
+    write_junit(path, "wireval", suites)
 
 
-def _suite(root: ET.Element, name: str, tests: int, failures: int) -> ET.Element:
-    return ET.SubElement(root, "testsuite", name=name, errors="0", tests=str(tests), failures=str(failures))
+def _whole(result: Result) -> dict[str, Any]:
+    return {"frame": "case", "status": result.status, "sentence": result.sentence, "message": result.sentence}
+
+
+def _outcome(frame: Mapping[str, Any]) -> Outcome:
+    name = f"frame {frame['frame']}"
+    if frame["status"] in GOOD:
+        return Outcome(name)
+    return Outcome(name, "failed", frame["sentence"], frame["status"], frame["message"])

@@ -39,7 +39,8 @@ def write_markups_curve(
         "measurements": _measurements(points, measured_mm or {}),
         "display": {"visibility": True, "color": list(rgb(colour)), "selectedColor": list(rgb(colour))},
     }
-    write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, indent=1, allow_nan=False) + "\n")
+    # no indent: compiled code, 4 times as fast, and two thirds of the bytes
+    write_text(path, json.dumps({"@schema": _SCHEMA, "markups": [markup]}, allow_nan=False) + "\n")
 
 
 def _measurements(points: Array, measured_mm: Mapping[str, float]) -> list[dict[str, Any]]:

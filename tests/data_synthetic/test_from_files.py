@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import SimpleITK as sitk
+from scipy.ndimage import gaussian_filter
 
 from data_synthetic.anatomy import shapes
 from data_synthetic.anatomy.centrelines import read_tree
 from data_synthetic.anatomy.from_tree import smooth_tube, way_through
-from data_synthetic.anatomy.real_scan import iso_wall
+from data_synthetic.anatomy.iso_wall import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
+from data_synthetic.anatomy.vessel_in_scan import find_vessel, find_way
 from data_synthetic.catalogue import background_scene, build, from_anatomy
 from data_synthetic.scanner.coverage import lumen_coverage
 from data_synthetic.write.volumes import to_image
@@ -116,11 +118,51 @@ def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
     scan = 200 * lumen_coverage(shapes.bend(angle_deg=50.0, turn_mm=25.0, radius_mm=1.8), grid)
     sitk.WriteImage(to_image(scan.astype(np.uint8), grid), str(tmp_path / "scan.mha"))
     study = build(background_scene(tmp_path / "scan.mha"), frames=2, truth_step_mm=0.8)
-    assert study.truth[-1].depth_mm > 20
+    assert study.truth[-1].depth_mm > 18
     added = study.frame(1).astype(float) - study.reference
     index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
     assert np.mean(added[tuple(index.T)]) > 5 * added[:5].std()
     assert np.all(study.reference[tuple(index.T)] > 250)  # vessel is at 1000, its wall at 500, less where pressed
+
+
+def test_a_vessel_is_found_beside_bone_and_above_tissue() -> None:
+    """Hounsfield units: the brightest voxels are a skull's, and air is darker than what surrounds the vessel."""
+    grid = centred_grid([0, 0, 10], (80, 80, 100), 0.5)
+    vessel = lumen_coverage(shapes.bend(angle_deg=20.0, turn_mm=25.0, radius_mm=1.8), grid)
+    x, y, _ = np.meshgrid(*(np.linspace(-1, 1, n) for n in grid.shape), indexing="ij", sparse=True)
+    tissue, skull = np.hypot(x, y) < 0.9, (np.hypot(x, y) > 0.8) & (np.hypot(x, y) < 0.9)
+    scan = np.where(skull, 1500.0, np.where(tissue, 40.0, -1000.0)) + 300.0 * vessel
+    scan += np.random.default_rng(1).normal(scale=15.0, size=grid.shape)
+    found = find_vessel(scan.astype(np.float32), grid)
+    assert found.threshold == pytest.approx(190.0, abs=10.0)
+    # the half level goes through voxels' middles: what is counted is the lumen's volume
+    assert np.count_nonzero(found.voxels) == pytest.approx(vessel.sum(), rel=0.05)
+    assert not np.any(found.voxels & skull)
+    assert find_way(found.voxels, grid).length_mm > 25
+
+
+def test_a_vessel_is_painted_into_a_scan_that_shows_none(tmp_path: Path) -> None:
+    """In voxels that are not cubes, beside something bright that is no tube."""
+    rng = np.random.default_rng(2)
+    scan = 500.0 + 40.0 * gaussian_filter(rng.normal(size=(70, 60, 50)), 0.8)
+    scan[:, :20] += 900.0
+    grid = centred_grid([5.0, 0, 10], scan.shape, 1.0)
+    image = to_image(scan.astype(np.uint16), grid)
+    image.SetSpacing((0.8, 0.9, 1.1))
+    sitk.WriteImage(image, str(tmp_path / "gel.nii.gz"))
+    scene = background_scene(tmp_path / "gel.nii.gz")
+    assert "made-up vessel" in scene.why
+    study = build(scene, frames=2, truth_step_mm=0.8)
+    index = np.rint(study.grid.to_index(study.truth[1].points_mm)).astype(int)
+    assert np.all(study.reference[tuple(index.T)] > 250)  # tissue is at 0, the vessel at 1000
+    assert index[:, 1].min() > 22  # not in what is bright
+
+
+def test_a_scan_without_room_for_a_vessel_is_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(3).normal(300.0, 20.0, (20, 20, 20)).astype(np.int16)
+    sitk.WriteImage(sitk.GetImageFromArray(noise), str(tmp_path / "small.mha"))
+    with pytest.raises(ValueError, match=r"small.mha: it shows no vessel, and has no room .* 19 x 19 x 19 mm"):
+        background_scene(tmp_path / "small.mha")
 
 
 @pytest.mark.slow

@@ -8,7 +8,8 @@ import pytest
 
 from data_synthetic import catalogue
 from pipeline.cli import main
-from reports.diff import diff_folders, load_tolerance
+from reports.diff import diff_folders
+from reports.tolerance import load_tolerance
 from tests.studies.catalogue import GOLDEN, Outcome, coverage, golden, run_all, times
 
 

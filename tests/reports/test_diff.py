@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from reports import diff, tables
 from reports.schema import ERRORS
+from reports.tolerance import load_tolerance
 from tests.reports.fake_results import FakeCase, write_run
 
 TOLERANCE = {"rms_mm": 0.1, "skill": 0.05, "branch_ok": 0.0, "insertion_mm": 0.2}
@@ -85,7 +86,7 @@ def test_a_change_one_way_is_undone_the_other_way(before: float, after: float, a
 
 def test_folders_against_themselves_and_against_a_worse_copy(tmp_path: Path) -> None:
     out = write_run(tmp_path / "a", (FakeCase("c", frames=5, failed=(1,)), FakeCase("d", frames=3)))
-    tolerance = diff.load_tolerance()
+    tolerance = load_tolerance()
     same = diff.diff_folders(out, out, tolerance)
     assert same.regressions.empty
     assert same.sentence == "2 cases compared: no regression"
@@ -128,11 +129,11 @@ def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> N
     path = tmp_path / "t.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=hint):
-        diff.load_tolerance(path)
+        load_tolerance(path)
 
 
 def test_the_shipped_tolerance_gates_shape_tip_and_skill() -> None:
-    assert {"rms_mm", "tip_mm", "skill", "truth_rms_mm"} <= set(diff.load_tolerance())
+    assert {"rms_mm", "tip_mm", "skill", "truth_rms_mm"} <= set(load_tolerance())
 
 
 def test_a_frame_that_fails_counts_once() -> None:

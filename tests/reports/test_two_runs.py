@@ -14,9 +14,10 @@ from pipeline.cli import main
 from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
-from reports.junit import write_junit
+from reports.junit import Outcome, write_junit
 from reports.schema import ERRORS, POINTS, SIMULATORS
 from reports.two_runs import Verdict
+from reports.two_runs_files import _markdown
 from tests.reports.fake_results import FakeCase, write_run
 
 GROUPS = ("a", "b", "c")
@@ -305,7 +306,7 @@ def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
 
     frames = diff_folders(first, first, {})
     verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
-    assert "a\\|b &lt;c&gt;" in verdict._markdown()
+    assert "a\\|b &lt;c&gt;" in _markdown(verdict)
     assert replace(verdict, judged="worse").closed
 
 
@@ -365,8 +366,8 @@ def test_a_tolerance_without_the_ratio_keeps_the_shipped_one(first: Path, second
 
 
 def test_a_message_with_control_characters_is_still_xml(tmp_path: Path) -> None:
-    root = ET.Element("testsuites", name="a\x00b\x1b[0m")
-    ET.SubElement(root, "failure", message="\ufffe\x08ok").text = "line\n\x0cnext\ud800"
-    write_junit(tmp_path / "x.xml", root)
-    read = ET.parse(tmp_path / "x.xml").getroot()
-    assert (read.get("name"), read[0].get("message"), read[0].text) == ("ab[0m", "ok", "line\nnext")
+    failed = Outcome("frame 1", "failed", "\ufffe\x08ok", "gate", "line\n\x0cnext\ud800")
+    write_junit(tmp_path / "x.xml", "wireval", [("a\x00b\x1b[0m", [failed])])
+    (suite,) = ET.parse(tmp_path / "x.xml").getroot()
+    failure = suite[0][0]
+    assert (suite.get("name"), failure.get("message"), failure.text) == ("ab[0m", "ok", "line\nnext")

@@ -1,0 +1,115 @@
+"""A wire in the real voxels of a scan: in a vessel that the scan shows, or else in one that is painted into it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import SimpleITK as sitk
+from scipy.ndimage import binary_dilation
+
+from data_synthetic.anatomy.iso_wall import iso_wall
+from data_synthetic.anatomy.tubes import Anatomy, Tube
+from data_synthetic.anatomy.vessel_in_scan import Mask, find_vessel, find_way
+from data_synthetic.catalogue.own_scenes import END_MM, steered
+from data_synthetic.catalogue.painted_vessel import paint_vessel
+from data_synthetic.catalogue.scene import NamedScene, Setup, spread
+from data_synthetic.geometry import ScanGrid, Volume
+from data_synthetic.rod.rod import Wall
+from data_synthetic.scanner import Greys, PsfScanner
+
+SMALLEST = 16
+"""Voxels along an axis below which nothing can be found in a scan."""
+VESSEL_GREY = 1000.0
+"""Grey values are stretched so that the vessel lies here: room for a brighter wire, and for noise below zero."""
+FIRST_MM, ENTRY_ARC_MM, CORRIDOR_MM = 10.0, 1.0, 4.0
+CROP_MARGIN_MM = 8.0
+"""The wall is only made this far around the way."""
+
+
+def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedScene:
+    """A scene in a real scan, along the longest of the vessels that it shows, or along one that is painted into it.
+
+    path : anything SimpleITK reads.     voxel_mm : overrides the file's spacing, where that is a placeholder.
+    Raises ValueError for what is no volume, and for one in which no vessel has room.
+    """
+    values, grid = read_scan(Path(path), voxel_mm)
+    try:
+        vessel = find_vessel(values, grid)
+        way, what = find_way(vessel.voxels, grid), ""
+        values = (values - np.float32(vessel.background)) * np.float32(1.0 / (vessel.grey - vessel.background))
+        wall: Wall | None = _wall(values, grid, vessel.voxels, way)
+    except ValueError:
+        try:
+            values, way = paint_vessel(values, grid)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+        wall, what = None, " and a made-up vessel, since it shows none,"
+    stretched = np.float32(VESSEL_GREY) * values
+
+    def plan(_rng: np.random.Generator, frames: int) -> Setup:
+        return _plan(grid, way, wall, frames)
+
+    return NamedScene(
+        name=Path(path).name.split(".")[0],
+        why=f"a made-up wire{what} in the real voxels of {Path(path).name}",
+        plan=plan,
+        frames=12,
+        steer=lambda setup: steered(setup, FIRST_MM, CORRIDOR_MM),
+        # real voxels are already blurred; what a wire displaces is read from them as they are
+        scan=(grid, lambda setup, _: PsfScanner(grid, setup.greys, stretched, stretched)),
+    )
+
+
+def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
+    """Grey values indexed x, y, z, and where they lie; ValueError for what is no volume of grey values."""
+    series = sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(path)) if path.is_dir() else str(path)
+    try:
+        image: Any = sitk.ReadImage(series)
+    except RuntimeError:
+        allowed = "a file that SimpleITK reads, or a folder with one DICOM series"
+        raise ValueError(f"{path}: cannot be read as a volume; allowed: {allowed}; check the file") from None
+    size, channels = image.GetSize(), image.GetNumberOfComponentsPerPixel()
+    if len(size) != 3 or channels != 1 or min(size) < SMALLEST:
+        found = f"{len(size)} axes of {size} with {channels} value(s) per voxel"
+        raise ValueError(
+            f"{path}: {found}; allowed: one volume of grey values, {SMALLEST} voxels or more along each axis"
+        )
+    values = np.ascontiguousarray(sitk.GetArrayFromImage(image).transpose(2, 1, 0), dtype=np.float32)
+    spacing = np.array(image.GetSpacing()) if voxel_mm is None else np.full(3, voxel_mm)
+    direction = np.array(image.GetDirection()).reshape(3, 3)
+    if not np.all(np.isfinite(values)) or values.min() == values.max():
+        raise ValueError(f"{path}: its grey values are NaN, infinite or all alike; allowed: a scan that shows a vessel")
+    return values, ScanGrid(values.shape, spacing, np.array(image.GetOrigin()), direction)
+
+
+def _plan(grid: ScanGrid, way: Tube, wall: Wall | None, frames: int) -> Setup:
+    """Enter the vessel at the way's beginning."""
+    share = (grid.voxel_mm / 0.3) ** 2
+    return Setup(
+        Anatomy((way,)),
+        way,
+        ENTRY_ARC_MM,
+        spread(FIRST_MM, way.length_mm - ENTRY_ARC_MM - END_MM, frames),
+        (0.0,) * frames,
+        grid.to_mm(0.5 * (np.array(grid.shape) - 1)),
+        # a wire fills less of a larger voxel: it is made as much brighter, or it would drown in voxels of 0.5 mm
+        greys=Greys(noise=40.0 * share, wire=Greys.wire * max(share, 1.0), correlation_voxels=0.5),
+        wall=wall,
+    )
+
+
+def _wall(values: Volume, grid: ScanGrid, vessel: Mask, way: Tube) -> Wall:
+    """The wall that the scan itself shows around a way: half-way from 0, its surroundings, to 1, the vessel."""
+    box, part = _around(way, grid)
+    near = binary_dilation(vessel[box], iterations=2)
+    return iso_wall(np.where(near, values[box], 0.0).astype(np.float32), part, 0.5)
+
+
+def _around(way: Tube, grid: ScanGrid) -> tuple[tuple[slice, ...], ScanGrid]:
+    """The box of voxels around a way, as slices and as a grid."""
+    index = grid.to_index(way.points_mm)
+    margin = CROP_MARGIN_MM / grid.spacing_mm
+    low = np.maximum(np.floor(index.min(axis=0) - margin), 0).astype(int)
+    high = np.minimum(np.ceil(index.max(axis=0) + margin) + 1, grid.shape).astype(int)
+    box = tuple(slice(a, b) for a, b in zip(low.tolist(), high.tolist(), strict=True))
+    return box, ScanGrid(tuple((high - low).tolist()), grid.spacing_mm, grid.to_mm(low), grid.direction)
