@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 if all cases are ok, 1 if some failed or are missing (but what --only left out), 2 if there are none."""
     from pipeline.run.aggregate import aggregate
-    from pipeline.run.launch import last_line
+    from pipeline.run.last_words import last_line
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.html import render_index

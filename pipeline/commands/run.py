@@ -52,7 +52,8 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
     from pipeline.run.aggregate import write_tests
     from pipeline.run.gate import gate
-    from pipeline.run.launch import failure_lines, intention, last_line, launch
+    from pipeline.run.last_words import failure_lines, last_line
+    from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
     from pipeline.status import InputError
     from pipeline.study.check import check

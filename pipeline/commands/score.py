@@ -41,7 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed; raises InputError where the input is wrong."""
-    from pipeline.run.launch import failure_lines, last_line, launch
+    from pipeline.run.last_words import failure_lines, last_line
+    from pipeline.run.launch import launch
     from pipeline.run.simulators import OURS, side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check

@@ -43,6 +43,14 @@ def note(insertions: int) -> str:
     return f"wide: {what}" if insertions < WIDE_BELOW else f"over {what}"
 
 
+def in_words(low: float, high: float, said: str) -> str:
+    """Ends and what was said of them, for a line of text; an end that nothing bounds is none."""
+    bounded = np.isfinite(low), np.isfinite(high)
+    middle, below, above = f"{low:.3f} to {high:.3f}", f"up to {high:.3f}", f"{low:.3f} and more"
+    ends = {(True, True): middle, (False, True): below, (True, False): above}.get(bounded)
+    return f"95 %: {ends}, {said}" if ends else said
+
+
 def fields(values: Mapping[str, Any], said: str = "") -> tuple[dict[str, Any], str]:
     """Values as fields of a row, ends that nothing bounds empty, and what was said of the interval with their names."""
     names = [name for name, value in values.items() if isinstance(value, float) and np.isinf(value)]

@@ -14,8 +14,6 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
@@ -23,9 +21,8 @@ from pipeline.run.case import Job, clear, each_on, finished, run_case
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
-from pipeline.run.overall import shared_scans
 from pipeline.run.provenance import code_state, this_run
-from pipeline.run.results import found_results, lost, write_json
+from pipeline.run.results import lost, write_json
 from pipeline.run.store import file_hash
 from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
 from pipeline.run.watch import Watch
@@ -34,11 +31,8 @@ from pipeline.status import InputError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
-from reports.case_files import counted, left_over, left_over_sentence, read_json
+from reports.case_files import counted, left_over, read_json
 from reports.html import render_index
-from reports.origin import mixed_settings
-from reports.schema import SWEEP
-from reports.verdict import next_command, typed
 
 
 class UsageError(InputError):
@@ -217,61 +211,3 @@ def intention(plan: Plan) -> list[str]:
         for point in plan.points
     ]
     return [*lines, "dry run: nothing was computed"]
-
-
-def failure_lines(plan: Plan, then: str = "") -> list[str]:
-    """What went wrong, a line each (frames, cases, crashed points of a sweep), and what comes next.
-
-    then : that, where it is not the run's own command for these cases.
-    """
-    found, cases = found_results(plan.out), []
-    lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
-    for result in found:
-        for row in result.failures:
-            cases.append(row["case"])
-            frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
-            lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
-    lines += [
-        f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
-        for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
-    ]
-    then = then or f"do what the message says, then {next_command(cases, typed(plan.out))}"
-    aside = [text] if (text := left_over_sentence(plan.out)) else []
-    return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
-
-
-def last_line(totals: Totals, index: Path) -> str:
-    """Counts, median error, time of the simulate stage, and where the sweep's table and the report lie."""
-    parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}: {totals.frames_ok} ok"]
-    if totals.frames_ok < totals.frames:
-        parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
-    elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
-        parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
-    if totals.sweep_lost:
-        parts.append(f"{totals.sweep_lost} crashed in the sweep")
-    if np.isfinite(totals.median_mm):
-        parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
-        parts.append(_with_interval(totals.pooled))
-        parts += _skill(totals.pooled)
-    if totals.unscored:
-        parts.append(totals.unscored.rstrip("."))
-    if totals.frames and totals.solver_s:
-        parts.append(f"simulate {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
-    sweep = index.parent / SWEEP.file
-    parts += [f"sweep: {sweep}"] * sweep.exists()
-    return ".  ".join([*parts, f"report: {index}"])
-
-
-def _skill(pooled: Mapping[str, Any]) -> list[str]:
-    """The number to quote: skill against the strongest predictor, and in a word where a guess is nearer."""
-    value, null = pooled.get("skill_strongest"), pooled.get("strongest_null")
-    if value is None or not null or not np.isfinite(value):
-        return []
-    return [f"skill {value:.3f} against the predictor {null}" + ", which is nearer" * bool(value < 0)]
-
-
-def _with_interval(pooled: Mapping[str, Any]) -> str:
-    """The pooled error with its interval, or why there is none."""
-    ends = f"95 %: {pooled['rms_low_mm']:.3f} to {pooled['rms_high_mm']:.3f}, "
-    known = ends if np.isfinite(pooled["rms_high_mm"]) else ""
-    return f"rms {pooled['rms_mm']:.3f} mm ({known}{pooled['interval']})"

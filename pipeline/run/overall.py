@@ -135,9 +135,8 @@ class Ratio:
     @property
     def sentence(self) -> str:
         """One line for a reader."""
-        end = f"to {self.high:.3f}" if np.isfinite(self.high) else "and more"
-        known = f"95 %: {self.low:.3f} {end}, " if np.isfinite(self.low) else ""
-        return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known}{self.note})"
+        known = intervals.in_words(self.low, self.high, self.note)
+        return f"rms of the second run / the first, on {self.frames} frames: {self.value:.3f} ({known})"
 
     def verdict(self, allowed: float = 1.0, caveat: str = "") -> str:
         """The sentence, and what may be concluded from it.

@@ -12,7 +12,7 @@ import pytest
 
 from pipeline.cli import main
 from pipeline.run.aggregate import aggregate
-from pipeline.run.launch import last_line
+from pipeline.run.last_words import last_line
 from pipeline.run.overall import found_cases, overall, ratio
 from reports import tables
 from reports.html import render_index

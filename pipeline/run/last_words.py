@@ -1,0 +1,70 @@
+"""What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.compare.intervals import in_words
+from pipeline.run.aggregate import Totals
+from pipeline.run.launch import Plan
+from pipeline.run.overall import shared_scans
+from pipeline.run.results import found_results
+from pipeline.run.sweep import heads_of, lost_points
+from reports.case_files import counted, left_over_sentence
+from reports.origin import mixed_settings
+from reports.schema import SWEEP
+from reports.verdict import next_command, typed
+
+
+def failure_lines(plan: Plan, then: str = "") -> list[str]:
+    """What went wrong, a line each (frames, cases, crashed points of a sweep), and what comes next.
+
+    then : that, where it is not the run's own command for these cases.
+    """
+    found, cases = found_results(plan.out), []
+    lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
+    for result in found:
+        for row in result.failures:
+            cases.append(row["case"])
+            frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
+            lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
+    lines += [
+        f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
+        for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
+    ]
+    then = then or f"do what the message says, then {next_command(cases, typed(plan.out))}"
+    aside = [text] if (text := left_over_sentence(plan.out)) else []
+    return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
+
+
+def last_line(totals: Totals, index: Path) -> str:
+    """Counts, median error, time of the simulate stage, and where the sweep's table and the report lie."""
+    parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}: {totals.frames_ok} ok"]
+    if totals.frames_ok < totals.frames:
+        parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+    elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
+        parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
+    if totals.sweep_lost:
+        parts.append(f"{totals.sweep_lost} crashed in the sweep")
+    if np.isfinite(totals.median_mm):
+        parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
+        low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))
+        parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm ({in_words(low, high, said)})")
+        parts += _skill(totals.pooled)
+    if totals.unscored:
+        parts.append(totals.unscored.rstrip("."))
+    if totals.frames and totals.solver_s:
+        parts.append(f"simulate {1000.0 * totals.solver_s / totals.frames:.1f} ms/frame")
+    sweep = index.parent / SWEEP.file
+    parts += [f"sweep: {sweep}"] * sweep.exists()
+    return ".  ".join([*parts, f"report: {index}"])
+
+
+def _skill(pooled: Mapping[str, Any]) -> list[str]:
+    """The number to quote: skill against the strongest predictor, and in a word where a guess is nearer."""
+    value, null = pooled.get("skill_strongest"), pooled.get("strongest_null")
+    if value is None or not null or not np.isfinite(value):
+        return []
+    return [f"skill {value:.3f} against the predictor {null}" + ", which is nearer" * bool(value < 0)]
