@@ -14,7 +14,7 @@ from pipeline.trace.onward import FAINTEST, TANGENT_MM
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
-from pipeline.trace.ways import SURE, brightest
+from pipeline.trace.ways import goes_on_unseen
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -56,8 +56,7 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
         return curve
     line = dense(tube, 0.5 * image.voxel)
     with image.showing(tube.voxels, tube.rest):
-        height = brightest(image, line[-1], tip_tangent(line, TANGENT_MM), FAINTEST * tube.peak)
-        if height < SURE:
+        if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), FAINTEST * tube.peak):
             return curve
     got, allowed = "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it"
     do = "look whether the wire's end is fainter than the rest; scan with more dose"
