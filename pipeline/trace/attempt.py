@@ -9,29 +9,27 @@ from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
+from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
 from pipeline.trace.link import Path, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
-from pipeline.trace.profile import EVEN, Steps, ended
+from pipeline.trace.profile import EVEN, ended
 from pipeline.trace.stated import Opacity, ended_as_stated
-from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
-from pipeline.trace.tube import Tube, fit_tube, predicted, spline_through, tint_nodes
+from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.tube import Tube, fit_tube, predicted
 
 ENTRY_REACH_MM = 4.0
 """How far from the manifest's entry the wire may pass."""
 PREFIX_MM = 3.0
 """How much wire before the entry is fitted along: its end must not disturb the fit at the entry."""
-THICK_SLICES = 1.5
-"""Largest over smallest voxel edge (as the kernels see them) from which slices count as thick."""
-KNOTS_PER_PITCH = 2.0
-"""Least distance between knots in lengths of wire from slice to slice: with one a slice the curve follows each slice's
-own error (0.15 mm of ripple at 2.5 mm slices)."""
 STREAK_SHARE = 0.2
 """Crest grey, as a share of the wire's peak, below which a bright line is a streak of the wire: a second wire's crest
 has 0.6 to 0.9 of it, streaks of steel in a cone-beam scan reach a few hundredths."""
+WIDE_KNOTS = 1.4
+"""Times CLOSEST from which closer knots are tried: below 6 noises. At 8 they gain 2 % for a fourth of the time."""
+BENDS_SURE = 4.0
+"""Standard deviations of what they save by chance from which they are taken."""
 NEAR_VOXELS = 2.5
 """Crests nearer than this to the curve belong to it."""
-FIRST_BLUR = 0.9
-"""The wire's blur (voxel) before it is fitted: scanner 0.8, wire and voxel the rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,37 +75,12 @@ class Attempt:
         return self.tube.peak / image.noise
 
 
-def slice_pitch(image: Subtraction, line: Array) -> float:
-    """Length of wire (mm) from one slice to the next along a path (n, 3), where slices are thicker than pixels; else 0.
-
-    Such slices are wider apart than the blur can join: between two of them the grey hardly says how high the wire is.
-    """
-    axis = int(np.argmax(image.spacing))
-    if image.spacing[axis] < THICK_SLICES * image.voxel:
-        return 0.0
-    slices = float(np.sum(np.abs(np.diff(line[:, axis])))) / float(image.spacing[axis])
-    return float(arc_length(line)[-1]) / max(slices, 1.0)
-
-
-def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN) -> Tube:
-    """Where the fit starts: a spline along the path, with the amplitude seen there.
-
-    Noise falls with the distance of the knots, a bend's bias rises (0.004 / 0.009 / 0.046 voxel at 8 / 10 / 14 voxels
-    for radii of 20 to 40).
-    """
-    h = image.voxel
-    line = resampled(points, 0.5 * h)
-    gain = 1.0 + (CREST_VOXELS / FIRST_BLUR) ** 2
-    amplitude = max(float(np.median(image.along(line[::4]))) * gain, image.noise)
-    knot = float(np.interp(amplitude / image.noise, [4.0, 8.0, 16.0], [12.0, 10.0, 8.0])) * h
-    controls = spline_through(line, max(knot, KNOTS_PER_PITCH * slice_pitch(image, line)))
-    return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0, steps=steps)
-
-
-def _fitted(image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True) -> Tube | None:
+def _fitted(
+    image: Subtraction, points: Array, cut: bool, entry: EntryPose, find_tip: bool = True, closest: bool = False
+) -> Tube | None:
     """The tube along a path; None where the path is so wrong that its equations have no solution.
 
-    cut : wire goes on before the path's first point.
+    cut : wire goes on before the path's first point.  closest : its knots are as close as they may be.
     """
     h = image.voxel
     try:
@@ -117,7 +90,7 @@ def _fitted(image: Subtraction, points: Array, cut: bool, entry: EntryPose, find
         elif find_tip and entry.opacity is not None:
             line, steps = ended_as_stated(image, line, FIRST_BLUR * h, entry.opacity)
         plane = (line[0] + 2.0 * h * entry.direction, entry.direction) if cut else None
-        return fit_tube(image, replace(first_tube(image, line, steps), start_plane=plane))
+        return fit_tube(image, replace(first_tube(image, line, steps, closest), start_plane=plane))
     except (np.linalg.LinAlgError, ValueError):
         return None
 
@@ -213,10 +186,35 @@ def cold(
     return _attempt(image, path, entry, pieces, whole.points, behind_mm)
 
 
-def again(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt:
-    """The attempt fitted anew, tip and all, to another image of the same frame; itself where that has no solution."""
-    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, entry)
+def beside(image: Subtraction, attempt: Attempt, pieces: list[Tracklet]) -> Attempt:
+    """The attempt held against the crests of another one, which may stay apart where its own have merged."""
+    left_mm = _leftover(image, attempt.tube, pieces, attempt.known)
+    return replace(attempt, pieces=pieces, leftover_mm=left_mm)
+
+
+def again(image: Subtraction, attempt: Attempt, entry: EntryPose, closest: bool = False) -> Attempt:
+    """The attempt fitted anew, tip and all, to another image of the same frame or with the closest knots; itself where
+    that has no solution.
+    """
+    tube = _fitted(image, dense(attempt.tube, 0.5 * image.voxel), attempt.cut, entry, closest=closest)
     return attempt if tube is None else replace(attempt, tube=tube)
+
+
+def bent(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt:
+    """The attempt with closer knots where the grey asks for them, as in bends that wide ones cut short; else itself.
+
+    Each further unknown takes one variance of the noise, with a standard deviation of sqrt(2), off the misfit of any
+    wire; only what is BENDS_SURE beyond that is a bend.
+    """
+    if attempt.tube.knot_mm < WIDE_KNOTS * CLOSEST * image.voxel:
+        return attempt
+    closer = again(image, attempt, entry, closest=True)
+    more = 3.0 * (closer.tube.intervals - attempt.tube.intervals)
+    if more <= 0:
+        return attempt
+    wide, close = misfit(image, [attempt, closer])
+    saved = (wide - close) / image.correlation**2
+    return closer if saved > more + BENDS_SURE * np.sqrt(2.0 * more) else attempt
 
 
 def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: float, gap_mm: float) -> Attempt | None:

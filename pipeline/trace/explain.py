@@ -8,17 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.grids import spread
-from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, EntryPose, again, cold, dense, misfit, prolonged, warm
+from pipeline.trace.attempt import (
+    ENTRY_REACH_MM,
+    Attempt,
+    EntryPose,
+    again,
+    bent,
+    beside,
+    cold,
+    dense,
+    misfit,
+    prolonged,
+    warm,
+)
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
+from pipeline.trace.doubts import ends_in_nothing, faint_for_its_noise, no_wire
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
-from pipeline.trace.verdict import LEAST_SEEN, SURE_CNR, Verdict, judge, note_of
+from pipeline.trace.verdict import SURE_CNR, Verdict, judge, note_of
 
 SAMPLE_VOXELS = 1.0
 """Spacing of the curve's points."""
@@ -137,7 +148,10 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
     if _doubtful(image, found, entry, config):
         if not found or found[0].attempt.cnr(image) > SURE_CNR:
             found += _read_off(image, cold(image, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND), entry)
-        found += _read_off(image, cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap), entry)
+        wide = cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap)
+        if wide is not None and found and found[0].attempt.cnr(image) > SURE_CNR:
+            wide = beside(image, wide, found[0].attempt.pieces)  # wide crests of two wires are one
+        found += _read_off(image, wide, entry)
         if previous is not None and len(previous.points_mm):
             found += _read_off(image, warm(image, entry, previous, config.ridge_voxels, gap), entry)
     return _prolonged(image, _best(image, found, entry, config), entry) if found else None
@@ -153,27 +167,6 @@ def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candida
         if best.attempt.goes_on:
             break
     return best
-
-
-def _traces_of_wire(image: Subtraction) -> bool:
-    """Whether the lumen holds more bright voxels than noise makes: three times as many above 3.5 sigmas, and 15."""
-    sample = smooth_voxels(image.grey, gaussian_taps(1.0), image.region.within)
-    limit = 3.5 * spread(sample)
-    up, down = (int(np.sum(s * (sample - np.median(sample)) > limit)) for s in (1, -1))
-    return up > 3 * max(down, 5)
-
-
-def _no_wire(image: Subtraction) -> Curve:
-    status, allowed = FrameStatus.NO_WIRE, f"a bright line within {ENTRY_REACH_MM} mm of entry_mm"
-    do = "check entry_mm and that the frame shows a wire"
-    if _traces_of_wire(image):
-        status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
-        do = f"{do}; give the curve of the frame before, or scan with more dose"
-    got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
-    return Curve(
-        np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
-        counters=image.counters, levels=image.levels,
-    )  # fmt: skip
 
 
 def _model_error(image: Subtraction, best: Candidate) -> Array:
@@ -226,20 +219,11 @@ def _agreed(first: Candidate, second: Candidate) -> Candidate:
     if apart < TIPS_MM or second.verdict.status is not FrameStatus.OK:
         return second
     note = note_of(
-        f"tips {apart:.1f} mm apart in two fits", f"{TIPS_MM} mm at most", "give a reference scan without wire"
+        f"tips {apart:.1f} mm apart in two fits",
+        f"{TIPS_MM} mm at most",
+        "look where the wire ends, or give a reference scan without wire",
     )
     return replace(second, verdict=replace(second.verdict, status=FrameStatus.TRACE_AMBIGUOUS, note=note))
-
-
-def _faint_for_its_noise(curve: Curve) -> Curve:
-    """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
-    seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
-    if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
-        return curve
-    got = f"a line {seen:.1f} noises bright, noise counted as it is correlated"
-    do = "check that the frame shows a wire; scan with more dose or a smoother reconstruction kernel"
-    note = note_of(got, f"{LEAST_SEEN} at least", do)
-    return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
 
 
 def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, config: TraceConfig) -> Curve:
@@ -250,9 +234,13 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     seen = levelled(image, np.zeros((0, 3)), image.voxel) if image.uneven else image
     best = best_of(seen, entry, previous, config)
     if best is None:
-        return _no_wire(image)
+        return no_wire(image)
+    attempt = best.attempt
     if image.modelled:
         # the lumen's own grey under the wire is taken from beside it, and the fit done again
-        image = levelled(image, dense(best.attempt.tube, image.voxel), best.attempt.tube.sigma)
-        best = _agreed(best, _read_off(image, again(image, best.attempt, entry), entry)[0])
-    return _faint_for_its_noise(_curve(image, best))
+        image = levelled(image, dense(attempt.tube, image.voxel), attempt.tube.sigma)
+        attempt = again(image, attempt, entry)
+    attempt = bent(image, attempt, entry)
+    if attempt is not best.attempt:
+        best = _agreed(best, _read_off(image, attempt, entry)[0])
+    return ends_in_nothing(image, best.attempt.tube, faint_for_its_noise(_curve(image, best)))

@@ -17,6 +17,7 @@ from pipeline.trace.profile import INDEPENDENT_VOXELS
 from pipeline.trace.region import SearchRegion
 from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
+from pipeline.trace.ways import CONE, cone
 
 REACH_MM = 9.0
 """How far beyond the tip more wire is looked for: a gap of 8 mm and a millimetre."""
@@ -32,8 +33,6 @@ SHORTEST_VOXELS = 5.0
 """Shorter pieces are noise."""
 SURE = 5.0
 """Significance of a piece's mean grey from which it is no noise: it was chosen among a hundred."""
-CONE = 0.6
-"""Least cosine between the wire's end and the way to what goes on from it (53 degrees)."""
 FAINTEST = 0.06
 """Share of the wire's peak below which its own streaks lie; blur leaves two thirds of a plastic tip's 0.15."""
 RAY_MM = 3.0
@@ -55,7 +54,7 @@ BONE = 1.25
 FEW = 0.1
 """Share of the ways below which what is bright on them is no vessel but the edge of bone, or a wire straight ahead."""
 AHEAD_RAD = 0.15
-"""Angle to the wire's end up to which a way is straight ahead: the nearest of ``_cone``."""
+"""Angle to the wire's end up to which a way is straight ahead: the nearest of ``cone``."""
 MOST_RAYS = 24
 """Pieces followed at most."""
 BESIDE_VOXELS = 2.0
@@ -108,19 +107,6 @@ def _onward(piece: Tracklet, tip: Array, heading: Array) -> Tracklet | None:
     return run if size < REACH_MM and (touching or straight) else None
 
 
-def _cone(heading: Array) -> Array:
-    """Directions (n, 3) up to CONE off a heading, a tenth of a radian apart."""
-    side = np.cross(heading, np.eye(3)[int(np.argmin(np.abs(heading)))])
-    side /= np.linalg.norm(side)
-    other = np.cross(heading, side)
-    widest = float(np.arccos(CONE))
-    rings = [heading[None]]
-    for angle in np.arange(RAY_STEP, widest, RAY_STEP):
-        phi = np.arange(0.0, 2 * np.pi, RAY_STEP / np.sin(angle))[:, None]
-        rings.append(np.cos(angle) * heading + np.sin(angle) * (np.cos(phi) * side + np.sin(phi) * other))
-    return np.concatenate(rings)
-
-
 def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Array | None:
     """The end (3,) of the straight piece from a point along which grey stands out most; None for none.
 
@@ -128,7 +114,7 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
     """
     h = image.voxel
     s = np.arange(1.5 * h, RAY_MM, h)
-    directions = _cone(heading)
+    directions = cone(heading, float(np.arccos(CONE)), RAY_STEP)
     grey = image.along((start + s[:, None, None] * directions).reshape(-1, 3)).reshape(len(s), -1)
     noise = image.noise_in(CREST_VOXELS)
     for stop in (len(s) // 2, len(s)):
@@ -149,7 +135,7 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
     h, tip = image.voxel, line[-1]
     heading = tip_tangent(line, TANGENT_MM)
     s = np.arange(1.0, RAY_MM, h)
-    directions = _cone(heading)
+    directions = cone(heading, float(np.arccos(CONE)), RAY_STEP)
     directions = directions[directions @ heading > OUTSIDE_CONE]
     points = (tip + s[:, None, None] * directions).reshape(-1, 3)
     depth = image.depth_at(points).reshape(len(s), -1)

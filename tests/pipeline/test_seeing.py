@@ -21,6 +21,7 @@ from pipeline.trace.reach import end_range
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge
+from pipeline.trace.ways import SURE, brightest
 from tests.studies.seeing.scenes import Draft
 from tests.studies.seeing.table import look
 
@@ -35,10 +36,10 @@ from tests.studies.seeing.table import look
         ("platinum coil tip, x 3 to 10", 4),
         ("platinum coil tip, x 3 to 10", 450),  # 2 voxels too long: a last piece of no brightness
         ("marker band before the tip", 2),
-        ("dim distal part, x 0.15 to 0.2", 502),
-        ("dim distal part, x 0.15 to 0.2", 343),  # 2.4 voxels too long and ok, by an offset common to bright and dim
+        ("dim distal part, x 0.15 to 0.2", 518),
         ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 341),  # its tip behind the plane of entry was not fitted
         ("plain, no reference", 347),  # once cut by 7.5 mm, and ok
+        ("plain, no reference", 623),  # bends cut short by knots 13 voxels apart, its tip 1.7 voxels off, and ok
         ("plain", 300),  # the blur of its end was a dimmer part
         ("a catheter over the wire", 616),  # the same, 2 voxels too long and ok
         ("stenosis", 1),
@@ -68,6 +69,10 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
         ("dim distal part, x 0.15 to 0.2", 434, "TRACE_AMBIGUOUS"),  # 2.0 voxels too long, by its noise, and ok
         ("dim distal part, x 0.15 to 0.2", 463, "TRACE_AMBIGUOUS"),  # 2.4 voxels too short, the same
+        ("dim distal part, x 0.15 to 0.2", 552, "TRACE_AMBIGUOUS"),  # 2.6 voxels too long, the same
+        ("dim distal part, x 0.15 to 0.2", 645, "TRACE_AMBIGUOUS"),  # cut by 6 mm of wire 1.7 noises bright, and ok
+        ("dim distal part, x 0.15 to 0.2", 556, "TRACE_AMBIGUOUS"),  # the same, 13 mm of 1.2 noises
+        ("two wires 0.8 mm apart", 635, "TRACE_AMBIGUOUS"),  # first the other one, and ok: wide crests merge them
         ("correlated noise, CNR 4 to 6", 2, "TRACE_AMBIGUOUS"),  # right, but nothing in the frame says so
         ("tip folded back on itself", 632, "TRACE_AMBIGUOUS"),  # 7 mm of it in contact, hardly out of round, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
@@ -81,6 +86,11 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
     if case.startswith("no wire"):
         assert "the frame shows none" in FrameStatus[status].value, "in noise something thin is always found"
         assert "check that the frame shows a wire" in row.text
+
+
+def test_a_dim_end_is_not_drawn_outwards_by_an_offset_common_to_bright_and_dim():
+    row = look("dim distal part, x 0.15 to 0.2", 343)
+    assert row.text.startswith("though right"), "2.4 voxels too long with an offset"
 
 
 @pytest.mark.parametrize("seed", [0, 5])
@@ -159,6 +169,7 @@ def line_in_noise(seed, height, last_mm, size=(40, 40, 90), h=0.3, blur=0.95):
     return SimpleNamespace(
         voxel=h, spacing=np.full(3, h), grey=grey, noise=1.0, correlation=1.0, noise_in=lambda blur: sd,
         along=lambda points: ndimage.map_coordinates(smooth, np.asarray(points).T / h, order=1),
+        region=SimpleNamespace(within=np.arange(grey.size), box=SimpleNamespace(shape=size, values=0 * smooth - 1.0)),
     )  # fmt: skip
 
 
@@ -170,3 +181,19 @@ def test_the_range_of_an_end_holds_the_true_one_and_is_as_narrow_as_noise_allows
     ranges = np.array([end_range(line_in_noise(seed, 3.0, 18.0), tube) for seed in range(60)])
     assert np.mean(ranges[:, 0] > 0.26) > 0.97, "three standard deviations, in steps of a quarter of a voxel"
     assert np.median(ranges.sum(axis=1)) < 2 * 1.3 * h, "1.06 / CNR voxel is the least standard deviation of an end"
+
+
+def test_faint_wire_beyond_a_tip_stands_out_over_its_length_and_noise_does_not():
+    tip, heading = np.array([6.0, 6.0, 6.0]), np.array([0.0, 0.0, 1.0])
+    for seed in range(10):
+        assert brightest(line_in_noise(seed, 0.0, 0.0), tip, heading, 0.0) < SURE
+        wire = line_in_noise(seed, 1.7, 12.0)
+        assert brightest(wire, tip, heading, 0.0) > SURE, "6 mm of 1.7 noises lie ahead"
+        assert brightest(wire, tip, heading, 3.0) == 0.0, "none is as bright as that"
+
+
+def test_knots_come_closer_for_bends_not_for_noise():
+    """Contrast 4 times the noise, knots 12 voxels apart; the sharpest bends have radii of 11 and 15 voxels."""
+    bends, none = (look("plain", seed) for seed in (2, 5))
+    assert bends.levels["knot_mm"] < 9.5 * 0.3 < 11.0 * 0.3 < none.levels["knot_mm"]
+    assert bends.mean < 0.11, "voxel; 0.13 with wide knots"

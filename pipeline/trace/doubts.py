@@ -1,0 +1,63 @@
+"""What is held against a frame or a curve in the end: no wire, too much noise for it, or more wire than was found."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays.grids import spread
+from pipeline.arrays.jets import gaussian_taps, smooth_voxels
+from pipeline.arrays.polyline import tip_tangent
+from pipeline.model import Curve
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import ENTRY_REACH_MM, dense
+from pipeline.trace.onward import FAINTEST, TANGENT_MM
+from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.tube import Tube
+from pipeline.trace.verdict import LEAST_SEEN, note_of
+from pipeline.trace.ways import goes_on_unseen
+
+
+def _traces_of_wire(image: Subtraction) -> bool:
+    """Whether the lumen holds more bright voxels than noise makes: three times as many above 3.5 sigmas, and 15."""
+    sample = smooth_voxels(image.grey, gaussian_taps(1.0), image.region.within)
+    limit = 3.5 * spread(sample)
+    up, down = (int(np.sum(s * (sample - np.median(sample)) > limit)) for s in (1, -1))
+    return up > 3 * max(down, 5)
+
+
+def no_wire(image: Subtraction) -> Curve:
+    """What is said of a frame in which no line passes the entry."""
+    status, allowed = FrameStatus.NO_WIRE, f"a bright line within {ENTRY_REACH_MM} mm of entry_mm"
+    do = "check entry_mm and that the frame shows a wire"
+    if _traces_of_wire(image):
+        status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
+        do = f"{do}; give the curve of the frame before, or scan with more dose"
+    got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
+    return Curve(
+        np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),
+        counters=image.counters, levels=image.levels,
+    )  # fmt: skip
+
+
+def faint_for_its_noise(curve: Curve) -> Curve:
+    """The curve, or the same as too low in contrast where correlated noise hides the wire more than white noise."""
+    seen = curve.levels["cnr"] / max(1.0, curve.levels["inflation"])
+    if seen > LEAST_SEEN or curve.status is not FrameStatus.OK or curve.counters["from_previous"]:
+        return curve
+    got = f"a line {seen:.1f} noises bright, noise counted as it is correlated"
+    do = "check that the frame shows a wire; scan with more dose or a smoother reconstruction kernel"
+    note = note_of(got, f"{LEAST_SEEN} at least", do)
+    return replace(curve, status=FrameStatus.TRACE_LOW_CONTRAST, note=note)
+
+
+def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where something beyond its tip is too bright, over its length, for noise."""
+    if curve.status is not FrameStatus.OK or image.correlated:
+        return curve
+    line = dense(tube, 0.5 * image.voxel)
+    with image.showing(tube.voxels, tube.rest):
+        if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), FAINTEST * tube.peak):
+            return curve
+    got, allowed = "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it"
+    do = "look whether the wire's end is fainter than the rest; scan with more dose"
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))

@@ -1,0 +1,46 @@
+"""How far apart the knots of a fitted curve are, and the tube with which its fit starts."""
+
+import numpy as np
+
+from pipeline.model import Array, arc_length
+from pipeline.trace.link import resampled
+from pipeline.trace.profile import EVEN, Steps
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.tube import Tube, spline_through, tint_nodes
+
+CLOSEST = 8.0
+"""Least distance between knots, voxels: closer ones only follow the noise."""
+THICK_SLICES = 1.5
+"""Largest over smallest voxel edge (as the kernels see them) from which slices count as thick."""
+KNOTS_PER_PITCH = 2.0
+"""Least distance between knots in lengths of wire from slice to slice: with one a slice the curve follows each slice's
+own error (0.15 mm of ripple at 2.5 mm slices)."""
+FIRST_BLUR = 0.9
+"""The wire's blur (voxel) before it is fitted: scanner 0.8, wire and voxel the rest."""
+
+
+def slice_pitch(image: Subtraction, line: Array) -> float:
+    """Length of wire (mm) from one slice to the next along a path (n, 3), where slices are thicker than pixels; else 0.
+
+    Such slices are wider apart than the blur can join: between two of them the grey hardly says how high the wire is.
+    """
+    axis = int(np.argmax(image.spacing))
+    if image.spacing[axis] < THICK_SLICES * image.voxel:
+        return 0.0
+    slices = float(np.sum(np.abs(np.diff(line[:, axis])))) / float(image.spacing[axis])
+    return float(arc_length(line)[-1]) / max(slices, 1.0)
+
+
+def first_tube(image: Subtraction, points: Array, steps: Steps = EVEN, closest: bool = False) -> Tube:
+    """Where the fit starts: a spline along the path, with the amplitude seen there.
+
+    closest : knots CLOSEST apart whatever the noise.  Noise falls with the distance of the knots, a bend's bias rises
+    (0.004 / 0.009 / 0.046 voxel at 8 / 10 / 14 voxels for radii of 20 to 40).
+    """
+    h = image.voxel
+    line = resampled(points, 0.5 * h)
+    gain = 1.0 + (CREST_VOXELS / FIRST_BLUR) ** 2
+    amplitude = max(float(np.median(image.along(line[::4]))) * gain, image.noise)
+    knot = CLOSEST if closest else float(np.interp(amplitude / image.noise, [4.0, 8.0, 16.0], [12.0, 10.0, CLOSEST]))
+    controls = spline_through(line, max(knot * h, KNOTS_PER_PITCH * slice_pitch(image, line)))
+    return Tube(controls, np.full(tint_nodes(len(controls) - 3), amplitude), FIRST_BLUR * h, 0.0, steps=steps)
