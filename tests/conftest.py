@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-
 # what a script starts in the background ignores Ctrl-C, and so would all that tests start and interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
