@@ -150,6 +150,7 @@ def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> boo
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
     begin(now, start, energy_of(problem, start))
+    now.forked = 0
     report.start, report.pivot = now.energy, 1.0
     resting = rests(problem, k, now)
     if resting:
