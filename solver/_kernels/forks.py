@@ -88,8 +88,7 @@ def along_softest_way(problem: Problem, k: int, report: Any) -> float:
     The start of the step comes to lie in LAST_GOOD.
     """
     chain, state = problem.chain, problem.state
-    # what a wall holds is not about to buckle
-    if report.pivot >= 1.0 or not softest_way(problem, k, report):
+    if not softest_way(problem, k, report):
         return 0.0
     j, gain = int(report.joint), problem.scratch.gain
     hold_all_but(gain, j, k)
