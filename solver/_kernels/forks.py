@@ -21,7 +21,7 @@ from solver._kernels.saddle import hold_all_but, turn_joint
 from solver._kernels.septum import through_wall
 
 
-@kernel
+@merged
 def other_side(handle: Any, k: int) -> float:
     """How far from the wire at rest another one lies that is as low, on the other side, mm; 0 where there is none.
 
