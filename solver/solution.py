@@ -44,12 +44,17 @@ class Status(Enum):
 
 
 class Snap(NamedTuple):
-    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint."""
+    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint.
+
+    other_mm : how far off, mm, it would lie on the other of two sides, at an energy that is the same to 0.1 %; 0 where
+    no other was found. Which one it took says nothing: all that follows holds for that side, until both meet again.
+    """
 
     from_mm: float
     to_mm: float
     released_N_mm: float
     moved_mm: float
+    other_mm: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +77,9 @@ class Solution:
     dissipated_N_mm : the hand's work on the way to this depth less the change of energy, by the trapezium rule over
     each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) off by half the jump times
     the step, and negative then. With friction it holds friction_energy_N_mm.     snaps : events on that way.
-    uncertain : the wire snapped, was about to, or lay elsewhere after long steps than after short ones, here or a few
-    mm before (as long as it stays soft): shorter steps may lead elsewhere.     radius_mm : the wire's.
+    uncertain : the wire snapped, was about to, took one of two sides that are as good, or lay elsewhere after long
+    steps than after short ones, here or a few mm before (as long as it stays soft): shorter steps may lead elsewhere.
+    radius_mm : the wire's.
     """
 
     joints_mm: Array

@@ -55,7 +55,7 @@ def begin(now: Any, slot: int, energy: float) -> None:
     now.share, now.next_check, now.checked_energy = 1.0, tol.FIRST_CHECK, math.inf
 
 
-@merged
+@kernel
 def relax_with_friction(
     problem: Problem, slot: int, k: int, limits: Limits, report: Any
 ) -> tuple[int, int, int, float]:
@@ -67,6 +67,7 @@ def relax_with_friction(
     rubs, counters = problem.friction.coefficient > 0.0, problem.scratch.counters[0]
     counters.relaxations_without_friction += not rubs
     counters.relaxations_without_twist += not problem.twisting
+    problem.scratch.descent[0].forked = 0
     if rubs:
         take_loads(problem, slot, k)
     outcome, iterations, most, energy = FRICTION, 0, 0, 0.0

@@ -111,7 +111,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
     """One backward Riccati recursion from the tip to joint ``first_free``: fills the gains and report.decrement.
 
     damping : Levenberg's term, a share of each joint's stiffness that holds its node in place; the coupling between
-    joints stays, as in a viscous bath, and the wall's negative curvature is left out.
+    joints stays, as in a viscous bath, and the wall's negative curvature is left out. Below 0 the bath pushes it aside.
     Returns False and stops at the first block that is not positive (semi-)definite, which the report then describes.
     """
     if problem.straight:
@@ -126,7 +126,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         frame = load9(state.r[slot], n)
         df, dg = node_gradient(problem, slot, n, frame)
         dp, dc, dh = node_hessian(problem, slot, n, frame, damping > 0.0)
-        held = damping * bend[j] / (length[j] * length[j]) if damping > 0.0 else 0.0
+        held = damping * bend[j] / (length[j] * length[j]) if damping != 0.0 else 0.0
         value = cross_segment(length[j], add_node(value, (df, dg), (dp, dc, dh), held))
         _, c, h, _, g = value
         u = load3(state.u[slot], j)

@@ -193,6 +193,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
         if trial == math.inf:
             trial = search(problem, k, now, 0.4, noise, report)
     elif now.damping == 0.0:
+        now.forked = 1
         costate(problem, now.slot, k, report)
         if at_rest(problem, now.slot, k, report):
             nearly = abs(report.curvature) <= tol.NEUTRAL * stiffest(problem.chain, k)

@@ -156,7 +156,7 @@ def sweep_straight(problem: Problem, slot: int, first_free: int, k: int, damping
         frame, u = load9(frames, n), (controls[j, 0], controls[j, 1])
         gradient = node_gradient(problem, slot, n, frame)
         hessian = node_hessian(problem, slot, n, frame, damping > 0.0)
-        held = damping * bend[j] / (length[j] * length[j]) if damping > 0.0 else 0.0
+        held = damping * bend[j] / (length[j] * length[j]) if damping != 0.0 else 0.0
         value = cross_segment(length[j], add_node(value, gradient, hessian, held))
         turn, q_uu = joint_block(bend[j] * (1.0 + 0.01 * damping), u, value)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, False)

@@ -61,6 +61,7 @@ pivot : least of the joints' stiffnesses with all beyond them free to follow, ov
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
+    ("forked", np.int64),
     *((name, float) for name in ("energy", "damping", "last_damping", "share", "checked_energy")),
 )
 """What one iteration of a relaxation hands to the next.
@@ -68,6 +69,7 @@ DESCENT = record(
 slot : of the current state; the trial is in 1 - slot.     energy : of the current state, N mm.
 Newton's method. first_free : joints before it are left alone.     damping : Levenberg's term.     last_damping : the
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
+forked : 1 where it came by an unstable state, see ``forks``.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(
@@ -89,5 +91,5 @@ seen_calm : what calm was before it.     seen_pivot : the least with which it co
 catheter, goal, next : its tip, where it is to go, and where this step takes it, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
 """
-SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm")))
-"""An event: depths before and after, energy released, the largest way of a joint."""
+SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm", "other_mm")))
+"""An event: depths before and after, energy released, the largest way of a joint, and see ``forks.other_side``."""

@@ -11,7 +11,7 @@ from solver._kernels.algebra import load3, store3
 from solver._kernels.crossing import admissible
 from solver._kernels.data import Problem
 from solver._kernels.energy import total_energy
-from solver._kernels.flags import kernel, merged
+from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.newton import sweep
 from solver._kernels.rollout import copy_base, place
 from solver._kernels.trial import step
@@ -33,23 +33,36 @@ def off_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) ->
 def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) -> float:
     """Leave a stationary point along its direction of negative curvature; return the new energy, or inf."""
     j, slot, gain = int(report.joint), now.slot, problem.scratch.gain
-    for a in range(3):
-        for b in range(7):
-            gain[j, a, b] = 0.0
-    for i in range(j + 1, k):
-        gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
+    hold_all_but(gain, j, k)
     size, least = tol.SWING, 0.1 * abs(report.curvature)
     # joints further on may answer with a thousand times as much: nothing but rounding ends the search
     while least * size * size > noise:
         for side in (1.0, -1.0):
-            for a in range(2):
-                gain[j, a, 0] = side * size * report.bend[a]
-            gain[j, 2, 0] = side * size * report.twist
+            turn_joint(gain, side * size, report)
             trial = step(problem, slot, j, k, 1.0)
             if trial < now.energy - least * size * size and admissible(problem, slot, k):
                 return trial
         size *= 0.25
     return math.inf
+
+
+@kernel
+def hold_all_but(gain: Any, j: int, k: int) -> None:
+    """Take all joints' own steps out of the gains: those beyond joint j answer to how it turns, and nothing else."""
+    for a in range(3):
+        for b in range(7):
+            gain[j, a, b] = 0.0
+    for i in range(j + 1, k):
+        gain[i, 0, 0] = gain[i, 1, 0] = gain[i, 2, 0] = 0.0
+
+
+@inlined
+def turn_joint(gain: Any, size: float, report: Any) -> None:
+    """Make a turn by ``size``, rad, in the report's direction the step of the report's joint."""
+    j = report.joint
+    for a in range(2):
+        gain[j, a, 0] = size * report.bend[a]
+    gain[j, 2, 0] = size * report.twist
 
 
 @merged

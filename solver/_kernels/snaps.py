@@ -8,11 +8,12 @@ import math
 from typing import Any, NamedTuple
 
 from solver import _tolerances as tol
-from solver._kernels.algebra import dot, load3, minus, store3
+from solver._kernels.algebra import load3, store3
 from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
+from solver._kernels.forks import farthest
 from solver._kernels.friction import friction_loss
 from solver._kernels.minimise import NEWTON
 from solver._kernels.shaft import loss_by_turning
@@ -41,10 +42,11 @@ class Books(NamedTuple):
 
 
 @merged
-def account(handle: Any, k: int, reached: tuple[float, float, float], used: int) -> int:
+def account(handle: Any, k: int, reached: tuple[float, float, float], used: int, other: float) -> int:
     """Hold the hand's work in a step against the wire's energy; ROUGH where a shorter step may lead elsewhere.
 
     reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
+    other : how far off another side lies, mm.
     """
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
@@ -58,14 +60,33 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
             remember(problem, at, k, reached)
         return ROUGH
     # a wire that went no further than its base was pushed did not snap: the trapezium rule left that of its work
-    if doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change:
-        note_snap(problem, at, moved, (reached[0], books.missing))
-        # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
-        if min(handle.report[1].pivot, report.pivot) > tol.SOFT:
-            at.seen_pivot = math.inf
+    snapped = doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change
+    # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
+    if snapped and min(handle.report[1].pivot, report.pivot) > tol.SOFT:
+        at.seen_pivot = math.inf
+    if snapped or other > 0.0:
+        note_snap(problem, at, (moved, other), (reached[0], books.missing))
     trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
+    if other > 0.0:
+        at.calm = at.seen_calm = tol.CALM_MM - tol.UNDECIDED_MM
     at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
     return CONVERGED
+
+
+@merged
+def may_fork(handle: Any, k: int, depth: float, used: int) -> bool:
+    """Whether the other side of a step to a depth is worth a look.
+
+    Not where the way down was never unstable, where no joint moved by more than the hand, and where a soft wire is in
+    doubt already.
+    """
+    problem, at = handle.problem, handle.place[0]
+    if problem.scratch.descent[0].forked == 0 or used <= tol.SWIFT:
+        return False
+    if handle.report[0].pivot < tol.SOFT and at.calm < tol.CALM_MM:
+        return False
+    way = max(abs(depth - at.inserted), abs(at.next - at.catheter))
+    return bool(way_of_joints(problem, at, k, handle.table.segment) > tol.FURTHER * way)
 
 
 @merged
@@ -135,22 +156,13 @@ def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bo
     if report.pivot > tol.STIFF or at.calm >= tol.CALM_MM:
         at.calm += ahead
     if doubtful or report.pivot < tol.CRITICAL:
-        at.calm = 0.0
+        at.calm = min(at.calm, 0.0)
     left = abs(reached[0] - at.seen_depth) + abs(reached[1] - at.seen_roll) + abs(at.next - at.seen_catheter)
     if left < tol.MATCH_DEPTH_MM:
         same = farthest(problem.scratch.seen, 0, problem.state.x[CURRENT], 0, k + 1) < tol.SAME_MM
-        at.calm = at.seen_calm + ahead if same and at.resigned == 0.0 and report.pivot > at.seen_pivot else 0.0
+        same = same and at.resigned == 0.0 and report.pivot > at.seen_pivot
+        at.calm = at.seen_calm + ahead if same else min(at.calm, 0.0)
         at.seen_depth, at.resigned = math.nan, 0.0
-
-
-@merged
-def farthest(a: Any, at: int, b: Any, to: int, count: int) -> float:
-    """Largest distance of ``count`` joints of two wires, mm, from joint ``at`` of one and ``to`` of the other on."""
-    most = 0.0
-    for m in range(count):
-        way = minus(load3(a, at + m), load3(b, to + m))
-        most = max(most, dot(way, way))
-    return math.sqrt(most)
 
 
 @merged
@@ -162,12 +174,14 @@ def way_of_joints(problem: Problem, at: Any, k: int, segment: float) -> float:
 
 
 @merged
-def note_snap(problem: Problem, at: Any, moved: float, reached: tuple[float, float]) -> None:
-    """Write down that a wire snapped.
+def note_snap(problem: Problem, at: Any, ways: tuple[float, float], reached: tuple[float, float]) -> None:
+    """Write down that a wire snapped, or turned to one of two sides.
 
-    reached : the depth, mm, and the energy released, N mm. Where there are too many the last place is taken again.
+    ways : the largest of a joint, and how far off the other side is, 0 for none, mm.     reached : the depth, mm, and
+    the energy released, N mm. Where there are too many the last place is taken again.
     """
     snaps = problem.scratch.snaps
     snap = snaps[min(at.snaps, snaps.size - 1)]
     at.snaps = min(at.snaps + 1, snaps.size)
-    snap.from_mm, snap.to_mm, snap.released_N_mm, snap.moved_mm = at.inserted, reached[0], reached[1], moved
+    snap.from_mm, snap.to_mm, snap.released_N_mm = at.inserted, reached[0], max(reached[1], 0.0)
+    snap.moved_mm, snap.other_mm = ways

@@ -256,3 +256,10 @@ def test_no_hop_of_a_hard_step_is_silent(seed: int, index: int) -> None:
     """A step of 1 mm let go 0.1 to 1 mm too early: the push fell within it, or the wire was free to turn."""
     silent = next(iter(against_short_steps(seed, 1, first=index)))
     assert silent.value == 0.0
+
+
+@pytest.mark.parametrize(("seed", "index"), [(9905, 24), (9921, 114), (9923, 64), (9964, 143)])
+def test_no_side_that_is_as_good_is_silent(seed: int, index: int) -> None:
+    """Steps of 1 mm and of 0.05 mm buckled to two sides of a siphon: 1, 4, 4 and 3 depths were silently off."""
+    silent = next(iter(against_short_steps(seed, 1, first=index)))
+    assert silent.value == 0.0

@@ -150,10 +150,12 @@ def _pressed_deep(frames: Sequence[Frame], wires: Sequence[Solution], radius_mm:
 
 def _told(frame: int, snap: Snap) -> str:
     """An event in words."""
+    hangs = "what is seen here and shortly after hangs on small causes"
+    if snap.other_mm > 0.0:
+        hangs = f"the other side, {snap.other_mm:.2f} mm off, was as good: what follows holds for this one"
     return (
         f"frame {frame}: the simulated wire gave way between {snap.from_mm:.2f} and {snap.to_mm:.2f} mm "
-        f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); what is seen here and "
-        "shortly after hangs on small causes"
+        f"({1e3 * snap.released_N_mm:.3g} µJ released, a joint moved by {snap.moved_mm:.2f} mm); {hangs}"
     )
 
 

@@ -63,7 +63,7 @@ def after_sweep(me: Any, now: Any, counters: Any, number: Any, lane: int) -> Non
     elif definite:
         me.phase = SEARCH
     elif now.damping == 0.0:
-        me.phase = JUDGE
+        now.forked, me.phase = 1, JUDGE
     else:
         hold_back(me, now, counters)
 
