@@ -11,7 +11,7 @@ from solver import _tolerances as tol
 from solver._kernels.algebra import dot, load3, minus, scaled, store3
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, TRIAL, Problem
 from solver._kernels.energy import bending_energy, energy_of, total_energy
-from solver._kernels.flags import kernel, merged
+from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.friction import take_loads
 from solver._kernels.minimise import relax_with_friction
@@ -21,7 +21,17 @@ from solver._kernels.saddle import hold_all_but, turn_joint
 from solver._kernels.septum import through_wall
 
 
-@merged
+@inlined
+def may_fork(problem: Problem, at: Any, report: Any, further: bool) -> bool:
+    """Whether the other side of a step is worth a look. further : a joint moved by more than the hand.
+
+    Not where the way down was never unstable, and where a soft one is in doubt already.
+    """
+    told = report.pivot < tol.SOFT and at.calm < tol.CALM_MM
+    return bool(problem.scratch.descent[0].forked == 1 and further and not told)
+
+
+@cached
 def other_side(handle: Any, k: int) -> float:
     """How far from the wire at rest another one lies that is as low, on the other side, mm; 0 where there is none.
 
