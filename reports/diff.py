@@ -105,8 +105,9 @@ class Difference:
 
     def _compared(self) -> str:
         """How many cases were compared, of how many."""
-        both = self.rows.drop(self.new.index)
-        held, cases = (rows["case"][rows["column"] != "simulator"].nunique() for rows in (both, self.rows))
+        rows = self.rows[self.rows["column"] != "simulator"]
+        held = rows["case"][rows["column"] == "status"].nunique()
+        cases = rows["case"].nunique()
         all_of_them = counted(cases, "case")
         return f"{all_of_them} compared" if held == cases else f"{held} of {all_of_them} compared"
 

@@ -43,7 +43,7 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
             values, way = paint_vessel(values, grid)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
-        wall, what = None, " and a made-up vessel, since it shows none,"
+        wall, what = None, " and a made-up vessel, since none was found,"
     stretched = np.float32(VESSEL_GREY) * values
 
     def plan(_rng: np.random.Generator, frames: int) -> Setup:

@@ -20,7 +20,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("-o", "--out", type=Path, metavar="DIR", help="folder for the study")
     add("--list", action="store_true", help="name the scenes, each with its reason")
     add("--anatomy", type=Path, metavar="FILE", help="vessel tree, .swc or .mrk.json with radii")
-    add("--background", type=Path, metavar="VOLUME", help="paint a wire into this real scan")
+    add(
+        "--background",
+        type=Path,
+        metavar="VOLUME",
+        help="a real scan to paint a wire into (and a vessel, if it has none)",
+    )
     add("--format", default="mha", choices=("mha", "nrrd", "nii.gz", "dicom", "h5"), help="of the scans (default mha)")
     add("--frames", type=int, metavar="N", help="scans with the wire; each scene has its own number")
     add(
@@ -110,6 +115,8 @@ def main(args: Namespace) -> int:
         study = catalogue.build(scene, scanner=args.scanner, **numbers)
     except (ValueError, ImportError) as error:
         return complain([str(error)], "the command line")
+    if args.background is not None:
+        say(f"{study.name}: {scene.why}")
     quality = study.quality
     chat = (lambda _: None) if args.quiet else say
     chat(

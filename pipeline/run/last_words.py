@@ -51,7 +51,9 @@ def last_line(totals: Totals, index: Path) -> str:
     if np.isfinite(totals.median_mm):
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))
-        parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm ({in_words(low, high, said)})")
+        judged = int(totals.pooled.get("cases") or totals.cases)
+        over = f" over the {counted(judged, 'case')} that are scored" * (judged < totals.cases)
+        parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm{over} ({in_words(low, high, said)})")
         parts += _skill(totals.pooled)
     if totals.unscored:
         parts.append(totals.unscored.rstrip("."))

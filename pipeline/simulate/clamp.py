@@ -211,9 +211,11 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
     offset = f"{shift:.2f} mm and {turned:.1f} degrees from the manifest's"
     if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
         warning = (
-            f"the traced wires start {offset} (accepted: {FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the "
-            "manifest's entry was kept: check entry_mm and entry_direction; the traces say "
-            f"entry_mm = {found.entry_mm.round(2).tolist()}, entry_direction = {found.direction.round(4).tolist()}"
+            f"the simulated wire fits the first {REACH_MM:g} mm of the traces from a clamp {offset} (accepted: "
+            f"{FARTHEST_MM} mm and {LARGEST_TURN_DEG} degrees); the manifest's entry was kept: check entry_mm and "
+            "entry_direction, and where these are right roll, material_axis and the wire's tip and stiffness; the "
+            f"clamp is entry_mm = {found.entry_mm.round(2).tolist()}, "
+            f"entry_direction = {found.direction.round(4).tolist()}"
         )
         return replace(given, warning=warning)
     if not used:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from pipeline.load.geometry import LoadError
@@ -38,6 +39,10 @@ def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     known = {"entry_case": 'entry = "case:ID"'}
     raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
+
+
+LEAST_ACROSS_DEG = 5.0
+"""Between material_axis and entry_direction: more than a clamp's direction is found to be off by."""
 
 
 class Case(Strict):
@@ -124,6 +129,7 @@ class Case(Strict):
             problems.append(
                 f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
             )
+        problems += self._axis_along_the_wire()
         # a single file may hold many volumes; their number is known once its header is read
         one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
@@ -131,6 +137,16 @@ class Case(Strict):
         if problems:
             raise saying(*problems)
         return self
+
+    def _axis_along_the_wire(self) -> list[str]:
+        """That material_axis, which shows where roll 0 points across the wire, points along it."""
+        if self.material_axis is None:
+            return []
+        along = abs(float(np.dot(self.material_axis, self.entry_direction)))
+        if along < np.cos(np.radians(LEAST_ACROSS_DEG)):
+            return []
+        found = f"material_axis = {list(self.material_axis)} is within {LEAST_ACROSS_DEG:g} degrees of entry_direction"
+        return [f"{found}; give a direction across the wire, where its curved tip points at roll 0, or leave it out"]
 
     def _over_the_wire(self) -> list[str]:
         """What is wrong with the catheter."""

@@ -17,7 +17,7 @@ from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import near_rotation_plane
 
-__all__ = ["of_length", "trace"]
+__all__ = ["of_catheter", "of_length", "trace"]
 
 BACK_END = explained
 """How the curve is found: (subtraction, entry, previous, config) -> Curve."""
@@ -84,6 +84,22 @@ def _same(curve: Curve, other: Curve, voxel: float) -> bool:
     near = cKDTree(other.points_mm).query(curve.points_mm)[0]
     tips = float(np.linalg.norm(curve.points_mm[-1] - other.points_mm[-1]))
     return bool(np.quantile(near, 0.95) < voxel and tips < 2.0 * voxel)
+
+
+CATHETER_END_MM = 1.0
+"""Distance of a trace's end from a catheter's within which it may be the catheter's own."""
+
+
+def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
+    """The curve; one that ends with a stated catheter, whose tip may hide where the wire ends, is not to be trusted.
+
+    For frames without a stated depth: where there is one, it says which of the two was traced.
+    """
+    if curve.status is not FrameStatus.OK or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
+        return curve
+    note = f"trace: length: got {curve.length_mm:.2f} mm, where the catheter ends ({catheter_mm:.2f} mm); "
+    note += "expected a wire that ends elsewhere, or a stated depth; give insertion_mm"
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
 
 
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:

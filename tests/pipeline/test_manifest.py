@@ -60,6 +60,7 @@ def test_natural_order() -> None:
         (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
         (("radius_mm = 0.18", "radius_mm = -1"), "greater than or equal to 0.001; found -1"),
         (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
+        (('wire = "soft"', 'wire = "soft"\nmaterial_axis = [0.05, 0, -3]'), "within 5 degrees of entry_direction"),
         (('frames = "frames/*.mha"', 'frames = "nothing/*.mha"'), "matches no file"),
         (('frames = "frames/*.mha"', ""), "neither frames nor insertion_mm"),
         (("entry_mm = [1.0, 2.0, 3.0]", ""), "case 'run1' entry_mm: missing"),

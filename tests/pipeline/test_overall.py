@@ -65,7 +65,8 @@ def test_one_population_everywhere(study: Path) -> None:
     assert (whole["frames"], whole["frames_ok"], whole["insertions"]) == (9, 7, 4)
     line = last_line(totals, study / "index.html")
     assert f"median point error {np.median(good):.3f} mm" in line
-    assert f"rms {rms:.3f} mm (95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, wide: 4 ins" in line
+    interval = f"95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, wide: 4 ins"
+    assert f"rms {rms:.3f} mm over the 4 cases that are scored ({interval}" in line
     page = render_index(study).read_text(encoding="utf-8")
     assert f"<b>{rms:.3f}</b>" in page
     curve = pd.read_csv(study / "figures" / "planned_within.csv")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.stages.trace import _in_plane
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
-from pipeline.trace import of_length, trace
+from pipeline.trace import of_catheter, of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted
 from pipeline.trace.verdict import near_rotation_plane
@@ -345,6 +346,19 @@ def test_a_length_that_disagrees_with_the_insertion_is_a_named_status():
     given = Curve(wire, np.full(len(wire), np.nan))
     assert of_length(given, 11.0, TraceConfig()) is of_length(given, None, TraceConfig()) is given
     assert of_length(given, 16.0, TraceConfig()).status is FrameStatus.LENGTH_MISMATCH
+
+
+def test_a_trace_that_ends_with_the_catheter_may_be_the_catheter_s():
+    """A catheter pushed past the wire's tip is a line as thin and as bright, and its end is as sharp."""
+    wire = np.column_stack([np.zeros((39, 2)), np.arange(39.0)])
+    curve = Curve(wire, np.full(39, np.nan))
+    found = of_catheter(curve, 38.4)
+    assert found.status is FrameStatus.TRACE_AMBIGUOUS
+    assert "38.40" in found.note
+    assert "insertion_mm" in found.note
+    assert of_catheter(curve, 30.0) is curve
+    missing = replace(curve, status=FrameStatus.NO_WIRE)
+    assert of_catheter(missing, 38.4) is missing
 
 
 def test_a_curve_that_leaves_the_lumen_is_a_named_status():

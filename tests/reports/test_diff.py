@@ -69,7 +69,7 @@ def test_missing_frames_and_cases_are_regressions_and_new_ones_are_not() -> None
     assert bad == [["a", "frame", "missing"], ["b", "case", "missing"]]
     assert found.rows[found.rows["verdict"] == "new"]["case"].tolist() == ["c"]
     assert found.sentence.startswith(
-        "2 of 3 cases compared: 2 regressions; the worst: case a frame 1, frame present -> missing"
+        "1 of 3 cases compared: 2 regressions; the worst: case a frame 1, frame present -> missing"
     )
 
 

@@ -23,7 +23,7 @@ from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
-from pipeline.trace import of_length, trace
+from pipeline.trace import of_catheter, of_length, trace
 
 
 def trace_frames(run: Context, known: Known) -> Known:
@@ -126,6 +126,8 @@ class _Tracing:
             opacity=run.case.wire.opacity,
             config=settings,
         )
+        if run.case.catheter is not None and np.isnan(frame.expected_mm):
+            curve = of_catheter(curve, frame.catheter_mm)
         return _along(_traced(done, curve), shown, window), window
 
 
