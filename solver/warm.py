@@ -85,7 +85,7 @@ def _compile(*kernels: Any) -> None:
         "reached": (0.0, 0.0, 0.0),
         **dict.fromkeys(("slot", "k", "was", "outcome", "laid", "used"), 1),
         **dict.fromkeys(("depth", "roll", "to_depth", "to_roll"), 1.0),
-        **dict.fromkeys(("first", "ahead", "tolerance", "margin", "share", "last"), 1.0),
+        **dict.fromkeys(("first", "ahead", "tolerance", "margin", "share", "last", "other"), 1.0),
     }
     types = {"problem": untyped.typeof(work.handle).field_dict["problem"]}
     for kernel in kernels:

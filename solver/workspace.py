@@ -95,7 +95,7 @@ class Workspace:
         self.place["shrink"], self.place["calm"] = 1.0, np.inf
         self.place["seen_depth"] = np.nan
         self.snaps = np.zeros(SNAPS_KEPT, records.SNAP)
-        self.report = np.zeros(2, records.REPORT)
+        self.report = np.zeros(3, records.REPORT)
         self._grow(16)
 
     def _grow(self, capacity: int) -> None:
@@ -132,9 +132,9 @@ class Workspace:
         self.capacity = capacity
 
     def _empty_state(self, k: int, points: int) -> data.State:
-        u, x, r = np.zeros((3, k, 3)), np.zeros((3, k + 1, 3)), np.zeros((3, k + 1, 3, 3))
-        penetration, jet = np.zeros((3, points)), np.zeros((3, points, 10))
-        return data.State(u, x, r, penetration, jet, np.zeros(3, records.ENERGIES), np.zeros((3, 3, 3)))
+        u, x, r = np.zeros((4, k, 3)), np.zeros((4, k + 1, 3)), np.zeros((4, k + 1, 3, 3))
+        penetration, jet = np.zeros((4, points)), np.zeros((4, points, 10))
+        return data.State(u, x, r, penetration, jet, np.zeros(4, records.ENERGIES), np.zeros((4, 3, 3)))
 
     def _empty_scratch(self, k: int, points: int) -> data.Scratch:
         gain, anchor = np.zeros((k, 3, 7)), np.ones((points, 4))

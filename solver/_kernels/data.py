@@ -12,8 +12,9 @@ OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", 
 CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
 UNFINISHED, ROUGH = -1, -2
 """It goes on. And of a step: it is to be taken again in shorter ones."""
-CURRENT, TRIAL, LAST_GOOD = range(3)
-"""Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes."""
+CURRENT, TRIAL, LAST_GOOD, SPARE = range(4)
+"""Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes;
+the last is for a second look at what it led to."""
 
 
 class Field(NamedTuple):
@@ -112,11 +113,11 @@ class Chain(NamedTuple):
 
 
 class State(NamedTuple):
-    """Three states of a chain side by side (axis 0), see ``CURRENT``.
+    """Four states of a chain side by side (axis 0), see ``CURRENT``.
 
-    u : (3, k, 3) controls, rad.   x : (3, k + 1, 3) joints, mm.   r : (3, k + 1, 3, 3) frames, whose columns are
-    material axes 1, 2 and the direction.   penetration : (3, p) mm.   jet : (3, p, 10), see ``field``, per mm.
-    energies : (3,) of ``records.ENERGIES``.   held : (3, 3, 3), see ``shaft.shaft_energy``; 0 where the shaft
+    u : (4, k, 3) controls, rad.   x : (4, k + 1, 3) joints, mm.   r : (4, k + 1, 3, 3) frames, whose columns are
+    material axes 1, 2 and the direction.   penetration : (4, p) mm.   jet : (4, p, 10), see ``field``, per mm.
+    energies : (4,) of ``records.ENERGIES``.   held : (4, 3, 3), see ``shaft.shaft_energy``; 0 where the shaft
     does not rub.
     """
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels.algebra import dot, load3, minus, scaled, store3
-from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, TRIAL, Problem
+from solver._kernels.data import CONVERGED, CURRENT, SPARE, TRIAL, Problem
 from solver._kernels.energy import bending_energy, energy_of, total_energy
-from solver._kernels.flags import cached, inlined, kernel, merged
+from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.friction import take_loads
 from solver._kernels.minimise import relax_with_friction
@@ -21,45 +21,35 @@ from solver._kernels.saddle import hold_all_but, turn_joint
 from solver._kernels.septum import through_wall
 
 
-@inlined
-def may_fork(problem: Problem, at: Any, report: Any, further: bool) -> bool:
-    """Whether the other side of a step is worth a look. further : a joint moved by more than the hand.
-
-    Not where the way down was never unstable, and where a soft one is in doubt already.
-    """
-    told = report.pivot < tol.SOFT and at.calm < tol.CALM_MM
-    return bool(problem.scratch.descent[0].forked == 1 and further and not told)
-
-
-@cached
+@merged
 def other_side(handle: Any, k: int) -> float:
     """How far from the wire at rest another one lies that is as low, on the other side, mm; 0 where there is none.
 
     What the step changed is mirrored, and relaxed from there: that leads back, unless there are two sides. State,
-    report and friction are left as they were found.
+    report and friction are left as they were found, and what a step needs that is taken back.
     """
     problem, state, report = handle.problem, handle.problem.state, handle.report[0]
     energy, apart = energy_of(problem, CURRENT), 0.0
-    handle.report[1] = report
+    handle.report[2] = report
     if mirrored(problem, k, report):
         total_energy(problem, CURRENT, 0, k)
         outcome, _, _, other = relax_with_friction(problem, CURRENT, k, handle.limits, report)
         if outcome == CONVERGED and abs(other - energy) < tol.AS_LOW * abs(energy):
-            apart = farthest(state.x[CURRENT], 0, state.x[LAST_GOOD], 0, k + 1)
+            apart = farthest(state.x[CURRENT], 0, state.x[SPARE], 0, k + 1)
         if apart > tol.APART_MM and through_wall(problem.field, state.x[CURRENT], k, handle.introducer.margin):
             apart = 0.0
-        copy_state(problem, LAST_GOOD, CURRENT, k)
+        copy_state(problem, SPARE, CURRENT, k)
         if problem.friction.coefficient > 0.0:
             take_loads(problem, CURRENT, k)
         if problem.shaft.drag > 0.0:
             total_energy(problem, CURRENT, 0, k)
-    handle.report[0] = handle.report[1]
+    handle.report[0] = handle.report[2]
     return apart if apart > tol.APART_MM else 0.0
 
 
 @merged
 def mirrored(problem: Problem, k: int, report: Any) -> bool:
-    """Keep the wire in LAST_GOOD, and mirror what the step changed; False, and nothing done, where that is little.
+    """Keep the wire in SPARE, and mirror what the step changed; False, and nothing done, where that is little.
 
     A wire that the step began to bend is mirrored as a whole; one that was bent before where it yields most easily.
     """
@@ -71,7 +61,7 @@ def mirrored(problem: Problem, k: int, report: Any) -> bool:
         back = along_softest_way(problem, k, report)
         if back == 0.0:
             return False
-    copy_state(problem, CURRENT, LAST_GOOD, k)
+    copy_state(problem, CURRENT, SPARE, k)
     u, aside = state.u[CURRENT], state.u[TRIAL]
     for i in range(k):
         now = load3(u, i)
@@ -85,7 +75,7 @@ def mirrored(problem: Problem, k: int, report: Any) -> bool:
 def along_softest_way(problem: Problem, k: int, report: Any) -> float:
     """How many times the way from CURRENT to TRIAL, the softest, mirrors what the step changed along it; 0 if little.
 
-    The start of the step comes to lie in LAST_GOOD.
+    The start of the step comes to lie in SPARE.
     """
     chain, state = problem.chain, problem.state
     if not softest_way(problem, k, report):
@@ -95,13 +85,13 @@ def along_softest_way(problem: Problem, k: int, report: Any) -> float:
     turn_joint(gain, tol.SLIGHT, report)
     rollout(problem, CURRENT, j, k, 1.0)
     for i in range(k):
-        store3(state.u[LAST_GOOD], i, load3(problem.scratch.start, i))
-    copy_base(state, CURRENT, LAST_GOOD)
-    place(chain, state, LAST_GOOD, k)
+        store3(state.u[SPARE], i, load3(problem.scratch.start, i))
+    copy_base(state, CURRENT, SPARE)
+    place(chain, state, SPARE, k)
     along, square, most = 0.0, 0.0, 0.0
     for n in range(1, k + 1):
         at, hold = load3(state.x[CURRENT], n), chain.bend[n - 1] / (chain.length[n - 1] * chain.length[n - 1])
-        way, change = minus(load3(state.x[TRIAL], n), at), minus(at, load3(state.x[LAST_GOOD], n))
+        way, change = minus(load3(state.x[TRIAL], n), at), minus(at, load3(state.x[SPARE], n))
         along, square = along + hold * dot(way, change), square + hold * dot(way, way)
         most = max(most, dot(way, way))
     back = -2.0 * along / square

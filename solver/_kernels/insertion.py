@@ -14,12 +14,13 @@ from solver._kernels.crossing import free_way
 from solver._kernels.data import Introducer, Problem, WireTable
 from solver._kernels.flags import cached, inlined, merged, uncounted
 from solver._kernels.forces import contact_forces, copy_state, forget_forces, furthest_outside, push_force
+from solver._kernels.forks import other_side
 from solver._kernels.friction import anchor_friction, friction_loss, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
 from solver._kernels.shaft import anchor_shaft, settle_shaft
 from solver._kernels.sleeve import put_over, stored_energy
-from solver._kernels.snaps import account
+from solver._kernels.snaps import account, may_fork
 from solver._kernels.start import extrapolate_start, lay_along, note_change, put_load
 
 
@@ -138,21 +139,26 @@ def step(handle: Any, to_depth: float, to_roll: float, laid: int) -> tuple[int, 
     else:
         depth, roll = next_place(handle, to_depth, to_roll)
         k = set_out(handle, depth, roll)
-    outcome, used, most, energy = data.CONVERGED, 0, 0, 0.0
+    outcome, used, most, energy, other = data.CONVERGED, 0, 0, 0.0, 0.0
     if k > 0:
         weigh(problem.chain, handle.introducer.weight, k)
         start = extrapolate_start(problem, at, k, likeness(problem, at, depth, roll))
         outcome, used, most, energy = relax_with_friction(problem, start, k, handle.limits, handle.report[0])
         if start != data.CURRENT:
             copy_state(problem, start, data.CURRENT, k)
-    return settle(handle, (depth, roll, energy), k, outcome, laid, most), used
+        if outcome == data.CONVERGED and laid == 0 and may_fork(handle, k, depth, most):
+            other = other_side(handle, k)
+    return settle(handle, (depth, roll, energy), k, outcome, laid, most, other), used
 
 
 @cached
-def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int) -> int:
+def settle(
+    handle: Any, reached: tuple[float, float, float], k: int, outcome: int, laid: int, used: int, other: float
+) -> int:
     """Keep the wire where a step led it, or take the step back where it failed; return the outcome.
 
     reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
+    other : see ``forks.other_side``.
     """
     problem, at, (depth, roll, energy) = handle.problem, handle.place[0], reached
     energy -= problem.state.energies[data.CURRENT].friction
@@ -162,7 +168,7 @@ def settle(handle: Any, reached: tuple[float, float, float], k: int, outcome: in
     stored = stored_energy(handle.table, depth) if at.next != 0.0 else 0.0
     energy += stored
     if outcome == data.CONVERGED and laid == 0:
-        outcome = account(handle, k, (depth, roll, energy), used)
+        outcome = account(handle, k, (depth, roll, energy), used, other)
     elif outcome == data.CONVERGED and handle.report[0].pivot < tol.CRITICAL:
         at.calm = 0.0
     if laid > 0 or outcome == data.CONVERGED:

@@ -13,7 +13,7 @@ from solver._kernels.chain import segments_at
 from solver._kernels.data import CONVERGED, CURRENT, LAST_GOOD, ROUGH, Problem
 from solver._kernels.flags import inlined, merged
 from solver._kernels.forces import push_force
-from solver._kernels.forks import farthest, may_fork, other_side
+from solver._kernels.forks import farthest
 from solver._kernels.friction import friction_loss
 from solver._kernels.minimise import NEWTON
 from solver._kernels.shaft import loss_by_turning
@@ -42,10 +42,11 @@ class Books(NamedTuple):
 
 
 @merged
-def account(handle: Any, k: int, reached: tuple[float, float, float], used: int) -> int:
+def account(handle: Any, k: int, reached: tuple[float, float, float], used: int, other: float) -> int:
     """Hold the hand's work in a step against the wire's energy; ROUGH where a shorter step may lead elsewhere.
 
     reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
+    other : how far off another side lies, mm.
     """
     problem, at, report, introducer = handle.problem, handle.place[0], handle.report[0], handle.introducer
     books, pending = balance(handle, k, reached), not math.isnan(at.seen_depth)
@@ -63,7 +64,6 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
     # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
     if snapped and min(handle.report[1].pivot, report.pivot) > tol.SOFT:
         at.seen_pivot = math.inf
-    other = other_side(handle, k) if may_fork(problem, at, report, moved > tol.FURTHER * books.way) else 0.0
     if snapped or other > 0.0:
         note_snap(problem, at, (moved, other), (reached[0], books.missing))
     trust(handle, k, reached, doubtful and (moved > tol.ELSEWHERE_MM or at.resigned > 0.0))
@@ -71,6 +71,22 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int)
         at.calm = at.seen_calm = tol.CALM_MM - tol.UNDECIDED_MM
     at.push, at.torque, at.pull, at.dissipated = books.push, books.torque, books.pull, at.dissipated + books.lost
     return CONVERGED
+
+
+@merged
+def may_fork(handle: Any, k: int, depth: float, used: int) -> bool:
+    """Whether the other side of a step to a depth is worth a look.
+
+    Not where the way down was never unstable, where no joint moved by more than the hand, and where a soft wire is in
+    doubt already.
+    """
+    problem, at = handle.problem, handle.place[0]
+    if problem.scratch.descent[0].forked == 0 or used <= tol.SWIFT:
+        return False
+    if handle.report[0].pivot < tol.SOFT and at.calm < tol.CALM_MM:
+        return False
+    way = max(abs(depth - at.inserted), abs(at.next - at.catheter))
+    return bool(way_of_joints(problem, at, k, handle.table.segment) > tol.FURTHER * way)
 
 
 @merged

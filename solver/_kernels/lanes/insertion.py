@@ -13,6 +13,7 @@ from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
+from solver._kernels.forks import other_side
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lanes.block import Block
 from solver._kernels.lanes.decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
@@ -21,6 +22,7 @@ from solver._kernels.lanes.start import Desk, chosen_start
 from solver._kernels.lanes.vectors import WIDTH, in_lanes
 from solver._kernels.minimise import begin, shape_of
 from solver._kernels.newton_method import rests
+from solver._kernels.snaps import may_fork
 
 
 class Plan(NamedTuple):
@@ -169,8 +171,11 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
     if me.k > 0 and me.outcome == data.CONVERGED:
         me.outcome = shape_of(problem, CURRENT, me.k)
-    me.iterations += now.iterations
-    outcome = settle(wire, (me.depth, me.roll, now.energy), me.k, me.outcome, 0, now.iterations)
+    energy, used = now.energy, now.iterations  # another relaxation writes over them
+    me.iterations += used
+    forks = me.k > 0 and me.outcome == data.CONVERGED and may_fork(wire, me.k, me.depth, used)
+    other = other_side(wire, me.k) if forks else 0.0
+    outcome = settle(wire, (me.depth, me.roll, energy), me.k, me.outcome, 0, used, other)
     goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
 
