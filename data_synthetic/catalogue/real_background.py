@@ -34,17 +34,11 @@ def background_scene(path: str | Path, voxel_mm: float | None = None) -> NamedSc
     """
     values, grid = read_scan(Path(path), voxel_mm)
     try:
-        vessel = find_vessel(values, grid)
-        way, what = find_way(vessel.voxels, grid), ""
-        values = (values - np.float32(vessel.background)) * np.float32(1.0 / (vessel.grey - vessel.background))
-        wall: Wall | None = _wall(values, grid, vessel.voxels, way)
-    except ValueError:
-        try:
-            values, way = paint_vessel(values, grid)
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
-        wall, what = None, " and a made-up vessel, since none was found,"
-    stretched = np.float32(VESSEL_GREY) * values
+        shown, way, wall = _ground(values, grid)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    what = " and a made-up vessel, since none was found," if wall is None else ""
+    stretched = np.float32(VESSEL_GREY) * shown
 
     def plan(_rng: np.random.Generator, frames: int) -> Setup:
         return _plan(grid, way, wall, frames)
@@ -80,6 +74,19 @@ def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
     if not np.all(np.isfinite(values)) or values.min() == values.max():
         raise ValueError(f"{path}: its grey values are NaN, infinite or all alike; allowed: a scan that shows a vessel")
     return values, ScanGrid(values.shape, spacing, np.array(image.GetOrigin()), direction)
+
+
+def _ground(values: Volume, grid: ScanGrid) -> tuple[Volume, Tube, Wall | None]:
+    """The scan with its vessel at 1 and what is around it at 0, the way through it, and its wall; no wall where the
+    vessel had to be painted, whose way is the wall, too. ValueError where there is no room for one.
+    """
+    try:
+        vessel = find_vessel(values, grid)
+        way = find_way(vessel.voxels, grid)
+    except ValueError:
+        return *paint_vessel(values, grid), None
+    shown = (values - np.float32(vessel.background)) * np.float32(1.0 / (vessel.grey - vessel.background))
+    return shown, way, _wall(shown, grid, vessel.voxels, way)
 
 
 def _plan(grid: ScanGrid, way: Tube, wall: Wall | None, frames: int) -> Setup:
