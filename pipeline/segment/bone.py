@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipeline.arrays.grids import indices_of
 from pipeline.segment.contact import Contact, named
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
 from solver.grid import Grid
@@ -30,10 +31,12 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     limit = levels.outside + BRIGHTER * levels.contrast
     box = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
     bright = (distance.values < SEEN_VOXELS * h) & (scan.values[box] > limit)
-    near = np.argwhere(bright)
+    near = indices_of(bright)
+    # most of what noise lifts above the limit is nothing: what is left lies in a far smaller box
+    surely = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
+    bright[tuple(near.T)], near = surely, near[surely]
     if len(near) == 0:
         return ()
-    bright[tuple(near.T)] = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
     first = np.maximum(near.min(axis=0) - THICK, 0)
     part = tuple(slice(a, b + 1 + THICK) for a, b in zip(first, near.max(axis=0), strict=True))
     places = _places(bright[part], distance.values[part] < AT_WALL_VOXELS * h)
@@ -50,9 +53,12 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
 
 def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple[int, NDArray[np.float64]]]:
     """Voxels at the wall, and their middle, of each bright thing that is thick enough."""
+    thick_ones = ndimage.binary_erosion(bright, iterations=THICK, border_value=1)
+    touched = indices_of(bright & at_wall)
+    if len(touched) == 0 or not thick_ones.any():
+        return []
     numbers, _ = ndimage.label(bright, np.ones((3, 3, 3)))
-    thick = np.unique(numbers[ndimage.binary_erosion(bright, iterations=THICK, border_value=1)])
-    touched = np.argwhere(bright & at_wall)
+    thick = np.unique(numbers[thick_ones])
     of = numbers[tuple(touched.T)]
     groups = [touched[of == n] for n in thick if n]
     return [(len(g), g.mean(axis=0)) for g in groups if len(g)]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import indices_of, spread
 from pipeline.model import Counters
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
@@ -149,10 +149,10 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     depth, core = _deepest(off_wall)
     limit = _brightest(distance, corner, levels, blur_mm)
     some = core[:: max(1, len(core) // 500)]
-    foreign = float(np.mean(grey_around(scan, np.argwhere(inside)[some] + corner) > limit))
+    foreign = float(np.mean(grey_around(scan, indices_of(inside)[some] + corner) > limit))
     if foreign > BRIGHT_SHARE:
         some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
-        some = some[grey_around(scan, np.argwhere(inside)[some] + corner) <= limit]
+        some = some[grey_around(scan, indices_of(inside)[some] + corner) <= limit]
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
         levels = replace(levels, brightest=limit, foreign=foreign)

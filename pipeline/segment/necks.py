@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import indices_of
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.solids import cones
@@ -151,7 +152,7 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
     if len(large) < 2:
         return []
     necks: list[Array] = []
-    pieces = sorted((np.argwhere(numbers == n) + corner for n in large), key=len, reverse=True)
+    pieces = sorted((indices_of(numbers == n) + corner for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]
     while left:
         tree = cKDTree(whole)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import indices_of
 from pipeline.arrays.jets import Blurred, smooth_voxels
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import FULL as FULL_STRENGTH
@@ -160,7 +161,7 @@ def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_
 
 def add_balls(distance: NDArray[np.float32], spacing: Array, found: Balls, outer_mm: float) -> None:
     """Lower the signed distance to that of the union with the balls that hang together with the vessel."""
-    vessel = np.argwhere(distance < 0).astype(float)
+    vessel = indices_of(distance < 0).astype(float)
     centre, radius = found
     if len(radius) == 0 or len(vessel) == 0:
         return

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import indices_of, spread
 from pipeline.segment.levels import GreyLevels, Index, Region
 from solver.grid import Array, Grid, read_only
 
@@ -54,7 +54,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     high = np.minimum(index.max(axis=0) + margin + 1, grid.shape)
     inside = np.zeros(tuple(high - low), bool)
     inside[tuple((index - low).T)] = True
-    core = np.argwhere(ndimage.binary_erosion(inside, iterations=CORE))
+    core = indices_of(ndimage.binary_erosion(inside, iterations=CORE))
     shape = tuple(-(-inside.shape[a] // BLOCK) for a in range(3))
     if len(core) == 0:
         return Filling(np.ones(shape), low, 1.0)
