@@ -16,8 +16,9 @@ from pipeline.trace.explain import explained, missed_mm
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracted
 from pipeline.trace.verdict import near_rotation_plane
+from pipeline.trace.whose_end import DIM_FROM_TIP, cleared
 
-__all__ = ["of_catheter", "of_length", "trace"]
+__all__ = ["DIM_FROM_TIP", "cleared", "of_catheter", "of_length", "trace"]
 
 BACK_END = explained
 """How the curve is found: (subtraction, entry, previous, config) -> Curve."""
@@ -93,8 +94,11 @@ CATHETER_END_MM = 1.0
 def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     """The curve; one that ends with a stated catheter, whose tip may hide where the wire ends, is not to be trusted.
 
-    For frames without a stated depth: where there is one, it says which of the two was traced.
+    One that gets dimmer where the catheter ends is no longer doubted for that. For frames without a stated depth: where
+    there is one, it says which of the two was traced.
     """
+    if abs(curve.length_mm - curve.levels.get(DIM_FROM_TIP, np.inf) - catheter_mm) < CATHETER_END_MM:
+        curve = cleared(curve)
     if curve.status is not FrameStatus.OK or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
         return curve
     note = f"trace: length: got {curve.length_mm:.2f} mm, where the catheter ends ({catheter_mm:.2f} mm); "

@@ -9,12 +9,13 @@ from pipeline.arrays.jets import gaussian_taps, smooth_voxels
 from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Curve
 from pipeline.status import FrameStatus
-from pipeline.trace.attempt import ENTRY_REACH_MM, dense
+from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
 from pipeline.trace.onward import FAINTEST, TANGENT_MM
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
+from pipeline.trace.whose_end import nothing_beyond, of_one_device
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -61,3 +62,11 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     got, allowed = "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it"
     do = "look whether the wire's end is fainter than the rest; scan with more dose"
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+
+
+def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
+    """The curve of an attempt with the first of all doubts, if there is any, as its status."""
+    curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
+    if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
+        return curve
+    return of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))

@@ -25,7 +25,7 @@ from pipeline.trace.attempt import (
 )
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.crests import SEED_SIGMAS, STRICT_BEND
-from pipeline.trace.doubts import ends_in_nothing, faint_for_its_noise, no_wire
+from pipeline.trace.doubts import doubted, no_wire
 from pipeline.trace.noise import inflation
 from pipeline.trace.subtraction import Subtraction, levelled
 from pipeline.trace.tube import DIM_END, Tube, point_sigmas
@@ -243,4 +243,4 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
     attempt = bent(image, attempt, entry)
     if attempt is not best.attempt:
         best = _agreed(best, _read_off(image, attempt, entry)[0])
-    return ends_in_nothing(image, best.attempt.tube, faint_for_its_noise(_curve(image, best)))
+    return doubted(image, best.attempt, _curve(image, best))

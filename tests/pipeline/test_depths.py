@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.model import Curve
+from pipeline.run.log import Log
 from pipeline.run.stages.depths import in_step, shrinking
+from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.trace import _last_curve, _Part
+from pipeline.status import FrameStatus
+from pipeline.trace import DIM_FROM_TIP, of_catheter
 
 
 def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
@@ -46,3 +53,55 @@ def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:
     assert "frames 2 (-3.0 mm)" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
     assert shrinking(frames([10.0, 14.0, 13.9], nan), 0.3) == []
     assert shrinking(frames([10.0, 14.0, 11.0], [10.0, 14.0, 11.0]), 0.3) == []
+
+
+def dim(lengths: list[float], from_tip: list[float]) -> list[Frame]:
+    """Frames whose dim ends may be a catheter's."""
+    out = []
+    for frame, end in zip(frames(lengths, [float("nan")] * len(lengths)), from_tip, strict=True):
+        assert frame.curve is not None
+        curve = replace(frame.curve, status=FrameStatus.TRACE_AMBIGUOUS, note="?", levels={DIM_FROM_TIP: end})
+        out.append(replace(frame, curve=curve).failed("trace", curve.status, curve.note))
+    return out
+
+
+def test_a_dim_end_that_goes_with_the_tip_is_the_wires_own() -> None:
+    found, said = own_dim_ends(dim([20.0, 25.0, 30.0, 35.0], [8.0, 8.3, 7.9, 3.0]), 0.3)
+    assert [f.status for f in found] == ["ok", "ok", "ok", "trace_ambiguous"], "the last one has another end"
+    assert found[0].trusted_curve is not None
+    assert found[0].trusted_curve.status is FrameStatus.OK
+    assert "the last 8.0 mm" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("lengths", "from_tip"),
+    [
+        ([35.0, 35.0, 35.0, 35.0], [15.0, 10.0, 5.0, 2.0]),  # a catheter that stays while the wire is pushed
+        ([35.0, 35.2, 35.1], [8.0, 8.0, 8.0]),  # nothing was pushed
+        ([20.0, 30.0], [8.0, 8.0]),
+        ([20.0, 24.0, 28.0, 32.0, 36.0], [8.0, 8.1, 4.0, 2.0, 12.0]),
+    ],
+)
+def test_a_dim_end_that_may_be_a_catheters_stays_refused(lengths: list[float], from_tip: list[float]) -> None:
+    found, said = own_dim_ends(dim(lengths, from_tip), 0.3)
+    assert not said
+    assert not any(f.ok for f in found)
+
+
+def test_a_wire_is_dimmer_beyond_a_stated_catheter() -> None:
+    (frame,) = dim([30.0], [12.0])
+    assert frame.curve is not None
+    assert of_catheter(frame.curve, 18.3).status is FrameStatus.OK
+    assert of_catheter(frame.curve, 25.0) is frame.curve
+
+
+def test_a_frame_is_told_strands_apart_by_one_that_stands_alone() -> None:
+    """A longer device beside the wire: refused in frame 0, and ok in frame 1 for frame 0 had a curve like that."""
+    right, wrong, own_end = frames([10.0], [10.0])[0], frames([14.0], [14.0])[0], dim([18.0], [8.0])[0]
+    assert wrong.curve is not None
+    wrong = replace(wrong, curve=replace(wrong.curve, status=FrameStatus.TRACE_AMBIGUOUS))
+    lengths = [
+        round(_last_curve(len(seen), [_Part(f, None, Log(lambda *_: None)) for f in seen].__getitem__).length_mm)
+        for seen in ([wrong], [right, wrong], [right, wrong, own_end])
+    ]
+    assert lengths == [0, 10, 18]

@@ -17,12 +17,15 @@ from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.onward import seen_outside
+from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
 from pipeline.trace.subtraction import CREST_VOXELS, subtracted
 from pipeline.trace.tube import Tube, spline_through, tint_nodes
 from pipeline.trace.verdict import judge
 from pipeline.trace.ways import SURE, brightest
-from tests.studies.seeing.scenes import Draft
+from pipeline.trace.whose_end import dim_from_tip_mm
+from tests.studies.seeing.render import arc_of
+from tests.studies.seeing.scenes import CASES, Draft
 from tests.studies.seeing.table import look
 
 
@@ -36,7 +39,7 @@ from tests.studies.seeing.table import look
         ("platinum coil tip, x 3 to 10", 4),
         ("platinum coil tip, x 3 to 10", 450),  # 2 voxels too long: a last piece of no brightness
         ("marker band before the tip", 2),
-        ("dim distal part, x 0.15 to 0.2", 518),
+        ("dim distal part, opacity stated", 518),
         ("gap of 5 to 8 mm, 2 to 4 mm of tip beyond", 341),  # its tip behind the plane of entry was not fitted
         ("plain, no reference", 347),  # once cut by 7.5 mm, and ok
         ("plain, no reference", 623),  # bends cut short by knots 13 voxels apart, its tip 1.7 voxels off, and ok
@@ -77,6 +80,9 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("tip folded back on itself", 632, "TRACE_AMBIGUOUS"),  # 7 mm of it in contact, hardly out of round, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
         ("correlated noise, CNR 4 to 6", 470, "TRACE_AMBIGUOUS"),  # began 3.0 mm beyond its entry, and ok
+        ("a catheter that reaches beyond the wire", 2, "TRACE_AMBIGUOUS"),  # 13 mm of it taken for wire, and ok
+        ("a catheter that reaches beyond the wire", 3, "TRACE_AMBIGUOUS"),  # the same, with a marker at its end
+        ("a marker at the tip, beyond 5 to 15 mm unseen", 5, "TRACE_AMBIGUOUS"),  # cut by 16 mm, and ok
         ("no wire, no reference", 421, "TRACE_LOW_CONTRAST"),  # 2 mm of noise, narrower than the scanner can see
     ],
 )
@@ -86,6 +92,33 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
     if case.startswith("no wire"):
         assert "the frame shows none" in FrameStatus[status].value, "in noise something thin is always found"
         assert "check that the frame shows a wire" in row.text
+
+
+def test_a_dim_end_may_be_a_catheters_unless_the_depth_is_stated():
+    case, seed = "dim distal part, x 0.15 to 0.2", 518
+    assert "state the wire's opacity if its end is so" in look(case, seed).text
+    wire = CASES[case](np.random.default_rng([seed, list(CASES).index(case)]), seed).wire
+    row = look(case, seed, expected_mm=float(arc_of(wire)[-1]))
+    assert row.verdict == "right", row.text
+
+
+@pytest.mark.parametrize(
+    ("levels", "edges", "from_tip"),
+    [
+        ([1.0, 0.3], [20.0], 10.0),
+        ([1.0, 0.3, 1.5], [20.0, 29.0], 10.0),  # with a marker at its end
+        ([0.2, 1.0, 0.15], [10.0, 20.0], 10.0),  # beyond a coil of platinum
+        ([1.0, 2.5, 1.0], [26.0, 27.0], 0.0),  # a marker band
+        ([1.6, 1.0], [10.0], 0.0),  # a wire that comes out of a catheter
+        ([1.0, 0.2, 1.0], [12.0, 14.0], 0.0),  # a stenosis that no reference shows
+        ([1.0, 0.05, 1.0], [20.0, 29.0], 0.0),  # a gap
+        ([0.2, 1.0], [10.0], 0.0),
+    ],
+)
+def test_only_what_is_dimmer_than_the_body_up_to_the_end_may_be_a_catheters(levels, edges, from_tip):
+    steps = Steps(np.array(edges) / 30.0, np.array(levels))
+    assert dim_from_tip_mm(steps, 30.0, 0.3) == pytest.approx(from_tip)
+    assert dim_from_tip_mm(replace(steps, stated=True), 30.0, 0.3) == 0.0
 
 
 def test_a_dim_end_is_not_drawn_outwards_by_an_offset_common_to_bright_and_dim():

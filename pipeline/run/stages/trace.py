@@ -17,13 +17,14 @@ from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.depths import in_step, shrinking
+from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
-from pipeline.trace import of_catheter, of_length, trace
+from pipeline.trace import cleared, of_catheter, of_length, trace
 
 
 def trace_frames(run: Context, known: Known) -> Known:
@@ -41,7 +42,9 @@ def trace_frames(run: Context, known: Known) -> Known:
     for part in parts:
         run.log.add(part.log)
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
-    frames = in_step([part.frame for part in parts], voxel_mm)
+    frames, assumed = own_dim_ends([part.frame for part in parts], voxel_mm)
+    run.log.assumptions += assumed
+    frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
@@ -139,9 +142,9 @@ def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
 
 
 def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
-    """The curve of the last frame before this one that has any."""
-    curves = (earlier(k).frame.curve for k in reversed(range(number)))
-    return next((curve for curve in curves if curve is not None and len(curve.points_mm)), NOTHING)
+    """The curve of the last frame before this one that stands: it is to say which of two strands is the wire's."""
+    curves = (cleared(curve) for k in reversed(range(number)) if (curve := earlier(k).frame.curve) is not None)
+    return next((curve for curve in curves if curve.status is FrameStatus.OK and len(curve.points_mm)), NOTHING)
 
 
 def _traced(frame: Frame, curve: Curve) -> Frame:

@@ -398,3 +398,24 @@ def slices_stated(rng, seed):
     d = Draft(rng, length=60.0, spacing=(0.5, 0.5, 2.0), radius=3.5, wire_radius=0.3)
     d.stated["expected_mm"] = float(r.arc_of(d.path[d.entry_at :])[-1] + rng.normal(scale=0.5))
     return d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)
+
+
+@case("a catheter that reaches beyond the wire")
+def catheter_beyond(rng, seed):
+    d = Draft(rng)
+    whole, tip = d.path, len(d.path) - round(rng.uniform(2.0, 15.0) / 0.05)
+    d.path, d.opacity = whole[:tip], np.ones(tip)
+    radius, level = rng.uniform(0.3, 0.55), rng.uniform(0.08, 0.25)
+    d.others = [(whole, radius, level)]
+    if seed % 2:  # with a marker at its end
+        d.others.append((whole[-30:-10], radius, 0.6))
+    return d.scan((8, 16)[seed // 2 % 2])
+
+
+@case("a marker at the tip, beyond 5 to 15 mm unseen")
+def lone_marker(rng, seed):
+    d = Draft(rng)
+    size = rng.uniform(5.0, 15.0)
+    d.opacity = np.where((d.from_tip > 1.0) & (d.from_tip < 1.0 + size), 0.0, 1.0)
+    whole = r.arc_of(d.path[d.entry_at :])[-1]
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 3, gaps=((whole - 1.0 - size, whole - 1.0),))

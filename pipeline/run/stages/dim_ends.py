@@ -1,0 +1,48 @@
+"""Dim ends of traced wires that frames at several depths agree on: those are the wire's own, and no catheter's."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.run.stages.known import Frame
+from pipeline.status import FrameStatus
+from pipeline.trace import DIM_FROM_TIP, cleared
+
+FEWEST = 3
+"""Frames that must agree."""
+AGREE_VOXELS = 3.0
+"""How much their dim ends may differ in length: where a step is told from a dim end it is 1 voxel off, the tip 1.75."""
+MOVED_MM = 5.0
+"""By how much the wire must have been pushed between the first and the last of them."""
+
+
+def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
+    """The frames, without the doubt that their dim end may be a catheter's where they all have one; and what was
+    assumed.
+
+    A catheter that stays where it is shows less of itself the further the wire is pushed.
+    """
+    out = list(frames)
+    doubted = [i for i, f in enumerate(out) if f.curve is not None and DIM_FROM_TIP in f.curve.levels]
+    curves = [curve for i in doubted if (curve := out[i].curve) is not None]
+    if not curves:
+        return out, []
+    dim, length = (np.array(v) for v in zip(*((c.levels[DIM_FROM_TIP], c.length_mm) for c in curves), strict=True))
+    usual = float(np.median(dim))
+    agreed = np.abs(dim - usual) < AGREE_VOXELS * voxel_mm
+    if agreed.sum() < max(FEWEST, len(dim) / 2) or np.ptp(length[agreed]) < MOVED_MM:
+        return out, []
+    usual = float(np.median(dim[agreed]))
+    for n in np.flatnonzero(agreed):
+        good = FrameStatus.OK
+        frame = out[doubted[n]]
+        out[doubted[n]] = replace(
+            frame, curve=cleared(curves[n]), status=good.identifier, sentence=good.value, stage="", message=""
+        )
+    said = (
+        f"the last {usual:.1f} mm of the wire are far dimmer than the rest in {int(agreed.sum())} frames, at depths of "
+        f"{length[agreed].min():.1f} to {length[agreed].max():.1f} mm: taken for the wire's own end; were it a "
+        "catheter's that was pushed with the wire, the tip would lie there"
+    )
+    return out, [said]

@@ -1,0 +1,104 @@
+"""Is what a curve ends with the wire's end? A catheter may reach beyond it, and a marker may lie beyond what is seen.
+
+Asked of frames without a stated depth alone: where there is one, it says where the wire ends.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.arrays.jets import gaussian_taps, smooth_voxels
+from pipeline.model import Array, Curve
+from pipeline.status import FrameStatus
+from pipeline.trace.attempt import dense, tube_length
+from pipeline.trace.profile import BAND_VOXELS, LEAST_LEVEL, UNEVEN, Steps
+from pipeline.trace.region import voxels_of
+from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.tube import Tube
+from pipeline.trace.verdict import note_of
+
+MARK_BLUR = 1.0
+"""Voxels by which grey is blurred where a mark is looked for: half as wide as a band of 1 mm is long."""
+MARK_SHARE, MARK_SIGMAS = 0.5, 8.0
+"""Share of the wire's own height, and standard deviations of noise, from which something is a mark."""
+MARK_VOXELS, MARK_OFF = 4, 4.0
+"""Voxels that it has at the least, and how many it lies off the tip: what is nearer is the tip's own."""
+BODY_MM = 3.0
+"""Length from which a piece is the wire's body, and no marker band."""
+DIM_FROM_TIP = "dim_from_tip_mm"
+"""Level of a curve that is doubted for a dim part alone: how far from its end that part begins."""
+
+
+def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
+    """How far beyond the tip (mm) the lumen holds something as bright as the wire; 0 for nowhere.
+
+    Crests are too long for a band of 1 mm that lies behind a stretch that nobody sees.
+    """
+    h, blur = image.voxel, MARK_BLUR * image.voxel
+    voxels = voxels_of(image.region.runs)
+    at = tuple(voxels.T)
+    least = MARK_SHARE * tube.peak
+    voxels = voxels[(image.grey[at] > least) & (image.region.box.values[at] < -h)]
+    flat = np.ravel_multi_index(tuple(voxels.T), image.grey.shape)
+    seen = smooth_voxels(image.grey, gaussian_taps(MARK_BLUR), flat)
+    least *= tube.sigma**2 / (tube.sigma**2 + blur**2)
+    found = voxels[seen > max(least, MARK_SIGMAS * image.noise_in(MARK_BLUR))] * image.spacing
+    if len(found) < MARK_VOXELS:
+        return 0.0
+    away, nearest = (np.asarray(part) for part in cKDTree(line).query(found))
+    beyond = away[(nearest == len(line) - 1) & (away > MARK_OFF * h)]
+    return float(beyond.min()) if len(beyond) >= MARK_VOXELS else 0.0
+
+
+def nothing_beyond(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where something as bright as the wire lies in the lumen beyond its tip."""
+    with image.showing(tube.voxels, tube.rest):
+        away_mm = _marks_beyond(image, tube, dense(tube, 0.5 * image.voxel))
+    if not away_mm:
+        return curve
+    got = f"something as bright as the wire in the lumen {away_mm:.1f} mm beyond its tip"
+    do = "look whether that is a marker at the wire's end, or another device; state insertion_mm"
+    note = note_of(got, "a tip with nothing beyond it", do)
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
+
+
+def dim_from_tip_mm(steps: Steps, length_mm: float, voxel: float) -> float:
+    """How far from the end of a line begins what is far dimmer than the body before it, to the end; 0 for nothing.
+
+    A catheter of up to 1.2 times the wire's own brightness is so where the wire within it has ended; where a wire
+    comes out of such a one, the line is dimmer by less. What is dimmer than LEAST_LEVEL is a gap; and where the line is
+    body again for longer than a marker is, nothing has ended.
+    """
+    if steps.stated:
+        return 0.0
+    starts = np.concatenate([[0.0], steps.edges]) * length_mm
+    body, first = 0.0, length_mm
+    for start, size, level in zip(starts, np.diff(starts, append=length_mm), steps.levels, strict=True):
+        if level < UNEVEN[0] * body:
+            dim = level > LEAST_LEVEL and size > BAND_VOXELS * voxel
+            first = min(first, float(start)) if dim else first
+        elif size > BODY_MM:
+            body, first = float(level), length_mm
+    return length_mm - first
+
+
+def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve, or the same as ambiguous where its last part may be a catheter's that reaches beyond the wire.
+
+    Frames at other depths tell: a wire's own dim end stays as long, what a catheter shows beyond the wire does not.
+    """
+    from_tip = dim_from_tip_mm(tube.steps, tube_length(tube), image.voxel)
+    if not from_tip or curve.status is not FrameStatus.OK:
+        return curve
+    got = f"a line whose last {from_tip:.1f} mm are far dimmer than what is before"
+    do = "state the wire's opacity if its end is so, insertion_mm, or the catheter and its insertion_mm"
+    note = note_of(got, "one brightness, or frames at other depths that show the same end", do)
+    return replace(
+        curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels={**curve.levels, DIM_FROM_TIP: from_tip}
+    )
+
+
+def cleared(curve: Curve) -> Curve:
+    """A curve that was doubted for its dim part alone, without that doubt; any other as it is."""
+    return replace(curve, status=FrameStatus.OK, note="") if DIM_FROM_TIP in curve.levels else curve
