@@ -19,7 +19,7 @@ class FrameStatus(Enum):
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = (
         "nothing here stands out of the noise enough to be called the wire: the frame shows none, or too faintly; "
-        "check that it shows one, then give the frame before, or scan with more dose"
+        "check that it shows one, then list a frame of a smaller depth before it, or scan with more dose"
     )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
     TRACE_WRONG_WAY = (

@@ -22,7 +22,8 @@ WRONG = (
     "[[1, 2, 3, 4]]", '[1, "x", 3]', "[nan, nan, nan]", "-1", "nan", "inf", "1e30", "2.5", "1979-05-27",
 )  # fmt: skip
 FOREIGN = re.compile(
-    r"Input|\bvalid\b|function|[Tt]uple|list\[|[Ll]iteral|instance|should|dictionary|Value error|datetime|\bNone\b|\bnull\b"
+    r"Input|\bvalid\b|function|[Tt]uple|list\[|[Ll]iteral|instance|should|dictionary|Value error|datetime"
+    r"|\bNone\b|\bnull\b"
 )
 WIRE = {"radius_mm": "0.18", "bending_stiffness_N_mm2": "1.0"}
 CASE = {

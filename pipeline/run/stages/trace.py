@@ -48,7 +48,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.assumptions += assumed
     run.log.warnings += doubtful
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
-    lumen = opened(known.lumen, curves, run.case.wire.radius_mm)
+    lumen = opened(known.lumen, curves, run.case.wire.radius_mm, given=run.case.lumen is not None)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
     return replace(known, frames=tuple(frames), lumen=lumen)
 
