@@ -467,6 +467,36 @@ def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.C
         manifest.write_text(text.replace('"frames/*.mha"', json.dumps(listed)), encoding="utf-8")
         assert main(["check", str(both)]) == 2
         assert said in capsys.readouterr().err
+    manifest.write_text(
+        text.replace("broken/", "frames/").replace('id = "second"', 'id = "second"\ngroup = "bifurcation"')
+    )
+    assert main(["check", str(both)]) == 0
+    assert "its frame counts twice" in capsys.readouterr().out
+
+
+def test_a_frame_under_two_names_counts_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A copy is refused at the door; the same voxels in another file are told when they are read."""
+    folder, out = tmp_path / "study", tmp_path / "out"
+    shutil.copytree(study, folder)
+    first, *_, last = sorted((folder / "frames").iterdir())
+    own = last.read_bytes()
+    shutil.copy(first, last)
+    assert main(["check", str(folder)]) == 2
+    assert f"{last}: has the content of {first}; a frame counts once" in capsys.readouterr().err
+    shutil.copy(folder / "reference.mha", last)
+    assert run(folder, out) == 2
+    assert "has the content of the reference" in capsys.readouterr().err
+    last.write_bytes(own)
+    sitk.WriteImage(sitk.Cast(sitk.ReadImage(str(first)), sitk.sitkFloat32), str(folder / "frames" / "frame_001b.nrrd"))
+    manifest = folder / "manifest.toml"
+    kept = [line for line in manifest.read_text(encoding="utf-8").splitlines() if not line.startswith(("ins", "tru"))]
+    manifest.write_text("\n".join(kept).replace("frames/*.mha", "frames/*"), encoding="utf-8")
+    assert main(["check", str(folder)]) == 0
+    assert run(folder, out, "--until", "compare") == 1
+    assert "repeated: it has the voxels of frame 0" in capsys.readouterr().err
+    errors = tables.read(out / "cases" / "bifurcation" / "errors.csv", ERRORS)
+    assert list(errors["status"]).count("repeated") == 1
+    assert pd.read_csv(out / "overall.csv")["frames_ok"].item() == FRAMES
 
 
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
