@@ -3,10 +3,12 @@
 import filecmp
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from itertools import combinations
 from pathlib import Path
 
-from pipeline.load import Source
+from pipeline.load import LoadError, Source
+from pipeline.load.guard import size_of
 from pipeline.study.manifest import Case
 
 SAMPLE_BYTES, SAMPLES = 4096, 8
@@ -40,8 +42,9 @@ def _of_one_content(paths: Iterable[Path]) -> Iterator[tuple[Path, Path]]:
     """Pairs of regular files with the same content; of several the first with each of the others."""
     alike: dict[tuple[int, bytes], list[Path]] = defaultdict(list)
     for path in paths:
-        if path.is_file():
-            alike[path.stat().st_size, _sample(path)].append(path)
+        with suppress(LoadError, OSError):  # a folder, or what cannot be read: the reader says so
+            size = size_of(path)
+            alike[size, _sample(path, size)].append(path)
     found: set[Path] = set()
     for group in alike.values():
         for first, second in combinations(group, 2):
@@ -50,9 +53,8 @@ def _of_one_content(paths: Iterable[Path]) -> Iterator[tuple[Path, Path]]:
                 yield first, second
 
 
-def _sample(path: Path) -> bytes:
+def _sample(path: Path, size: int) -> bytes:
     """A few short pieces of a file, evenly through it, which tell two scans apart without reading them."""
-    size = path.stat().st_size
     with path.open("rb") as file:
         pieces = []
         for n in range(SAMPLES):

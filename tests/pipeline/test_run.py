@@ -800,7 +800,9 @@ def test_a_failed_frame_names_its_scan(study: Path, tmp_path: Path, capsys: pyte
     folder = tmp_path / "study"
     shutil.copytree(study, folder)
     frames = sorted((folder / "frames").iterdir())
-    shutil.copy(folder / "reference.mha", frames[1])  # no wire
+    empty = sitk.ReadImage(str(folder / "reference.mha"))
+    empty[0, 0, 0] += 1  # a scan of its own
+    sitk.WriteImage(empty, str(frames[1]))
     assert run(folder, tmp_path / "out", "--until", "trace") == 1
     assert f"(scan {frames[1].name})" in capsys.readouterr().err
     rows = pd.read_csv(tmp_path / "out" / "failures.csv").set_index("frame")
