@@ -125,12 +125,19 @@ def _main(argv: Sequence[str] | None) -> int:
         return complain([str(error)], COMMAND_LINE)
     except KeyboardInterrupt as why:
         number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
-        kept = "; what is finished is kept, the same command goes on from there"
-        print("\ninterrupted" + kept * (args.command in ("run", "score")), file=sys.stderr)
+        print("\ninterrupted" + _kept(args), file=sys.stderr)
         return 128 + number
     except WriteError as error:
         print(error, file=sys.stderr)
         return FAILED
+
+
+def _kept(args: argparse.Namespace) -> str:
+    """What of an interrupted command is left, and how it goes on."""
+    if getattr(args, "command", None) not in ("run", "score") or getattr(args, "dry_run", False):
+        return ""
+    again = "the same command without --fresh" if args.fresh else "the same command"
+    return f"; what is finished is kept, {again} goes on from there"
 
 
 if __name__ == "__main__":

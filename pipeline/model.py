@@ -10,10 +10,11 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, WithJsonSchema
 
 from pipeline.ranges import FiniteProfile, NonNegative, Number, OpacityProfile, Positive, PositiveProfile, Radius
 from pipeline.status import FrameStatus
+from pipeline.wording import WRITTEN_HERE
 from solver.grid import Grid, read_only
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Wire:
     """A guide wire. Profiles are functions of the distance from the tip (mm): one number, or pairs."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
-    name: str
+    name: Annotated[str, WithJsonSchema(WRITTEN_HERE)]
     radius_mm: Radius
     bending_stiffness_N_mm2: PositiveProfile
     rest_curvature_per_mm: FiniteProfile = 0.0
@@ -44,7 +45,7 @@ class OverWire:
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     bending_stiffness_N_mm2: NonNegative
     radius_mm: Radius
-    insertion_mm: NonNegative | tuple[NonNegative, ...]
+    insertion_mm: NonNegative | Annotated[tuple[NonNegative, ...], Field(min_length=1)]
 
 
 @dataclass(frozen=True)

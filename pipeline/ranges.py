@@ -1,22 +1,18 @@
-"""Kinds of values that users may give; pydantic refuses any other at the door, naming the place and what was found."""
+"""Kinds of values that users may give; any other is refused at the door, in the words of ``pipeline.wording``."""
 
 import math
 from functools import partial
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
 
 def _number(value: Any) -> Any:
     """The value itself; an error for a text or a truth value, which pydantic would take for a number."""
     if isinstance(value, (bool, str)):
-        raise ValueError("Input should be a valid number, not in quotes, true or false")
+        raise PydanticCustomError("number", "no number")
     return value
-
-
-def reason(said: str) -> str:
-    """Why a value is refused: what pydantic says, without the kind of its error."""
-    return said.removeprefix("Value error, ").replace("Input should be", "expected")
 
 
 Number = BeforeValidator(_number)
@@ -42,6 +38,18 @@ Vector = tuple[Finite, Finite, Finite]
 _Plain = Annotated[float, Number]
 Profile = _Plain | list[tuple[_Plain, _Plain]]
 """A number for the whole wire, or pairs (distance from the tip in mm, value), linear between, constant beyond."""
+_PROFILE = WithJsonSchema(
+    {
+        "anyOf": [
+            {"type": "number"},
+            {
+                "type": "array",
+                "items": {"type": "array", "prefixItems": [{"type": "number"}] * 2, "minItems": 2, "maxItems": 2},
+                "$comment": "pairs [[distance from the tip in mm, number], ...]",
+            },
+        ]
+    }
+)
 
 
 def _not_zero(value: Vector) -> Vector:
@@ -55,23 +63,22 @@ def _unit(value: Vector) -> Vector:
     return value[0] / size, value[1] / size, value[2] / size
 
 
-def _checked(value: Profile, info: ValidationInfo, *, lowest: float, highest: float) -> Profile:
-    name = info.field_name
+def _checked(value: Profile, *, lowest: float, highest: float) -> Profile:
     pairs = [(0.0, value)] if isinstance(value, (int, float)) else value
     if not pairs:
-        raise ValueError(f"{name}: an empty profile; give a number or [[distance from tip mm, value], ...]")
+        raise ValueError("an empty profile; give a number or [[distance from tip mm, value], ...]")
     distances = [s for s, _ in pairs]
     if distances != sorted(distances) or not 0 <= distances[0] <= distances[-1] < math.inf:
-        raise ValueError(f"{name}: distances from the tip {distances} must be >= 0 and must not decrease")
+        raise ValueError(f"distances from the tip {distances} must be >= 0 and must not decrease")
     if any(not lowest <= v <= highest for _, v in pairs):
         above = "" if lowest < 0 else " and above 0"
-        raise ValueError(f"{name}: values {[v for _, v in pairs]} must be finite{above}, at most {highest:g}")
+        raise ValueError(f"values {[v for _, v in pairs]} must be finite{above}, at most {highest:g}")
     return value
 
 
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
 """A vector that is made to have length 1."""
-PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9))]
-OpacityProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-3, highest=1e6))]
-FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0))]
+PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9)), _PROFILE]
+OpacityProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-3, highest=1e6)), _PROFILE]
+FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0)), _PROFILE]

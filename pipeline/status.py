@@ -12,6 +12,9 @@ class FrameStatus(Enum):
     SIMULATED = "simulated only: the case has no frames to compare with"
     ROLL_FITTED = "the roll of the insertion was fitted on this frame, so that it is not scored"
     LOAD_FAILED = "the scan could not be read; the message names the file and the reason"
+    REPEATED = (
+        "the scan has the voxels of an earlier frame, and a scan counts once; take one of the two out of the case"
+    )
     SEGMENT_FAILED = "no lumen could be segmented; the message has the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
     TRACE_FAILED = "the wire could not be followed as one curve from the entry; the message has the reason"
@@ -19,7 +22,7 @@ class FrameStatus(Enum):
     TRACE_AMBIGUOUS = "the wire can be followed in more than one way here; look at the picture before using it"
     TRACE_LOW_CONTRAST = (
         "nothing here stands out of the noise enough to be called the wire: the frame shows none, or too faintly; "
-        "check that it shows one, then give the frame before, or scan with more dose"
+        "check that it shows one, then list a frame of a smaller depth before it, or scan with more dose"
     )
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
     TRACE_WRONG_WAY = (

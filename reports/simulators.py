@@ -9,11 +9,11 @@ import pandas as pd
 
 from reports import _content
 from reports.case_files import counted, find_cases, not_run_sentence, warnings_of
-from reports.figures.simulators import OURS, SimulatorFiles, leads
+from reports.figures.simulators import SimulatorFiles, leads
 from reports.html import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
-from reports.verdict import TIPS_OFF, badge, tips_off, verdict
+from reports.verdict import OURS, TIPS_OFF, badge, tips_off, verdict
 
 PAGE = "simulators.html"
 _MOST_WARNINGS = 5
@@ -32,7 +32,7 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
-        "said": [{"name": name, "link": links[name]} | _said(folder, ours) for name, folder in folders.items()],
+        "said": [{"name": name, "link": links[name]} | _said(name, folder, ours) for name, folder in folders.items()],
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
@@ -49,7 +49,7 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
+def _said(name: str, folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
     """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires."""
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
@@ -62,7 +62,7 @@ def _said(folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
         "badge": badge(
             "cases missing" if missing else "frames failed" if failed else "ok", not (missing or failed), row
         ),
-        "verdict": (counts + said if (said := verdict(row)) else "No frame of it has a result.") + aside,
+        "verdict": (counts + said if (said := verdict(row, name)) else "No frame of it has a result.") + aside,
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
 

@@ -29,9 +29,11 @@ def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
     sentence += f", 95 % interval {ends} mm" if ends else ""
     tail = number(statistics.get("p95_mm"))
     sentence += f"; 95 % of its points lie within {tail} mm." if tail != NOTHING else "."
-    return " ".join(filter(None, (sentence, *remarks(statistics), _against(statistics))))
+    return " ".join(filter(None, (sentence, *remarks(statistics, simulator), _against(statistics))))
 
 
+OURS = "wireval"
+"""Name of this package's own wire among simulators."""
 WORSE = "worse than a guess"
 NO_BETTER, NOT_SHOWN = "no better than a guess", "not shown to be better than a guess"
 TIPS_OFF = "the tips lie off"
@@ -45,17 +47,21 @@ WORSE_BELOW = -0.1
 """Skill without an interval below which a wire is worse than its rival: an rms 5 % above that one's."""
 
 
-def remarks(statistics: Mapping[str, Any]) -> list[str]:
-    """What rms_mm and skill alone do not tell, a sentence each."""
-    return [text for text in (tips_off(statistics), _unknown_roll(statistics)) if text]
+def remarks(statistics: Mapping[str, Any], simulator: str = "") -> list[str]:
+    """What rms_mm and skill alone do not tell, a sentence each. simulator : as in :func:`verdict`."""
+    return [text for text in (tips_off(statistics), _unknown_roll(statistics, simulator)) if text]
 
 
-def _unknown_roll(statistics: Mapping[str, Any]) -> str:
+def _unknown_roll(statistics: Mapping[str, Any], simulator: str) -> str:
     """That a roll which is stated does worse than none, where the wire is no better than a guess."""
     rms, unknown = (_number(statistics.get(key)) for key in ("rms_mm", "null_roll_unknown_rms_mm"))
     if standing(statistics) not in (NO_BETTER, WORSE) or not unknown < FAR_BELOW * rms:
         return ""
     mend = 'check axes (LPS or RAS) and roll; roll_deg = "fit" finds the roll of a wire that is simulated here'
+    if simulator not in ("", OURS):
+        mend = "check axes (LPS or RAS) and the roll that it was simulated with"
+    elif _number(statistics.get("frames_fitted")) > 0:
+        mend = "check axes (LPS or RAS) and the wire's tip; the roll was fitted on a frame: state it, or begin deeper"
     return f"It is worse than with an unknown roll ({number(unknown)} mm): {mend}."
 
 

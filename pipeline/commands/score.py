@@ -43,10 +43,10 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case of any simulator failed; raises InputError where the input is wrong."""
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import launch
-    from pipeline.run.simulators import OURS, side_by_side
+    from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
-    from reports.verdict import remarks
+    from reports.verdict import OURS, remarks
 
     plans = _plans(args)
     problems = [text for plan in plans.values() for text in check(plan.cases, plan.template.settings.config)]
@@ -61,7 +61,7 @@ def main(args: argparse.Namespace) -> int:
         for line in failure_lines(plan, "do what the message says, then the same command again"):
             sys.stderr.write(f"{name}: {line}\n")
         say(f"{name}: {last_line(*done[name])}")
-        for text in remarks(done[name][0].pooled):
+        for text in remarks(done[name][0].pooled, name):
             say(f"{name}: warning: {text}")
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
@@ -74,9 +74,9 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
     from pipeline.run.launch import Plan, UsageError
-    from pipeline.run.simulators import OURS
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
+    from reports.verdict import OURS
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
     if args.jobs < 1:

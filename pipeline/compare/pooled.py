@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.compare import intervals
 from pipeline.compare.metrics import OF_POINTS, rms
@@ -153,29 +154,48 @@ def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "s
 
 
 LEAST_SHARE = 0.5
-"""Of the points that a predictor must have a guess of to be the strongest: the first frame has no previous one."""
+"""Of the points that a predictor must have a guess of to be the strongest, and that all of them must have together: the
+first frame has no previous one, and no path leads to some tips."""
 
 
 def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[str, Any]:
-    """Skill against the predictor that leaves the least, of those that are told nothing of the frame; its name."""
+    """Skill against the predictor that leaves the least, of those that are told nothing of the frame; its name.
+
+    All are judged on the same frames, ``strongest_frames`` of them: whoever has no guess of the hardest one would look
+    strong, or be beaten by much, for that alone.
+    """
     depths = [
         numbers([f for f in frames if f.insertion == one], "insertion_mm") for one in {f.insertion for f in frames}
     ]
     steps = np.abs(np.concatenate([np.diff(own) for own in depths]))
     result: dict[str, Any] = {"frame_spacing_mm": float(np.median(steps)) if len(steps) else float("nan")}
-    best = {"skill_strongest": float("inf")}
-    for name in rivals():
-        nulls = points * numbers(frames, f"null_{name}_rms_mm") ** 2
-        known = np.isfinite(nulls)
-        if name == ANOTHER and known.any():
-            result["null_another_rms_mm"] = float(np.sqrt(nulls[known].sum() / points[known].sum()))
-        if points[known].sum() < LEAST_SHARE * points.sum():
-            continue
-        found = skill(frames, squares, nulls, "skill_strongest")
-        if found and found["skill_strongest"] < best["skill_strongest"]:
-            best = found
-            result["strongest_null"] = name
-    return result | (best if "strongest_null" in result else {})
+    nulls = {name: points * numbers(frames, f"null_{name}_rms_mm") ** 2 for name in rivals()}
+    if ANOTHER in nulls and np.isfinite(nulls[ANOTHER]).any():
+        known = np.isfinite(nulls[ANOTHER])
+        result["null_another_rms_mm"] = float(np.sqrt(nulls[ANOTHER][known].sum() / points[known].sum()))
+    names, common = judged({name: np.isfinite(of) for name, of in nulls.items()}, points)
+    if not names:
+        return result
+    best = min(names, key=lambda name: float(nulls[name][common].sum()))
+    found = skill(frames, squares, np.where(common, nulls[best], np.nan), "skill_strongest")
+    return result | ({"strongest_null": best, "strongest_frames": int(common.sum())} | found if found else {})
+
+
+def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:
+    """The predictors that are held against each other, and the frames (frames,) of which all of them have a guess.
+
+    known : by name, the frames of which it has one.     points : of each frame.     A predictor takes part that has
+    LEAST_SHARE of all points; while all together have less in common, the one goes that costs most of it.
+    """
+
+    def share(names: Sequence[str]) -> float:
+        together = np.all([known[name] for name in names], axis=0)
+        return float(points[together].sum() / points.sum())
+
+    names = [name for name in known if share([name]) >= LEAST_SHARE]
+    while names and share(names) < LEAST_SHARE:
+        names.remove(max(names, key=lambda name: share([other for other in names if other != name])))
+    return names, np.all([known[name] for name in names], axis=0) if names else np.zeros(len(points), bool)
 
 
 def _over_frames(rule: Callable[[Array, Array], float], values: Array, points: Array) -> float:

@@ -19,7 +19,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from pipeline.load.geometry import unusable
 from pipeline.model import Array
-from pipeline.ranges import Finite, Vector, reason
+from pipeline.ranges import Finite, Vector
+from pipeline.wording import said, sentences
 
 Row = tuple[Finite, Finite, Finite, Finite]
 
@@ -94,13 +95,13 @@ class View:
 def read_views(path: Path, count: int) -> list[View]:
     """One view for each frame; raises LoadError where the file is no such thing, or has another number of them."""
     try:
-        file = _File.model_validate(json.loads(path.read_text(encoding="utf-8")))
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise unusable(path, f"{where}: {reason(first['msg'])}") from None
+        data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise unusable(path, f"cannot be read as projections: {error}") from None
+    try:
+        file = _File.model_validate(data)
+    except ValidationError as error:
+        raise unusable(path, said(*next(sentences(error, data, _File.model_json_schema())))) from None
     if len(file.frames) != count:
         raise unusable(path, f"holds {len(file.frames)} frames for {count} depths in insertion_mm; give one for each")
     centre, leaf, fitted = np.array(file.isocentre_mm), np.array(file.leaf_mm), file.translation == "fitted"

@@ -36,6 +36,7 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
     good = sum(frame.ok for frame in planned)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
     head |= {"frames": len(planned), "frames_ok": good, "frames_failed": len(planned) - good}
+    head["frames_fitted"] = len(known.frames) - len(planned)
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     pairs = zip(errors, points, strict=True)
     scored = [Scored(row, mm, case.group) for row, mm in pairs if mm is not None and is_pooled(row, mm)]

@@ -108,6 +108,9 @@ def frames_of(found: Sequence[Found]) -> list[Scored]:
     return [frame for case in found for frame in case.frames.values()]
 
 
+COUNTED = ("frames", "frames_ok", "frames_failed", "frames_fitted")
+
+
 def overall(found: Sequence[Found]) -> dict[str, Any]:
     """The row of all validation cases, with the columns of summary.csv; empty where no frame counts."""
     used = validation(found)
@@ -115,7 +118,7 @@ def overall(found: Sequence[Found]) -> dict[str, Any]:
     if not frames:
         return {}
     rows = [case.result.summary for case in used]
-    counts = {name: sum(row.get(name) or 0 for row in rows) for name in ("frames", "frames_ok", "frames_failed")}
+    counts = {name: sum(row.get(name) or 0 for row in rows) for name in COUNTED}
     good = all(case.result.ok for case in used)
     head = {"case": ALL, "role": "validation", "status": "ok" if good else "frames_failed", **counts}
     share = within([frame.row for frame in frames], counts["frames"])

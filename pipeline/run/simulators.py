@@ -21,9 +21,8 @@ from reports.html import render_index
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, POINTS, SIMULATORS, WHERE
 from reports.simulators import render_simulators
-from reports.verdict import TIPS_OFF, tips_off
+from reports.verdict import OURS, TIPS_OFF, tips_off
 
-OURS = "wireval"
 STEPS_MM = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_BINS = 12
 Studies = Mapping[str, Sequence[Found]]

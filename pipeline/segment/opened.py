@@ -7,9 +7,9 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from pipeline.arrays.grids import in_memory_order, reorder
-from pipeline.model import Curve, Lumen
+from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
-from solver.grid import read_only
+from solver.grid import Grid, read_only
 
 OUTSIDE_VOXELS = 1.0
 """How far outside the wall a wire's axis lies before the wall is at fault: both are known to a fraction of that."""
@@ -19,10 +19,10 @@ ROOM_VOXELS = 0.5
 """Room around the wire where the lumen is opened: the error of a trace that was bridged."""
 
 
-def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float) -> Lumen:
+def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bool = False) -> Lumen:
     """The lumen with room for every trace of a wire of this radius, and a warning that says where it had none.
 
-    The lumen itself where they all lie within it.
+    The lumen itself where they all lie within it.     given : whether it was given as a file instead of segmented.
     """
     grid, axes = in_memory_order(lumen.distance)
     spacing = np.asarray(grid.spacing_mm)
@@ -30,7 +30,7 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float) -> Lumen:
     starts, ends, said = [], [], []
     for curve in curves:
         index = grid.to_index(curve.points_mm)
-        depth = map_coordinates(grid.values, index.T, order=1, mode="constant", cval=most)
+        depth = _depth(grid, index)
         out = depth > OUTSIDE_VOXELS * voxel + SIGMAS * np.nan_to_num(curve.sigma_mm)
         links = np.flatnonzero(out[:-1] | out[1:])
         starts.append((index * spacing)[links])
@@ -47,7 +47,20 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float) -> Lumen:
     text = (
         f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {len(said)} place(s), allowed "
         f"{OUTSIDE_VOXELS * voxel:.2f} and {SIGMAS:g} standard deviations; furthest at [{where}] mm; the lumen was "
-        "opened there: look whether vessel is missing, or give the lumen as a file (manifest key lumen)"
+        "opened there: look whether vessel is missing, or "
+        + ("correct the file of the lumen" if given else "give the lumen as a file (manifest key lumen)")
     )
     distance = reorder(grid.with_values(read_only(values)), axes)
     return replace(lumen, distance=distance, warnings=(*lumen.warnings, text))
+
+
+def _depth(grid: Grid, index: Array) -> Array:
+    """Signed distance (n,) at places (n, 3) in voxels; beyond the last voxel the most that it can be there.
+
+    A scan ends half a voxel beyond the middle of its last slice, and a wire enters through that end: there the vessel
+    goes on, as far as anybody sees.
+    """
+    last = np.array(grid.values.shape) - 1.0
+    beyond = np.maximum(np.maximum(-index, index - last) - 0.5, 0.0)
+    inside = map_coordinates(grid.values, index.T, order=1, mode="nearest")
+    return np.asarray(inside + np.linalg.norm(beyond * grid.spacing_mm, axis=1))

@@ -4,18 +4,21 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
+from pydantic.config import JsonDict
+from pydantic_core import PydanticCustomError
 
 from pipeline.ranges import Factor, Finite, NonNegative, Number, PositiveCount, Step
 from solver._kernels.minimise import METHODS
 
 Segment = Step | Literal["auto"]
+HULLS: JsonDict = {"$comment": '"offset" or "samples:N", N from 1 to 999'}
 COARSEST_MM = 1.0
 """Length of the segments that ``auto`` begins with at most."""
 
 
 def _known(method: str) -> str:
     if method not in METHODS:
-        raise ValueError(f"Input should be {' or '.join(map(repr, METHODS))}")
+        raise PydanticCustomError("method", "no method")
     return method
 
 
@@ -27,7 +30,7 @@ class SolverConfig:
     """newton, or the seed's closed_form."""
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
-    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d{0,2})$")] = "offset"
+    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d{0,2})$", json_schema_extra=HULLS)] = "offset"
     """offset (the smooth limit) or samples:N."""
     tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""

@@ -11,10 +11,7 @@ from typing import Any, get_type_hints
 from pydantic import TypeAdapter
 
 from pipeline.study.settings import Config
-
-LIMITS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
-VAST = 1e6  # a bound against overflow, of which nobody needs to be told
-KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "a text"}
+from pipeline.wording import in_words
 
 
 @dataclass(frozen=True)
@@ -68,29 +65,3 @@ def _sentences(kind: type) -> dict[str, str]:
         if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
         if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)
     }
-
-
-def in_words(schema: dict[str, Any]) -> str:
-    """What a JSON schema allows, as a reader says it."""
-    if "anyOf" in schema:
-        return " or ".join(in_words(one) for one in schema["anyOf"])
-    if "const" in schema or "enum" in schema:
-        return " or ".join(json.dumps(value) for value in schema.get("enum", [schema.get("const")]))
-    if schema.get("type") == "null":
-        return "left out"
-    if schema.get("type") == "array":
-        return _list_in_words(schema)
-    if "pattern" in schema:
-        return f"a text like {schema['pattern']}"
-    limits = [f"{word} {schema[key]:g}" for key, word in LIMITS.items() if abs(schema.get(key, VAST)) < VAST]
-    return " ".join([KINDS.get(schema.get("type", ""), "any"), *limits])
-
-
-def _list_in_words(schema: dict[str, Any]) -> str:
-    parts = schema.get("prefixItems", [])
-    if schema.get("maxItems") == 0:
-        return "empty"
-    if parts and all(part == parts[0] for part in parts):
-        numbers = parts[0].get("type") == "number"
-        return f"[{', '.join(['number'] * len(parts))}]" if numbers else f"{len(parts)} values"
-    return f"a list, each {in_words(schema['items'])}" if "items" in schema else "a list"

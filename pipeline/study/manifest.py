@@ -6,21 +6,32 @@ Everything that is wrong with it is listed at once.
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+from pydantic.config import JsonDict
 
 from pipeline.load.geometry import LoadError
 from pipeline.load.guard import read_text, status_of
 from pipeline.model import OverWire, Uncertainty, Wall, Wire
-from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Point, Positive, reason
+from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Number, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
-from pipeline.study.others import Others, written_out
-from pipeline.study.sources import WHOLE_CASE, MaskText, PathText, Sources, SourceText, Strict, saying
+from pipeline.study.others import OthersText
+from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
+from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
 
 MANIFEST_BYTES = 16 * 2**20
 
@@ -29,7 +40,7 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
     """The wire of that name among ``[wires.*]``, which are read first."""
     wires: dict[str, Wire] = (info.context or {}).get("wires", {})
     if not isinstance(value, str) or value not in wires:
-        problem = f"wire {value!r} is not among [wires.*]; {did_you_mean(str(value), wires)}"
+        problem = f"wire {as_toml(value)} is not among [wires.*]; {did_you_mean(str(value), wires)}"
         # where the wires themselves are wrong, that is all there is to say
         raise saying(*[problem] * bool(wires))
     return wires[value]
@@ -38,17 +49,25 @@ def _wire(value: Any, info: ValidationInfo) -> Wire:
 def _not_written(value: Any, info: ValidationInfo) -> None:
     """A key that is filled in here, never by the user."""
     known = {"entry_case": 'entry = "case:ID"'}
-    raise ValueError(f"unknown key {info.field_name!r}; write {known.get(str(info.field_name), 'parameters = FILE')}")
+    raise ValueError(f"unknown key; write {known.get(str(info.field_name), 'parameters = FILE')}")
 
 
+ONE_OF_THEM: JsonDict = {"type": "string", "$comment": "the name of one of [wires.*], in quotes"}
+FILLED_IN = BeforeValidator(_not_written), WithJsonSchema(WRITTEN_HERE)
+IDS: JsonDict = {"$comment": "up to 100 letters, digits and . _ -, a letter or a digit first"}
+ANOTHER: JsonDict = {"$comment": '"case:ID", with the id of another case'}
 LEAST_ACROSS_DEG = 5.0
 """Between material_axis and entry_direction: more than a clamp's direction is found to be off by."""
+
+
+Depths = Annotated[tuple[Depth, ...], Field(min_length=1)]
+PerFrame = Annotated[tuple[Finite, ...], Field(min_length=1)]
 
 
 class Case(Strict):
     """One ``[[case]]`` table, an insertion: paths are resolved, the wire is looked up, everything is in LPS mm."""
 
-    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100, json_schema_extra=IDS)]
     role: Literal["validation", "calibration"] = "validation"
     assumed: tuple[Annotated[str, Field(min_length=1, max_length=1000)], ...] = ()
     group: str = Field(default_factory=lambda data: data.get("id", ""), min_length=1, max_length=200)
@@ -56,30 +75,30 @@ class Case(Strict):
     frames: Sources = ()
     entry_mm: Point
     entry_direction: Direction
-    entry: Annotated[str, Field(pattern=r"^(case:.+)?$")] = ""
-    entry_case: Annotated["Case | None", BeforeValidator(_not_written)] = None
+    entry: Annotated[str, Field(pattern=r"^(case:.+)?$", json_schema_extra=ANOTHER)] = ""
+    entry_case: Annotated["Case | None", *FILLED_IN] = None
     entry_sigma_mm: NonNegative | None = None
     entry_direction_sigma_deg: NonNegative = 2.0
     material_axis: Axis | None = None
-    wire: Annotated[Wire, BeforeValidator(_wire)]
-    insertion_mm: Annotated[tuple[Depth, ...], Field(min_length=1)] | None = None
+    wire: Annotated[Wire, BeforeValidator(_wire), WithJsonSchema(ONE_OF_THEM)]
+    insertion_mm: Depths | None = None
     insertion_sigma_mm: NonNegative | None = None
     spacing_mm: tuple[Positive, Positive, Positive] | None = None
     lumen: MaskText | None = None
     traces: Sources = ()
     parameters: PathText | None = None
-    calibrated: Annotated[str, BeforeValidator(_not_written)] = ""
-    own_parameters: Annotated[str, BeforeValidator(_not_written)] = ""
-    roll_deg: Finite | tuple[Finite, ...] | Literal["fit"] = 0.0
+    calibrated: Annotated[str, *FILLED_IN] = ""
+    own_parameters: Annotated[str, *FILLED_IN] = ""
+    roll_deg: Finite | PerFrame | Literal["fit"] = 0.0
     roll_sigma_deg: NonNegative | None = None
-    push_force_N: tuple[Finite, ...] | None = None
+    push_force_N: PerFrame | None = None
     push_force_sigma_N: Positive = 0.001
     lumen_seed_mm: Annotated[tuple[Point, ...], Field(min_length=1)] = Field(
         default_factory=lambda data: (data.get("entry_mm"),)
     )
     truth: PathText | None = None
     projections: PathText | None = None
-    simulated: Annotated[Others | None, BeforeValidator(written_out)] = None
+    simulated: OthersText = None
     wall: Wall = Wall()
     uncertainty: Uncertainty = Uncertainty()
     down: Axis | None = None
@@ -177,7 +196,7 @@ def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:
 class ManifestTables(Strict):
     """The whole file."""
 
-    schema_: Annotated[Literal[1], Field(alias="schema")]
+    schema_: Annotated[Literal[1], Number, Field(alias="schema")]
     wires: dict[str, Wire]
     case: Annotated[list[Case], Field(min_length=1)]
 
@@ -194,7 +213,7 @@ class ManifestTables(Strict):
     def _known_to_cases(cls, value: dict[str, Wire], info: ValidationInfo) -> dict[str, Wire]:
         for name, wire in value.items():
             if wire.name != name:
-                raise ValueError(f"{name}: unknown key 'name'; a wire has the name of its table")
+                raise saying(f"wires {name} name: unknown key; a wire has the name of its table")
         if info.context is not None:
             info.context["wires"] = value
         return value
@@ -243,44 +262,25 @@ def read_manifest(path: Path) -> Manifest:
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:
-        problems = [text for item in error.errors() for text in _sentences(data, dict(item))]
-        raise ManifestError([f"{path}: {text}".replace(": : ", ": ") for text in problems]) from None
+        raise ManifestError([f"{path}: {text}" for text in _problems(data, error)]) from None
     held = {f"case:{case.id}": case for case in tables.case}
     return Manifest(path, tuple(case.model_copy(update={"entry_case": held.get(case.entry)}) for case in tables.case))
 
 
-def _sentences(data: dict[str, Any], error: dict[str, Any]) -> Iterator[str]:
-    """One error of pydantic as sentences: case, key, what was found, what is allowed."""
-    place = [str(part) for part in _place(data, error["loc"])]
-    if error["type"] == WHOLE_CASE:
-        yield from (": ".join([*place[:1], problem]) for problem in error["ctx"]["problems"])
-        return
-    where = " ".join(place)
-    if error["type"] == "default_factory_not_called":
-        return  # a default that hangs on another key, which is named already
-    if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        yield f"{where}: unknown key; {did_you_mean(place[-1], _siblings(error['loc']))}"
-    elif error["type"] == "missing":
-        yield f"{where}: missing; this key is required"
-    else:
-        found = f"; found {error['input']!r}" if not isinstance(error["input"], (dict, list)) else ""
-        yield f"{where}: {reason(error['msg'])}{found}"
+_schema = cache(ManifestTables.model_json_schema)
 
 
-def _place(data: dict[str, Any], location: tuple[int | str, ...]) -> list[int | str]:
-    """The place of an error, a case by its id instead of its number."""
-    if len(location) < 2 or location[0] != "case" or not isinstance(location[1], int):
-        return list(location)
-    cases = data.get("case", [])
-    case = cases[location[1]] if isinstance(cases, list) else None
-    name = case.get("id", location[1]) if isinstance(case, dict) else location[1]
-    return [f"case {name!r}", *location[2:]]
+def _problems(data: dict[str, Any], error: ValidationError) -> Iterator[str]:
+    """Everything that is wrong with a manifest, a sentence each: case, key, what was found, what is allowed."""
+    for place, sentence in sentences(error, data, _schema()):
+        yield said(_named(data, place), sentence)
 
 
-def _siblings(location: tuple[int | str, ...]) -> set[str]:
-    """The keys that stand beside the one at a location."""
-    kinds = {"wires": Wire, "wall": Wall, "catheter": OverWire, "uncertainty": Uncertainty}
-    tables = {name: {item.name for item in fields(kind)} - {"name"} for name, kind in kinds.items()}
-    tables["case"] = set(Case.model_fields)
-    nearest = next((part for part in reversed(location[:-1]) if part in tables), None)
-    return tables[str(nearest)] if nearest else {"schema", "wires", "case"}
+def _named(data: dict[str, Any], place: Place) -> Place:
+    """A place with a case called by its id instead of its number."""
+    match place:
+        case ("case", int(number), *rest):
+            case = data["case"][number]
+            name = case.get("id", number) if isinstance(case, dict) else number
+            return (f"case {name!r}" if isinstance(name, str) else f"case {as_toml(name)}", *rest)
+    return place

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+from pydantic.config import JsonDict
 
 from pipeline.load.order import natural_key
 from pipeline.load.wires import KINDS, kind_of
 from pipeline.status import InputError
-from pipeline.study.sources import Sources, Strict
+from pipeline.study.sources import NAMES, Sources, Strict
 
 
 class Others(Strict):
@@ -21,6 +24,10 @@ class Others(Strict):
 def written_out(value: Any) -> Any:
     """A pattern or a list stands for the files alone."""
     return {"files": value} if isinstance(value, (str, list)) else value
+
+
+WORDS: JsonDict = {"$comment": f"{NAMES['$comment']}, or a table {{files = ..., space = ..., unit = ...}}"}
+OthersText = Annotated[Others | None, BeforeValidator(written_out), Field(json_schema_extra=WORDS)]
 
 
 def found_for(case: str, place: Path, alone: bool) -> list[str]:

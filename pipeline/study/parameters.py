@@ -5,15 +5,16 @@ nothing about the model, and is not scored unless that is asked for.
 """
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile, reason
-from pipeline.status import InputError, did_you_mean
+from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
+from pipeline.status import InputError
+from pipeline.wording import said, sentences
 
 if TYPE_CHECKING:
     from pipeline.model import Wire
@@ -97,24 +98,18 @@ class ParametersError(InputError):
 def read_parameters(path: Path) -> Parameters:
     """Read parameters.toml; raises ParametersError."""
     try:
-        return Parameters.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ParametersError(
             [f"{path}: no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"]
         ) from None
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ParametersError([f"{path}: cannot be read as TOML: {error}"]) from None
+    try:
+        return Parameters.model_validate(data)
     except ValidationError as error:
-        raise ParametersError([_sentence(path, dict(item)) for item in error.errors()]) from None
-
-
-def _sentence(path: Path, error: Mapping[str, Any]) -> str:
-    where = ".".join(map(str, error["loc"]))
-    if error["type"] == "extra_forbidden":
-        names = {field.alias or name for name, field in Parameters.model_fields.items()}
-        return f"{path}: {where}: unknown key; {did_you_mean(where, names)}"
-    found = f"; found {error['input']!r}" if not isinstance(error["input"], (dict, list)) else ""
-    return f"{path}: {where}: {reason(error['msg'])}{found}; write it as wireval calibrate did"
+        found = sentences(error, data, Parameters.model_json_schema())
+        raise ParametersError([f"{path}: {said(*one)}; wireval calibrate writes this file" for one in found]) from None
 
 
 def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Case":

@@ -1,10 +1,18 @@
 """The same scan where it would count twice: in one case, or as several insertions of a study."""
 
-from collections import Counter
-from collections.abc import Sequence
+import filecmp
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import combinations
+from pathlib import Path
 
-from pipeline.load import Source
+from pipeline.load import LoadError, Source
+from pipeline.load.guard import size_of
 from pipeline.study.manifest import Case
+
+SAMPLE_BYTES, SAMPLES = 4096, 8
+"""Read of a file to tell it from others of its size: noise differs in the first of these places."""
 
 
 def repeated(case: Case) -> list[str]:
@@ -15,21 +23,59 @@ def repeated(case: Case) -> list[str]:
     ]
     if case.reference is not None and _place(case.reference) in several:
         problems.append(f"{case.reference.path}: reference and frame; the reference is a scan without the wire")
-    return problems
+    return problems or list(_copies(case))
+
+
+def _copies(case: Case) -> Iterator[str]:
+    """Frames or traces with the very content of another one, or of the reference, a sentence each."""
+    empty = () if case.reference is None else (case.reference.path,)
+    for sources, before in ((case.frames, empty), (case.traces, ())):
+        paths = dict.fromkeys([*before, *(source.path for source in sources if not source.dataset)])
+        for first, second in _of_one_content(paths):
+            if first in before:
+                yield f"{second}: has the content of the reference, {first}; a frame is a scan with the wire"
+            else:
+                yield f"{second}: has the content of {first}; a frame counts once; take one of the two out"
+
+
+def _of_one_content(paths: Iterable[Path]) -> Iterator[tuple[Path, Path]]:
+    """Pairs of regular files with the same content; of several the first with each of the others."""
+    alike: dict[tuple[int, bytes], list[Path]] = defaultdict(list)
+    for path in paths:
+        with suppress(LoadError, OSError):  # a folder, or what cannot be read: the reader says so
+            size = size_of(path)
+            alike[size, _sample(path, size)].append(path)
+    found: set[Path] = set()
+    for group in alike.values():
+        for first, second in combinations(group, 2):
+            if not {first, second} & found and filecmp.cmp(first, second, shallow=False):
+                found.add(second)
+                yield first, second
+
+
+def _sample(path: Path, size: int) -> bytes:
+    """A few short pieces of a file, evenly through it, which tell two scans apart without reading them."""
+    with path.open("rb") as file:
+        pieces = []
+        for n in range(SAMPLES):
+            file.seek(max(0, size - SAMPLE_BYTES) * n // (SAMPLES - 1))
+            pieces.append(file.read(SAMPLE_BYTES))
+    return b"".join(pieces)
 
 
 def shared(cases: Sequence[Case]) -> list[str]:
-    """Cases of different groups that name the same scan, a sentence for each two; they count as one insertion."""
+    """Pairs of cases that name the same scan, a sentence for each two, with what follows for the statistics."""
     first: dict[tuple[str, str], Case] = {}
     found = {}
     for case in cases:
         for source in (*case.frames, *case.traces):
             other = first.setdefault(_place(source), case)
-            if other.group != case.group:
-                found[other.id, case.id] = source.path
+            if other.id != case.id:
+                found[other.id, case.id] = source.path, other.group == case.group
     return [
-        f"cases {one!r} and {two!r} share {path}: they count as one insertion, as with the same group"
-        for (one, two), path in found.items()
+        f"cases {one!r} and {two!r} share {path}: "
+        + ("its frame counts twice" if same_group else "they count as one insertion, as with the same group")
+        for (one, two), (path, same_group) in found.items()
     ]
 
 

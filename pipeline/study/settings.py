@@ -8,18 +8,18 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
 from pipeline.load.config import LoadConfig
-from pipeline.ranges import reason
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
 from pipeline.trace.config import TraceConfig
+from pipeline.wording import said, sentences
 
 
 @dataclass(frozen=True)
@@ -121,14 +121,15 @@ def _applied(config: Config, setting: Setting) -> Config:
     if table not in tables:
         raise SettingsError([f"{setting.source}: no table {table!r}; {did_you_mean(table, tables)}"])
     current = getattr(config, table)
-    kinds = get_type_hints(type(current), include_extras=True)
+    kinds = {item.name for item in fields(current)}
     if key not in kinds:
         raise SettingsError([f"{setting.source}: no setting {setting.name!r}; {did_you_mean(key, kinds)}"])
+    adapter, written = TypeAdapter(type(current)), {key: setting.value}
     try:
-        value = TypeAdapter(kinds[key]).validate_python(setting.value)
+        value = getattr(adapter.validate_python(written), key)
     except ValidationError as error:
-        why = reason(error.errors()[0]["msg"])
-        raise SettingsError([f"{setting.source}: {setting.name} = {setting.value!r}: {why}"]) from None
+        found = sentences(error, written, adapter.json_schema())
+        raise SettingsError([f"{setting.source}: {table}.{said(*one)}" for one in found]) from None
     return replace(config, **{table: replace(current, **{key: value})})
 
 

@@ -5,27 +5,21 @@ import os
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.load import Source
 from pipeline.load.geometry import Mask
 from pipeline.load.order import natural_key
+from pipeline.wording import saying
 
-WHOLE_CASE = "whole_case"
-"""Kind of an error whose message says all, beyond the case that it belongs to; its context lists the problems."""
 MOST_MATCHES, LONGEST_PATTERN, LONGEST_NAME = 20_000, 4000, 255
-
-
-def saying(*problems: str) -> PydanticCustomError:
-    """The error that says these sentences and nothing else."""
-    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
 
 
 def _source(value: Any, info: ValidationInfo) -> Source:
     """``file``, ``folder`` or ``file.h5#/dataset``, relative to the manifest."""
     if not isinstance(value, str):
-        raise ValueError("Input should be a valid string")
+        raise PydanticCustomError("name", "no name")
     name, _, dataset = value.partition("#")
     _require_name(name, info)
     return Source(Path((info.context or {}).get("folder", "")) / name, dataset)
@@ -98,10 +92,31 @@ def _masked(source: Source, label: int | str | None, level: float | None) -> Mas
     return Mask(source.path, source.dataset, source.item, label, level)
 
 
-SourceText = Annotated[Source, BeforeValidator(_source)]
-MaskText = Annotated[Mask, BeforeValidator(_mask)]
-Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources)]
-PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path)]
+NAME: dict[str, Any] = {"type": "string", "$comment": "the name of a file or a folder, in quotes"}
+NAMES: dict[str, Any] = {
+    "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+    "$comment": 'a name or a pattern in quotes ("frames/*.mha"), or a list of names',
+}
+MASK: dict[str, Any] = {
+    "anyOf": [
+        {"type": "string"},
+        {
+            "type": "object",
+            "properties": {
+                "file": {"type": "string"},
+                "label": {"anyOf": [{"type": "integer"}, {"type": "string"}]},
+                "level": {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
+            },
+            "required": ["file"],
+            "additionalProperties": False,
+        },
+    ],
+    "$comment": "the name of a file in quotes, or {file = ..., label = ...}, or {file = ..., level = ...}",
+}
+SourceText = Annotated[Source, BeforeValidator(_source), WithJsonSchema(NAME)]
+MaskText = Annotated[Mask, BeforeValidator(_mask), WithJsonSchema(MASK)]
+Sources = Annotated[tuple[Source, ...], BeforeValidator(_sources), WithJsonSchema(NAMES)]
+PathText = Annotated[Path, BeforeValidator(lambda value, info: _source(value, info).path), WithJsonSchema(NAME)]
 
 
 class Strict(BaseModel):

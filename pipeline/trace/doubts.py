@@ -32,7 +32,7 @@ def no_wire(image: Subtraction) -> Curve:
     do = "check entry_mm and that the frame shows a wire"
     if _traces_of_wire(image):
         status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
-        do = f"{do}; give the curve of the frame before, or scan with more dose"
+        do = f"{do}; list a frame of a smaller depth before it, or scan with more dose"
     got = f"nothing that stands out of {image.noise:.0f} grey of noise and passes the entry"
     return Curve(
         np.zeros((0, 3)), np.zeros(0), status=status, note=note_of(got, allowed, do),

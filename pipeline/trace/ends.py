@@ -66,6 +66,12 @@ Objection = tuple[bool, FrameStatus, str, str, str]
 """Whether it holds, the status that it gives, what was found, what is allowed and what to do."""
 
 
+def _against_dim_ends(attempt: Attempt) -> str:
+    if attempt.tube.steps.stated:
+        return "correct the wire's opacity, whose steps lie elsewhere, or scan with more dose"
+    return "state the wire's opacity, whose steps tell where its end is, or scan with more dose"
+
+
 def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
     missing_mm = attempt.tube.steps.missing_mm
@@ -80,7 +86,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          "leave this frame out, or scan a larger field"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
-         f"{sure_mm:.1f} mm", "state the wire's opacity, whose steps tell where its end is, or scan with more dose"),
+         f"{sure_mm:.1f} mm", _against_dim_ends(attempt)),
         (attempt.late_mm > LATE_MM + LATE_VOXELS * image.voxel, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that begins {attempt.late_mm:.1f} mm beyond the entry",
          f"{LATE_MM + LATE_VOXELS * image.voxel:.1f} mm at most",
@@ -101,7 +107,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
         (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
-         "give the curve of the frame before, or look where the wire ends"),
+         "list a frame of a smaller depth before it, or look where the wire ends"),
         (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
          "a line as thick as its vessel", "a wire, which is thinner",
          "check that the frame shows a wire, and that the reference has the frame's contrast"),

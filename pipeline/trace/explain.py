@@ -213,15 +213,18 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     )  # fmt: skip
 
 
-def _agreed(first: Candidate, second: Candidate) -> Candidate:
-    """The second fit of a wire; refused where it ends elsewhere than the first: in noise it was once cut by 7.5 mm."""
+def _agreed(first: Candidate, second: Candidate, *, modelled: bool) -> Candidate:
+    """The second fit of a wire; refused where it ends elsewhere than the first: in noise it was once cut by 7.5 mm.
+
+    modelled : whether the background is guessed, which the difference to a good reference scan spares.
+    """
     apart = abs(first.length_mm - second.length_mm)
     if apart < TIPS_MM or second.verdict.status is not FrameStatus.OK:
         return second
     note = note_of(
         f"tips {apart:.1f} mm apart in two fits",
         f"{TIPS_MM} mm at most",
-        "look where the wire ends, or give a reference scan without wire",
+        "look where the wire ends" + ", or give a reference scan without wire that fits the frame" * modelled,
     )
     return replace(second, verdict=replace(second.verdict, status=FrameStatus.TRACE_AMBIGUOUS, note=note))
 
@@ -242,5 +245,5 @@ def explained(image: Subtraction, entry: EntryPose, previous: Curve | None, conf
         attempt = again(image, attempt, entry)
     attempt = bent(image, attempt, entry)
     if attempt is not best.attempt:
-        best = _agreed(best, _read_off(image, attempt, entry)[0])
+        best = _agreed(best, _read_off(image, attempt, entry)[0], modelled=image.modelled)
     return doubted(image, best.attempt, _curve(image, best))

@@ -200,10 +200,10 @@ def _of_the_line(
         (thin and cnr < SURE_CNR, FrameStatus.TRACE_LOW_CONTRAST,
          f"a line of blur {attempt.tube.sigma:.2f} mm, {cnr:.1f} noises bright",
          f"no less than {NARROWEST:g} of the scanner's own blur, {image.wall_blur_mm:.2f} mm",
-         "check that the frame shows a wire; scan with more dose or give the frame before"),
+         "check that the frame shows a wire; scan with more dose or list a frame of a smaller depth before it"),
         (cnr < LEAST_CNR and not (confirmed and _ends_there(image, points)), FrameStatus.TRACE_LOW_CONTRAST,
-         f"a line {cnr:.1f} noises bright", f"{LEAST_CNR}, or a previous curve that the frame confirms",
-         "check that the frame shows a wire; scan with more dose or give the frame before"),
+         f"a line {cnr:.1f} noises bright", f"{LEAST_CNR}, or the curve of the frame before, confirmed by this one",
+         "check that the frame shows a wire; scan with more dose or list a frame of a smaller depth before it"),
         (outside.mean() > MOST_OUTSIDE, FrameStatus.TRACE_LEFT_LUMEN,
          f"{100 * outside.mean():.0f} % of the curve over 2 voxels outside the lumen",
          f"{100 * MOST_OUTSIDE:.0f} % at most", "check the lumen, and whether the phantom moved between the scans"),
@@ -215,7 +215,7 @@ def _of_the_line(
          "look at the picture"),
         (double_mm > MOST_DOUBLE_MM and not prior, FrameStatus.TRACE_AMBIGUOUS,
          f"{double_mm:.1f} mm of line too bright or too wide for one strand", f"{MOST_DOUBLE_MM} mm at most",
-         "give the curve of the frame before, which tells strands in contact apart, or look for a second wire"),
+         "list a frame of a smaller depth before it, whose curve tells strands apart, or look for a second wire"),
     )  # fmt: skip
 
 

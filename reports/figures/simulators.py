@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from reports.colours import SIMULATED
 from reports.figures._drawing import Drawing, legend, new_figure, plain, positive_axis
 from reports.figures._style import PALETTE
-from reports.verdict import TIPS_OFF
+from reports.verdict import OURS, TIPS_OFF
 
-OURS = "wireval"
 _FAINT = 0.3  # of a lead that is not clear
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -159,3 +162,41 @@ def test_the_strongest_predictor_is_named_and_never_one_that_is_told() -> None:
     assert result["frame_spacing_mm"] == 2.0
     known = np.concatenate([frame.error_mm for i, frame in enumerate(frames) if i % 5])
     assert result["skill_strongest"] == pytest.approx(1 - np.mean(known**2) / 1.5**2), "on the frames that it has"
+    assert result["strongest_frames"] == len(frames) * 4 // 5
+
+
+def guessed(errors: Sequence[float], **nulls: Sequence[float | None]) -> list[Scored]:
+    """Frames of one insertion with these errors (mm, at ten points each) and what predictors leave in them."""
+    rows: list[dict[str, Any]] = [{"insertion_mm": 10.0 + n} for n in range(len(errors))]
+    for name, values in nulls.items():
+        rows = [row | {f"null_{name}_rms_mm": value} for row, value in zip(rows, values, strict=True)]
+    return [Scored(row, np.full(10, mm), "one") for row, mm in zip(rows, errors, strict=True)]
+
+
+def test_predictors_are_judged_on_the_same_frames() -> None:
+    """The frame before has no guess of the frame that is the worst of all; on the others it is no better."""
+    frames = guessed(
+        [0.9, 0.1, 0.1, 0.1], centreline=[2.0, 1.0, 1.0, 1.0], previous=[None, 1.1, 1.1, 1.1], shortest=[9.0] * 4
+    )
+    result = pooled(frames)
+    assert (result["strongest_null"], result["strongest_frames"]) == ("centreline", 3)
+    assert result["skill_strongest"] == pytest.approx(1 - 0.1**2)
+    # 0.9 mm off where nobody else guesses: that frame is in rms_mm, in skill against whom has a guess of it
+    assert result["skill"] == pytest.approx(1 - (0.9**2 + 3 * 0.1**2) / (4.0 + 3.0))
+    # lacking what is hardest for predictors makes none the strongest
+    frames = guessed([0.1] * 4, centreline=[8.0, 1.0, 1.0, 1.0], previous=[None, 1.1, 1.1, 1.1])
+    assert pooled(frames)["strongest_null"] == "centreline"
+    assert pooled(frames)["skill_strongest"] == pytest.approx(1 - 0.1**2)
+
+
+def test_who_has_too_little_in_common_with_the_others_is_left_out() -> None:
+    none = None
+    halves = {"previous": [1.0, 1.0, 1.0, none, none], "shortest": [none, none, 1.2, 1.2, 1.2]}
+    result = pooled(guessed([0.1] * 5, centreline=[2.0] * 5, **halves))
+    assert result["strongest_frames"] == 3, "one of the two halves stays, on the three frames that it has"
+    assert result["strongest_null"] in halves
+    result = pooled(guessed([0.1] * 5, centreline=[2.0] * 5, previous=[1.0, 1.0, none, none, none]))
+    assert (result["strongest_null"], result["strongest_frames"]) == ("centreline", 5), "less than half of the points"
+    result = pooled(guessed([0.1] * 2, previous=[none, none]))
+    assert "strongest_null" not in result
+    assert "skill_strongest" not in result

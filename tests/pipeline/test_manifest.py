@@ -58,7 +58,7 @@ def test_natural_order() -> None:
     [
         (("radius_mm", "radus_mm"), "unknown key; did you mean 'radius_mm'?"),
         (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
-        (("radius_mm = 0.18", "radius_mm = -1"), "greater than or equal to 0.001; found -1"),
+        (("radius_mm = 0.18", "radius_mm = -1"), "radius_mm = -1: expected a number from 0.001 to 20"),
         (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
         (('wire = "soft"', 'wire = "soft"\nmaterial_axis = [0.05, 0, -3]'), "within 5 degrees of entry_direction"),
         (('frames = "frames/*.mha"', 'frames = "nothing/*.mha"'), "matches no file"),
@@ -67,16 +67,16 @@ def test_natural_order() -> None:
         (('id = "run1"', 'id = "a/b"'), "id"),
         (("[30.0, 5.0]", "[-3.0, 5.0]"), "distances from the tip"),
         (("schema = 1", "schema = 2"), "schema"),
-        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "expected 'fit'; found 'fitted'"),
-        (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "unknown key 'calibrated'; write parameters = FILE"),
+        (('wire = "soft"', 'wire = "soft"\nroll_deg = "fitted"'), "did you mean 'fit'?"),
+        (('wire = "soft"', 'wire = "soft"\ncalibrated = "x"'), "calibrated: unknown key; write parameters = FILE"),
         *(
             (("entry_mm", f"catheter = {{ {keys} }}\nentry_mm"), expected)
             for keys, expected in (
                 ("radius_mm = 0.9, insertion_mm = 1.0", "catheter bending_stiffness_N_mm2: missing"),
-                ("bending_stiffness_N_mm2 = -1, radius_mm = 0.9, insertion_mm = 1.0", "greater than or equal to 0"),
+                ("bending_stiffness_N_mm2 = -1, radius_mm = 0.9, insertion_mm = 1.0", "= -1: expected a number from 0"),
                 ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion = 1.0", "did you mean 'insertion_mm'?"),
                 ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = [1, 2]", "has 2 entries for 3 frames"),
-                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = -1", "greater than or equal to 0"),
+                ("bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = -1", "= -1: expected a number from 0"),
                 ("bending_stiffness_N_mm2 = 5, radius_mm = 0.1, insertion_mm = 1", "no more than the wire's 0.18"),
                 (
                     "bending_stiffness_N_mm2 = 5, radius_mm = 0.9, insertion_mm = [1, 9, 3] }\nspacing_mm = [1, 1, 1]\n"

@@ -50,3 +50,19 @@ def test_a_wire_within_the_lumen_or_pressed_into_its_wall_changes_nothing() -> N
     assert opened(lumen, [traced(wire(7.9, 2.0, 7.0), 0.06)], 0.2) is lumen
     assert opened(lumen, [traced(wire(7.9, 2.0, 7.0))], 0.2) is not lumen
     assert opened(lumen, [], 0.2) is lumen
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_wire_enters_through_the_end_of_the_scan(order: str) -> None:
+    """A scan reaches half a voxel beyond the middle of its last slice; further on the vessel may end."""
+    lumen = tube(order)
+    entering, leaving = wire(6.0, -0.49 * H, 7.0), wire(6.0, 11.0, 59.45 * H)
+    assert opened(lumen, [traced(entering), traced(leaving)], 0.2) is lumen
+    for outside in (wire(7.9, -0.49 * H, 7.0), wire(6.0, -9.0, 7.0)):
+        assert "opened" in opened(lumen, [traced(outside)], 0.2).warnings[1]
+
+
+def test_who_gave_the_lumen_is_not_told_to_give_it() -> None:
+    lumen, curve = tube("C"), traced(wire(6.4, 2.0, 16.0))
+    assert "give the lumen as a file" in opened(lumen, [curve], 0.2).warnings[1]
+    assert opened(lumen, [curve], 0.2, given=True).warnings[1].endswith("or correct the file of the lumen")

@@ -467,6 +467,36 @@ def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.C
         manifest.write_text(text.replace('"frames/*.mha"', json.dumps(listed)), encoding="utf-8")
         assert main(["check", str(both)]) == 2
         assert said in capsys.readouterr().err
+    manifest.write_text(
+        text.replace("broken/", "frames/").replace('id = "second"', 'id = "second"\ngroup = "bifurcation"')
+    )
+    assert main(["check", str(both)]) == 0
+    assert "its frame counts twice" in capsys.readouterr().out
+
+
+def test_a_frame_under_two_names_counts_once(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A copy is refused at the door; the same voxels in another file are told when they are read."""
+    folder, out = tmp_path / "study", tmp_path / "out"
+    shutil.copytree(study, folder)
+    first, *_, last = sorted((folder / "frames").iterdir())
+    own = last.read_bytes()
+    shutil.copy(first, last)
+    assert main(["check", str(folder)]) == 2
+    assert f"{last}: has the content of {first}; a frame counts once" in capsys.readouterr().err
+    shutil.copy(folder / "reference.mha", last)
+    assert run(folder, out) == 2
+    assert "has the content of the reference" in capsys.readouterr().err
+    last.write_bytes(own)
+    sitk.WriteImage(sitk.Cast(sitk.ReadImage(str(first)), sitk.sitkFloat32), str(folder / "frames" / "frame_001b.nrrd"))
+    manifest = folder / "manifest.toml"
+    kept = [line for line in manifest.read_text(encoding="utf-8").splitlines() if not line.startswith(("ins", "tru"))]
+    manifest.write_text("\n".join(kept).replace("frames/*.mha", "frames/*"), encoding="utf-8")
+    assert main(["check", str(folder)]) == 0
+    assert run(folder, out, "--until", "compare") == 1
+    assert "repeated: it has the voxels of frame 0" in capsys.readouterr().err
+    errors = tables.read(out / "cases" / "bifurcation" / "errors.csv", ERRORS)
+    assert list(errors["status"]).count("repeated") == 1
+    assert pd.read_csv(out / "overall.csv")["frames_ok"].item() == FRAMES
 
 
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
@@ -770,7 +800,9 @@ def test_a_failed_frame_names_its_scan(study: Path, tmp_path: Path, capsys: pyte
     folder = tmp_path / "study"
     shutil.copytree(study, folder)
     frames = sorted((folder / "frames").iterdir())
-    shutil.copy(folder / "reference.mha", frames[1])  # no wire
+    empty = sitk.ReadImage(str(folder / "reference.mha"))
+    empty[0, 0, 0] += 1  # a scan of its own
+    sitk.WriteImage(empty, str(frames[1]))
     assert run(folder, tmp_path / "out", "--until", "trace") == 1
     assert f"(scan {frames[1].name})" in capsys.readouterr().err
     rows = pd.read_csv(tmp_path / "out" / "failures.csv").set_index("frame")

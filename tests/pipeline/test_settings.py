@@ -43,13 +43,16 @@ def test_resolved_settings_read_back(tmp_path: Path) -> None:
     [
         ("solver.segmnt_mm=1", "did you mean 'segment_mm'"),
         ("sovler.segment_mm=1", "did you mean 'solver'"),
-        ("solver.segment_mm=wide", "valid number"),
-        ("budget.members=abc", "budget.members = 'abc': expected a valid number"),
+        ("solver.segment_mm=wide", '"wide": expected a number from 0.01 to 100 or "auto"'),
+        (
+            "budget.members=abc",
+            'budget.members = "abc": expected a whole number from 0; correct it, or leave it out for 0',
+        ),
         ("segment_mm=1", "no setting; write table.key=value"),
-        ("simulate.entry=foo", "'traced' or 'manifest'"),
-        ("solver.segment_mm=-3", "greater than"),
-        ("compare.sample_mm=0", "greater than"),
-        ("segment.outer_mm=nan", "a finite number"),
+        ("simulate.entry=foo", '"traced" or "manifest"'),
+        ("solver.segment_mm=-3", "from 0.01"),
+        ("compare.sample_mm=0", "from 0.01"),
+        ("segment.outer_mm=nan", "= nan: expected a number from 0.1 to 50"),
         ("trace.rotation_axis=[0,0,0]", "length zero"),
     ],
 )

@@ -89,6 +89,16 @@ def test_a_wrong_roll_is_guessed_at() -> None:
     assert "check axes" not in verdict(row | {"null_roll_unknown_rms_mm": 1.9})
 
 
+def test_a_roll_is_to_be_fitted_only_where_it_can_be_and_is_not() -> None:
+    row = {"rms_mm": 2.0, "null_roll_unknown_rms_mm": 0.82, "skill_strongest": -1.0, "strongest_null": "roll_unknown"}
+    assert 'roll_deg = "fit"' in verdict(row | {"frames_fitted": 0}, "wireval")
+    fitted = verdict(row | {"frames_fitted": 1})
+    assert 'roll_deg = "fit"' not in fitted
+    assert "the roll was fitted on a frame: state it, or begin deeper" in fitted
+    assert 'roll_deg = "fit"' not in verdict(row, "sofa")
+    assert "the roll that it was simulated with" in verdict(row, "sofa")
+
+
 def test_a_run_without_a_score_says_why() -> None:
     assert unscored([("calibration", "ok"), ("calibration", "no_wire")]).startswith("Nothing is scored: every case")
     assert "to be compared with" in unscored([("validation", "simulated"), ("calibration", "ok")])

@@ -16,8 +16,9 @@ import wireval
 from pipeline.cli import parsers
 from pipeline.run.results import LOST, RESULT
 from pipeline.status import FrameStatus
-from pipeline.study.explain import described, in_words
-from pipeline.study.manifest import Case, ManifestTables
+from pipeline.study.explain import described
+from pipeline.study.manifest import ManifestTables
+from pipeline.wording import WRITTEN_HERE, in_words
 from reports import frames_file, schema
 from reports.frames_file import ATTRIBUTES
 from reports.schema import Table
@@ -82,7 +83,6 @@ KEYS = {
     "insertion_mm of OverWire": "Depth of the catheter's own tip, one for all frames or one per frame.",
 }
 """What the keys of the manifest mean; their kinds and defaults stand in the code."""
-HIDDEN = {"name"} | {key for key, field in Case.model_fields.items() if "_not_written" in str(field.metadata)}
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -106,37 +106,16 @@ def settings() -> str:
     return "\n".join(parts)
 
 
-MASK = {
-    "anyOf": [
-        {"type": "string"},
-        {
-            "type": "object",
-            "properties": {
-                "file": {"type": "string"},
-                "label": {"anyOf": [{"type": "integer"}, {"type": "string"}]},
-                "level": {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1},
-            },
-            "required": ["file"],
-            "additionalProperties": False,
-        },
-    ]
-}
-
-
 def plain(node: Any) -> Any:
-    """A schema without titles, hidden keys and pydantic's view of what is a text in the file."""
+    """A schema without titles and without what no user may write."""
     if isinstance(node, list):
         return [plain(item) for item in node]
     if not isinstance(node, dict):
         return node
-    if node.get("$ref") == "#/$defs/Source":
-        return {"type": "string"}
-    if node.get("$ref") == "#/$defs/Mask":
-        return MASK
     kept = {key: plain(value) for key, value in node.items() if key != "title" or not isinstance(value, str)}
     if kept.get("default") == math.inf:
         del kept["default"]  # JSON has none
-    for key in HIDDEN & set(kept.get("properties", {})):
+    for key in [key for key, of in kept.get("properties", {}).items() if of.get("not") == WRITTEN_HERE["not"]]:
         del kept["properties"][key]
         kept["required"] = [name for name in kept.get("required", []) if name != key]
     return kept
@@ -144,13 +123,6 @@ def plain(node: Any) -> Any:
 
 def manifest_schema() -> dict[str, Any]:
     made = plain(ManifestTables.model_json_schema())
-    made["$defs"].pop("Source")
-    made["$defs"].pop("Mask", None)
-    case = made["$defs"]["Case"]["properties"]
-    several = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
-    case["simulated"] = {"anyOf": [*several["anyOf"], case["simulated"]]}
-    made["$defs"]["Others"]["properties"]["files"] = several
-    case |= {name: several for name in ("frames", "traces") if name in case} | {"wire": {"type": "string"}}
     for name, owner in made["$defs"].items():
         for key, value in owner.get("properties", {}).items():
             owner["properties"][key] = {"description": meaning(key, name), **value}
@@ -167,14 +139,6 @@ def result_schema() -> dict[str, Any]:
     made["properties"] = {"schema": {"const": 1}, **made["properties"]}
     made["required"] = ["schema", *made["required"]]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "wireval result.json", **made}
-
-
-def allowed(node: dict[str, Any], definitions: dict[str, Any]) -> str:
-    if "$ref" in node:
-        return "a table"
-    if "anyOf" in node:
-        return " or ".join(allowed(one, definitions) for one in node["anyOf"] if one.get("type") != "null")
-    return in_words(node)
 
 
 def manifest() -> str:
@@ -195,7 +159,7 @@ def manifest() -> str:
         for key, value in owner["properties"].items():
             default = "required" if key in needed else json.dumps(value.get("default"))
             default = "" if default in ("null", '""', "[]") else default
-            rows.append((f"`{key}`", meaning(key, name), allowed(value, made["$defs"]), default))
+            rows.append((f"`{key}`", meaning(key, name), in_words(value, null=False), default))
         parts += [f"## `{title}`\n", table(("key", "meaning", "allowed", "default"), rows)]
     return "\n".join(parts)
 

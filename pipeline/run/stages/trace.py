@@ -1,5 +1,7 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
+import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -44,24 +46,47 @@ def trace_frames(run: Context, known: Known) -> Known:
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
     frames, assumed = own_dim_ends([part.frame for part in parts], voxel_mm)
     run.log.assumptions += assumed
-    frames = in_step(frames, voxel_mm)
+    frames = in_step(_once(frames, [part.voxels for part in parts]), voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
-    lumen = opened(known.lumen, curves, run.case.wire.radius_mm)
+    lumen = opened(known.lumen, curves, run.case.wire.radius_mm, given=run.case.lumen is not None)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
     return replace(known, frames=tuple(frames), lumen=lumen)
 
 
 class _Part(NamedTuple):
-    """What becomes of one frame. window : the grey values that are shown of it; None where it could not be read."""
+    """What becomes of one frame.
+
+    window : the grey values that are shown of it; None where it could not be read.     voxels : by which its scan is
+    known again; empty where it could not be read.
+    """
 
     frame: Frame
     window: tuple[float, float] | None
     log: Log
+    voxels: bytes = b""
+
+
+def _once(frames: Sequence[Frame], voxels: Sequence[bytes]) -> list[Frame]:
+    """The frames; one with the voxels of an earlier one, in whatever file, is not counted again."""
+    out, first = list(frames), dict[bytes, int]()
+    for n, known in enumerate(voxels):
+        same = first.setdefault(known, n)
+        if known and same != n:
+            out[n] = frames[n].failed("load", FrameStatus.REPEATED, f"it has the voxels of frame {same}")
+    return out
+
+
+def _known_by(volume: Volume) -> bytes:
+    """A hash of the voxels, whatever type they are kept in."""
+    hasher = hashlib.blake2b(digest_size=16)
+    for plane in volume.values:
+        hasher.update(np.ascontiguousarray(plane, np.float32).data)
+    return hasher.digest()
 
 
 class _Tracing:
@@ -89,19 +114,20 @@ class _Tracing:
         """One frame, which failed where it cannot be read."""
         run, frame = self.run.part(), self.frames[number]
         try:
-            done, window = self.look(run, frame, self.headers[number], earlier)
+            done, window, voxels = self.look(run, frame, self.headers[number], earlier)
         except StageError as error:
             return _Part(frame.failed("load", error), None, run.log)
         length = 0.0 if done.curve is None else done.curve.length_mm
         run.log.progress("trace", number + 1, len(self.frames), f"{done.status} {length:.1f} mm")
-        return _Part(done, window, run.log)
+        return _Part(done, window, run.log, voxels)
 
     def look(
         self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
-    ) -> tuple[Frame, tuple[float, float]]:
-        """One frame read, put in place and traced, and its grey window; LoadError where it cannot be read."""
+    ) -> tuple[Frame, tuple[float, float], bytes]:
+        """One frame read, put in place and traced, its grey window and hash; LoadError where it cannot be read."""
         log, settings = run.log, run.config.trace
         volume = run.load(Crop(header, self.box, self.load), frame.index)
+        voxels = _known_by(volume)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
@@ -114,7 +140,7 @@ class _Tracing:
         window = next((part.window for part in before if part.window), None) or grey_window(shown)
         done = replace(frame, registration=registration, projections=projections(shown, window))
         if self.given:
-            return _along(_as_given(run, done, self.given[frame.index]), shown, window), window
+            return _along(_as_given(run, done, self.given[frame.index]), shown, window), window, voxels
         curve = run.stored(
             "trace",
             trace,
@@ -131,7 +157,7 @@ class _Tracing:
         )
         if run.case.catheter is not None and np.isnan(frame.expected_mm):
             curve = of_catheter(curve, frame.catheter_mm)
-        return _along(_traced(done, curve), shown, window), window
+        return _along(_traced(done, curve), shown, window), window, voxels
 
 
 def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:

@@ -1,0 +1,237 @@
+"""What a validation refused, as a user reads it: where, what was found, what is allowed, what to do.
+
+pydantic says what broke in its own words, once for each branch of a union and with the names of Python's types; here
+one sentence a key is made from the JSON schema of what was to be written.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import date, time
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
+
+from pipeline.status import did_you_mean
+
+Place = tuple[int | str, ...]
+"""Keys and positions in lists that lead to a value in what the user wrote."""
+Schema = Mapping[str, Any]
+OWN, WHOLE_CASE = "value_error", "whole_case"
+"""Kinds of errors whose message is ours: on a key, and one that says all, beyond the case that it belongs to."""
+WRITTEN_HERE: dict[str, Any] = {"not": {}}
+"""Schema of a field that no user may write."""
+UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+LIMITS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
+VAST = 1e6  # a bound against overflow, of which nobody needs to be told who is within it
+KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "a text"}
+SEVERAL = {"number": "numbers", "integer": "whole numbers", "string": "texts", "object": "tables"}
+LONGEST = 60
+
+
+def sentences(error: ValidationError, data: Any, schema: Schema) -> Iterator[tuple[Place, str]]:
+    """(place, sentence) of each key that is wrong in ``data``, which was held against a model of that JSON schema."""
+    groups: dict[Place, list[tuple[Place, Mapping[str, Any]]]] = {}
+    for item in error.errors():
+        place = _written(data, item["loc"])
+        if item["type"] == WHOLE_CASE:
+            yield from ((place[:2], f": {problem}") for problem in item["ctx"]["problems"])
+        elif item["type"] in UNKNOWN:
+            yield place, _no_such_key(schema, place)
+        elif item["type"] == "missing" and isinstance(key := item["loc"][-1], str):
+            yield (*place, key), MISSING
+        elif item["type"] != "default_factory_not_called":  # it hangs on another key, which is named already
+            groups.setdefault(_key_of(place), []).append((place, item))
+    for key_place, items in groups.items():
+        own = next((item["msg"] for _, item in items if item["type"] == OWN), "")
+        if own:
+            yield key_place, f": {own.removeprefix('Value error, ')}"
+        else:
+            place = max((place for place, _ in items), key=len)
+            yield _refused(data, key_place, place, schema)
+
+
+MISSING = ": missing; this key is required"
+
+
+def saying(*problems: str) -> PydanticCustomError:
+    """The error that says these sentences and nothing else."""
+    return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
+
+
+def said(place: Sequence[int | str], sentence: str) -> str:
+    """One of ``sentences``, with its place in front: keys apart by blanks, positions in brackets."""
+    words = [f"[{part}]" if isinstance(part, int) else f" {part}" for part in place]
+    return ("".join(words).strip() + sentence).removeprefix(": ")
+
+
+def expected(found: Any, node: Schema, definitions: Schema, *, optional: bool) -> str:
+    """``= found: expected ...; do this`` for a value that a schema does not allow."""
+    many = [part for part in _numbers(found) if not abs(part) < VAST]
+    words = in_words(node, definitions, exact=bool(many), null=False)
+    return f" = {shortened(as_toml(found))}: expected {words}; {_what_to_do(found, node, definitions, optional)}"
+
+
+def _refused(data: Any, key: Place, place: Place, schema: Schema) -> tuple[Place, str]:
+    """The sentence on one key: the whole value, or of a long list the entry that is wrong."""
+    node, needed = _node(schema, key)
+    whole = _value(data, key)
+    where = key if len(as_toml(whole)) <= LONGEST else place
+    words = expected(_value(data, where), node, schema.get("$defs", {}), optional=not needed)
+    return where, words
+
+
+def _written(data: Any, location: Sequence[int | str]) -> Place:
+    """A location of pydantic without its names of the branches of a union."""
+    place: list[int | str] = []
+    for part in location:
+        inside = part in data if isinstance(data, dict) else isinstance(part, int) and part < _length(data)
+        if inside:
+            place.append(part)
+            data = data[part]
+    return tuple(place)
+
+
+def _length(data: Any) -> int:
+    return len(data) if isinstance(data, list) else 0
+
+
+def _key_of(place: Place) -> Place:
+    """The place of the nearest key: a list is one value."""
+    last = max((n for n, part in enumerate(place) if isinstance(part, str)), default=-1)
+    return place[: last + 1]
+
+
+def _value(data: Any, place: Place) -> Any:
+    for part in place:
+        data = data[part]
+    return data
+
+
+def _branches(node: Schema, definitions: Schema) -> Iterator[Schema]:
+    """A schema as the alternatives that it allows."""
+    if "$ref" in node:
+        yield from _branches(definitions[node["$ref"].rpartition("/")[2]], definitions)
+    elif "anyOf" in node:
+        for one in node["anyOf"]:
+            yield from _branches(one, definitions)
+    else:
+        yield node
+
+
+def _node(schema: Schema, place: Place) -> tuple[Schema, bool]:
+    """The schema of a place, and whether its key is required."""
+    definitions = schema.get("$defs", {})
+    node, needed = schema, True
+    for part in place:
+        options = list(_branches(node, definitions))
+        if isinstance(part, int):
+            node = next((one["items"] for one in options if "items" in one), {})
+            continue
+        owner = next((one for one in options if part in one.get("properties", {})), None)
+        if owner is not None:
+            node, needed = owner["properties"][part], part in owner.get("required", ())
+        else:  # a table with names of the user's own
+            node = next((one["additionalProperties"] for one in options if one.get("additionalProperties")), {})
+    return node, needed
+
+
+def _no_such_key(schema: Schema, place: Place) -> str:
+    node, _ = _node(schema, place[:-1])
+    options = _branches(node, schema.get("$defs", {}))
+    names = [name for one in options for name, of in one.get("properties", {}).items() if of.get("not") != {}]
+    return f": unknown key; {did_you_mean(str(place[-1]), names)}"
+
+
+def _numbers(found: Any) -> Iterator[float]:
+    """Every number of a value."""
+    if isinstance(found, (list, tuple)):
+        for one in found:
+            yield from _numbers(one)
+    elif isinstance(found, (int, float)) and not isinstance(found, bool):
+        yield found
+
+
+def _what_to_do(found: Any, node: Schema, definitions: Schema, optional: bool) -> str:
+    options = list(_branches(node, definitions))
+    if isinstance(found, str):
+        if any(one.get("type") in ("number", "integer") for one in options) and _is_number(found):
+            return "write it without quotes"
+        choices = [str(one) for option in options for one in option.get("enum", [option.get("const", "")]) if one]
+        if close := get_close_matches(found, choices, n=1):
+            return f"did you mean {close[0]!r}?"
+    if not optional:
+        return "correct it"
+    default = node.get("default")
+    plain = isinstance(default, (int, float)) or (isinstance(default, str) and default)
+    return "correct it, or leave it out" + (f" for {as_toml(default)}" if plain else "")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def as_toml(value: Any) -> str:
+    """A value as its file writes it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {as_toml(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(as_toml, value)) + "]"
+    if isinstance(value, (date, time)):
+        return value.isoformat()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def shortened(text: str) -> str:
+    """A text of at most ``LONGEST`` characters."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def in_words(node: Schema, definitions: Schema | None = None, *, exact: bool = False, null: bool = True) -> str:
+    """What a JSON schema allows, as a reader says it.
+
+    exact : with bounds against overflow, too.     null : whether it says that a value may be left out.
+    """
+    how: dict[str, Any] = {"exact": exact, "null": null}
+    if "$comment" in node:
+        return str(node["$comment"])
+    if "$ref" in node:
+        return "a table"
+    if "anyOf" in node:
+        words = [in_words(one, definitions, **how) for one in node["anyOf"] if null or one.get("type") != "null"]
+        return " or ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    if "const" in node or "enum" in node:
+        return " or ".join(json.dumps(value) for value in node.get("enum", [node.get("const")]))
+    if node.get("type") == "null":
+        return "left out"
+    if node.get("type") == "array":
+        return _list_in_words(node, definitions, how)
+    return KINDS.get(node.get("type", ""), "a table") + _limits(node, exact)
+
+
+def _limits(node: Schema, exact: bool) -> str:
+    limits = {
+        word: node[key] for key, word in LIMITS.items() if exact or abs(node.get(key, VAST)) < VAST if key in node
+    }
+    return "".join(f" {word} {bound:g}".replace("e+0", "e") for word, bound in limits.items())
+
+
+def _list_in_words(node: Schema, definitions: Schema | None, how: Mapping[str, Any]) -> str:
+    parts, items = node.get("prefixItems", []), node.get("items", {})
+    if node.get("maxItems") == 0:
+        return "empty"
+    if parts and all(part == parts[0] for part in parts):
+        each = _limits(parts[0], how["exact"])
+        one = "number" if parts[0].get("type") == "number" else in_words(parts[0], definitions, **how)
+        return f"[{', '.join([one] * len(parts))}]" + f", each{each}" * bool(each)
+    least = "a list (not empty) of " if node.get("minItems") else "a list of "
+    if "$comment" not in items and items.get("type") in SEVERAL and "pattern" not in items:
+        return least + SEVERAL[items["type"]] + _limits(items, how["exact"])
+    return least + ("tables" if "$ref" in items else in_words(items, definitions, **how))
