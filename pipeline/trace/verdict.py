@@ -45,6 +45,8 @@ MOST_DOUBLE = 2.6
 IN_CONTACT = 0.035
 """How far out of round (second harmonic over peak) two strands in contact are at the least; a round wire, with the wall
 beside it, is below 0.03."""
+ALONE = 0.15
+"""Share of a line in which one strand may lie alone at the least: 5 mm of 35."""
 OBLONG = 0.12
 """and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
 BESIDE_VOXELS = 2.2
@@ -159,13 +161,19 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
     oblong, doubtful = out_of_round(image, points, attempt.tube.sigma)
     double = beside_itself(points, step, BESIDE_VOXELS * image.voxel)
     if not image.thick_slices:
-        double |= _doubled(share, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
+        alone = share / _of_one_strand(share, (ends > MEAN_OVER_MM) & ~bridged & ~faint)
+        double |= _doubled(alone, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
     objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     objections += of_the_ends(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)
+
+
+def _of_one_strand(share: Array, seen: NDArray[np.bool_]) -> float:
+    """The height of one strand, in that of most of the line: two that lie together nearly all along are the usual."""
+    return min(1.0, float(np.quantile(share[seen], ALONE))) if seen.any() else 1.0
 
 
 def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:

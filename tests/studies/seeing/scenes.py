@@ -419,3 +419,22 @@ def lone_marker(rng, seed):
     d.opacity = np.where((d.from_tip > 1.0) & (d.from_tip < 1.0 + size), 0.0, 1.0)
     whole = r.arc_of(d.path[d.entry_at :])[-1]
     return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 3, gaps=((whole - 1.0 - size, whole - 1.0),))
+
+
+@case("a longer device 0.4 to 0.6 mm beside the wire")
+def longer_beside(rng, seed):
+    d = Draft(rng, radius=2.2, room=0.8)
+    whole, tip = d.path, len(d.path) - round(rng.uniform(8.0, 16.0) / 0.05)
+    d.path, d.opacity = whole[:tip], np.ones(tip)
+    d.others = [(sideways(whole, rng, rng.uniform(0.4, 0.6)), d.wire_radius, rng.uniform(0.7, 1.3))]
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 3)
+
+
+@case("a streak beyond the tip, x 0.1 to 0.3")
+def streak(rng, seed):
+    d = Draft(rng, radius=2.5)
+    t = d.path[-1] - d.path[-20]
+    t /= np.linalg.norm(t)
+    line = d.path[-1] + np.linspace(0.3, rng.uniform(4.0, 10.0), 200)[:, None] * t
+    d.others = [(line, d.wire_radius, rng.uniform(0.1, 0.3))]
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 3)
