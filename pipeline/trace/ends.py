@@ -25,6 +25,8 @@ END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 1.75, 3.0, 1.5
 with 2.0, one of them 2.6 voxels off and one 2.0; with 1.75 it is 74, the worst 1.2 off. An even wire in correlated
 noise is refused by more than its end alone, and may have the second. A stated step shows the end to half a voxel: what
 is further off than the third contradicts it."""
+HAIRPIN_DEG, HAIRPIN_VOXELS = 140.0, 7.0
+"""A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were one, there and back."""
 TIP_BESIDE = 3.5
 """Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
 
@@ -36,6 +38,17 @@ def beside_itself(points: Array, step: float, near: float) -> NDArray[np.bool_]:
     out = np.zeros(len(points), bool)
     out[pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > apart].ravel()] = True
     return out
+
+
+def sharpest_turn_deg(points: Array, step: float, reach: float) -> float:
+    """Largest angle by which a curve (n, 3), points ``step`` mm apart, turns within ``reach`` mm."""
+    along = np.diff(points, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
+    apart = max(1, round(reach / max(step, 1e-9)))
+    if len(along) <= apart:
+        return 0.0
+    cosine = np.sum(along[apart:] * along[:-apart], axis=1)
+    return float(np.degrees(np.arccos(np.clip(cosine.min(), -1.0, 1.0))))
 
 
 def _named(image: Subtraction, point: Array) -> str:
@@ -76,7 +89,9 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
     """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
     missing_mm = attempt.tube.steps.missing_mm
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
-    folded = beside_itself(points, length_mm / max(1, len(points) - 1), TIP_BESIDE * image.voxel)
+    step = length_mm / max(1, len(points) - 1)
+    folded = beside_itself(points, step, TIP_BESIDE * image.voxel)
+    turn = sharpest_turn_deg(points, step, HAIRPIN_VOXELS * image.voxel)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -108,6 +123,9 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
         (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
          "list a frame of a smaller depth before it, or look where the wire ends"),
+        (turn > HAIRPIN_DEG and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
+         f"a turn by {turn:.0f} degrees within {HAIRPIN_VOXELS * image.voxel:.1f} mm", f"{HAIRPIN_DEG:g} at most",
+         "look whether two wires lie side by side; state insertion_mm if the wire is folded"),
         (fills_vessel(image, points, attempt.tube.sigma), FrameStatus.TRACE_AMBIGUOUS,
          "a line as thick as its vessel", "a wire, which is thinner",
          "check that the frame shows a wire, and that the reference has the frame's contrast"),

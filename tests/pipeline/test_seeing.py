@@ -16,6 +16,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace import explain, trace
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.config import TraceConfig
+from pipeline.trace.ends import sharpest_turn_deg
 from pipeline.trace.onward import seen_outside
 from pipeline.trace.profile import Steps
 from pipeline.trace.reach import end_range
@@ -76,6 +77,9 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("dim distal part, x 0.15 to 0.2", 645, "TRACE_AMBIGUOUS"),  # cut by 6 mm of wire 1.7 noises bright, and ok
         ("dim distal part, x 0.15 to 0.2", 556, "TRACE_AMBIGUOUS"),  # the same, 13 mm of 1.2 noises
         ("two wires 0.8 mm apart", 635, "TRACE_AMBIGUOUS"),  # first the other one, and ok: wide crests merge them
+        ("two wires 0.8 mm apart", 805, "TRACE_AMBIGUOUS"),  # along one and back along the other, and ok
+        ("a longer device 0.4 to 0.6 mm beside the wire", 5, "TRACE_AMBIGUOUS"),  # to the other's tip, and ok
+        ("a longer device 0.4 to 0.6 mm beside the wire", 10, "TRACE_AMBIGUOUS"),
         ("correlated noise, CNR 4 to 6", 2, "TRACE_AMBIGUOUS"),  # right, but nothing in the frame says so
         ("tip folded back on itself", 632, "TRACE_AMBIGUOUS"),  # 7 mm of it in contact, hardly out of round, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
@@ -230,3 +234,13 @@ def test_knots_come_closer_for_bends_not_for_noise():
     bends, none = (look("plain", seed) for seed in (2, 5))
     assert bends.levels["knot_mm"] < 9.5 * 0.3 < 11.0 * 0.3 < none.levels["knot_mm"]
     assert bends.mean < 0.11, "voxel; 0.13 with wide knots"
+
+
+def test_a_turn_is_as_sharp_as_its_arc():
+    angle = np.linspace(0.0, np.pi, 200)
+    for radius in (0.5, 5.0):
+        arc = radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        step = radius * np.pi / 199
+        reach = 0.5 * radius
+        assert sharpest_turn_deg(arc, step, reach) == pytest.approx(np.degrees(0.5), rel=0.02), "to a sample"
+    assert sharpest_turn_deg(arc[:2], step, reach) == 0.0
