@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from pipeline.study.manifest import Case, Manifest
 
-NAME = "manifest.toml"
+NAME, INFERRED = "manifest.toml", "manifest.inferred.toml"
 Inferred = tuple[str, tuple[str, ...], tuple[str, ...]]
 """The text of a manifest, sentences that say what was seen, and what is assumed."""
 
@@ -75,7 +75,7 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     if keep is None:
         keep = Path(tempfile.mkdtemp())
         atexit.register(shutil.rmtree, keep, ignore_errors=True)  # until then its hash may be asked for
-    written = keep / "manifest.inferred.toml"
+    written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
 

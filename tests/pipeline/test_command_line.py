@@ -141,6 +141,27 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     assert not [text for text in told["assumed"] if text.startswith("entry")]
 
 
+def test_without_a_reference_init_says_what_to_correct_and_how(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The entry lies on the wire, and the lumen was to be found from there."""
+    next(scans.glob("reference.*")).unlink()
+    assert main(["run", str(scans), "-o", str(tmp_path / "out"), "--until", "trace", "-q"]) == 1
+    assert f"next: wireval init '{scans}', correct in it what is assumed" in capsys.readouterr().err
+    assert main(["init", str(scans)]) == 0
+    assert "lumen_seed_mm: the entry, from where the vessel is segmented" in capsys.readouterr().out
+    manifest = scans / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8")
+    assert "change the signs of the first two numbers" in text
+    assert "# lumen_seed_mm = [[x, y, z]]" in text
+    assert "\nmaterial_axis" not in text, "it would be that of a direction which is corrected"
+    manifest.write_text(
+        text.replace("# lumen_seed_mm = [[x, y, z]]", "lumen_seed_mm = [[0.5, -1.0, 10.0]]"), encoding="utf-8"
+    )
+    assert main(["check", str(scans)]) == 0
+    assert "lumen_seed_mm" not in capsys.readouterr().out, "what is stated is no longer assumed"
+
+
 def test_a_wire_thinner_than_half_a_voxel_is_warned_of_and_a_fitted_roll_not_assumed(
     scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
