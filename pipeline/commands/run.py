@@ -40,11 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_calibrated(parser)
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
-    add(
-        "--no-cache",
-        action="store_true",
-        help="neither read nor write the stage store; inputs are hashed for provenance",
-    )
+    add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_verbosity(parser)
 
 
