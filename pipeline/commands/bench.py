@@ -38,6 +38,8 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.study.manifest import ManifestError, read_manifest
     from pipeline.study.settings import Config
 
+    if problems := _wrong(args):
+        return complain(problems, "the command line")
     plain = not (args.stress or args.peers or args.snaps or args.resolution)
     random = {"snaps": study_of_steps, "resolution": study_of_resolution}
     studies = [make(args.seed, quick=args.quick) for name, make in random.items() if plain or getattr(args, name)]
@@ -63,3 +65,13 @@ def main(args: argparse.Namespace) -> int:
         sound &= measure_claims(args.out, say, [*STUDIES, friction, *studies] if plain else studies)
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1
+
+
+def _wrong(args: argparse.Namespace) -> list[str]:
+    """What of the command line cannot be carried out."""
+    problems = [f"--seed {args.seed}: expected 0 or more"] * (args.seed < 0)
+    problems += [f"--scenes {args.scenes}: expected 1 or more, or leave it out"] * (args.scenes < 0)
+    studies = [f"--{name}" for name in ("stress", "peers", "snaps", "resolution") if getattr(args, name)]
+    if args.manifest is not None and studies:
+        problems.append(f"{args.manifest}: {', '.join(studies)} make scenes of their own; leave the manifest out")
+    return problems

@@ -69,6 +69,8 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
         )
     path = file_of(path)
     if not path.is_dir():
+        if unused := _said_of_scans(args):
+            raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
     text, seen, _ = inferred(args)
     say("\n".join([text, *seen]))
@@ -78,6 +80,12 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
     written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
+
+
+def _said_of_scans(args: argparse.Namespace) -> list[str]:
+    """The options that were given for a folder of scans."""
+    names = ("entry", "direction", "reference", "wire_radius")
+    return [f"--{name.replace('_', '-')}" for name in names if getattr(args, name) is not None]
 
 
 def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:

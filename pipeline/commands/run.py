@@ -126,6 +126,8 @@ def _limits(args: argparse.Namespace) -> "Limits":
 
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
+    if args.resume and args.fresh:
+        raise UsageError(["--resume and --fresh: keep what fits, or compute again; give one of them"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     limits = Limits(args.case_timeout, args.case_memory)

@@ -64,16 +64,34 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("init STUDY --to y --wire-radius -1", "radius_mm"),
         ("init STUDY --to y --reference STUDY/none.mha", "no such scan"),
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
+        ("run", "missing: MANIFEST, -o; wireval run --help lists what there is"),
+        ("run STUDY -o", "-o: its value is missing"),
+        ("run STUDY -o EMPTY", "an empty argument"),
+        ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
+        ("run STUDY -o y -q -v", "-v and -q: give one of them"),
+        ("run STUDY -o y --resume --fresh", "--resume and --fresh: keep what fits, or compute again"),
+        ("run STUDY -o y --entry 1,2,3", "--entry: of a folder of scans"),
+        ("check STUDY --wire-radius 3", "--wire-radius: of a folder of scans"),
+        ("run STUDY -o y -c STUDY", "this is a folder"),
+        ("run STUDY -o y -c STUDY/none.toml", "none.toml: no such file; wireval settings prints one"),
+        ("synth straight -o y --format foo", "--format 'foo': allowed: 'mha', 'nrrd'"),
+        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 or more"),
+        ("bench -o y --snaps --seed -1", "--seed -1: expected 0 or more"),
+        ("bench STUDY -o y --stress", "leave the manifest out"),
+        ("cache", "missing: one of --info, --check, --limit, --prune"),
     ],
 )
 def test_what_is_wrong_is_said(
     words: str, said: str, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    typed = [str(tmp_path / "y") if w == "y" else w.replace("STUDY", str(study)) for w in words.split()]
+    typed = [
+        str(tmp_path / "y") if w == "y" else w.replace("STUDY", str(study)).replace("EMPTY", "") for w in words.split()
+    ]
     assert main(typed) == 2
     heard = capsys.readouterr().err.strip().splitlines()
     assert said in heard[0]
     assert len(heard) == 2, "the problem, and how many there are"
+    assert "usage:" not in "".join(heard)
     assert not (tmp_path / "y").exists(), "nothing is left behind"
 
 
