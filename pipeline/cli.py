@@ -135,8 +135,12 @@ def _ended_by_signal() -> Iterator[None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code, which a reader of its output that has gone does not change."""
-    with lasting():
-        return _main(argv)
+    with lasting() as out:
+        code = _main(argv)
+        out.flush()
+        if out.lost:  # a table that is cut short is no success
+            print(f"the output cannot be written: {out.lost}; make room, then give the command again", file=sys.stderr)
+        return code or (FAILED if out.lost else OK)
 
 
 def _main(argv: Sequence[str] | None) -> int:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from pipeline.commands import complain, say
+from pipeline.commands.given import file_of
 
 HELP = "run time against error; rivals; a stress study"
 
@@ -25,6 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
+    problems = _wrong(args)
+    return complain(problems, "the command line") if problems else _measured(args)
+
+
+def _measured(args: argparse.Namespace) -> int:
+    """Measure, write and say; the exit code, as ``main``."""
     from pipeline.benchmark import page, scenes
     from pipeline.benchmark.claims import STUDIES, measure_claims
     from pipeline.benchmark.cost import measure_cost
@@ -38,13 +45,11 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.study.manifest import ManifestError, read_manifest
     from pipeline.study.settings import Config
 
-    if problems := _wrong(args):
-        return complain(problems, "the command line")
     plain = not (args.stress or args.peers or args.snaps or args.resolution)
     random = {"snaps": study_of_steps, "resolution": study_of_resolution}
     studies = [make(args.seed, quick=args.quick) for name, make in random.items() if plain or getattr(args, name)]
     try:
-        cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
+        cases = read_manifest(file_of(args.manifest)).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
     except (ManifestError, NoScene, LoadError) as error:
         return complain(getattr(error, "problems", [str(error)]), str(args.manifest))

@@ -16,8 +16,9 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run.gate import Gate, gate
-from pipeline.study.explain import described, in_words
+from pipeline.study.explain import described
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
+from pipeline.wording import in_words
 
 
 @pytest.fixture(scope="module")
@@ -365,3 +366,24 @@ def test_diff_says_where_the_candidate_is_no_run(
         capsys.readouterr()
         assert main(["diff", str(out), str(second)]) == said
         assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == said
+
+
+def test_an_output_that_cannot_be_written_is_no_success() -> None:
+    """A full disk under `wireval settings > FILE` was a traceback."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "pipeline", "settings"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines() == [
+        "the output cannot be written: No space left on device; make room, then give the command again"
+    ]
+
+
+def test_a_closed_output_is_no_trouble() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m pipeline settings >&-", shell=True, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
