@@ -2,12 +2,14 @@
 
 import argparse
 import importlib
+import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import shtab
 
@@ -25,9 +27,41 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM, as a batch system sends it before it kills: ends like Ctrl-C."""
 
 
-def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+KINDS = {"int": "a whole number", "float": "a number"}
+WORDED: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
+    (r"argument (\S+): invalid (int|float) value: (.*)", lambda m: f"{_short(m[1])} {m[3]}: expected {KINDS[m[2]]}"),
+    (
+        r"argument (\S+): invalid choice: ('.*?') \(choose from (.*)\)",
+        lambda m: f"{_short(m[1])} {m[2]}: allowed: {m[3]}",
+    ),
+    (r"argument (\S+): expected one argument", lambda m: f"{_short(m[1])}: its value is missing"),
+    (
+        r"argument (\S+): not allowed with argument (\S+)",
+        lambda m: f"{_short(m[1])} and {_short(m[2])}: give one of them",
+    ),
+    (r"the following arguments are required: (.*)", lambda m: f"missing: {', '.join(map(_short, m[1].split(', ')))}"),
+    (r"one of the arguments (.*) is required", lambda m: f"missing: one of {', '.join(m[1].split())}"),
+)
+"""What argparse says, and how it is said here."""
+
+
+def _short(names: str) -> str:
+    return names.partition("/")[0]
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that tells what is wrong as everything else is told, without a page of usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError."""
+        found = ((re.fullmatch(pattern, message), say) for pattern, say in WORDED)
+        text = next((say(match) for match, say in found if match), message)
+        raise _usage(f"{text}; {self.prog} --help lists what there is")
+
+
+def parsers() -> tuple[Parser, dict[str, Parser]]:
     """The parser of the whole command line, and that of each verb by its name."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="wireval",
         description="Validate simulated guide wires against 3D scans.",
         epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted; "
@@ -38,7 +72,7 @@ def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
         parser, "--print-completion", help="print what makes this shell complete commands and options"
     )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
-    verbs = {}
+    verbs: dict[str, Parser] = {}
     for name in VERBS:
         verb = importlib.import_module(f"pipeline.commands.{name}")
         verbs[name] = commands.add_parser(name, help=verb.HELP, description=verb.HELP)
@@ -47,7 +81,9 @@ def parsers() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
 
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
-    """What was typed; InputError for a verb or an option that there is none of, argparse's exit for the rest."""
+    """What was typed; InputError for what cannot be carried out, argparse's exit for --help."""
+    if "" in words:
+        raise _usage("an empty argument; name a file, a folder or a value, or leave it out")
     parser, verbs = parsers()
     if words and not words[0].startswith("-") and words[0] not in verbs:
         raise _usage(f"{words[0]!r} is no command; {did_you_mean(words[0], verbs)}")
@@ -99,8 +135,12 @@ def _ended_by_signal() -> Iterator[None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code, which a reader of its output that has gone does not change."""
-    with lasting():
-        return _main(argv)
+    with lasting() as out:
+        code = _main(argv)
+        out.flush()
+        if out.lost:  # a table that is cut short is no success
+            print(f"the output cannot be written: {out.lost}; make room, then give the command again", file=sys.stderr)
+        return code or (FAILED if out.lost else OK)
 
 
 def _main(argv: Sequence[str] | None) -> int:

@@ -4,14 +4,20 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TextIO, cast
 
 
 class Lasting:
-    """A stream that goes nowhere once its reader has gone, so that the command ends with the exit code that it has."""
+    """A stream that goes nowhere once its reader has gone, so that the command ends with the exit code that it has.
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+    lost : why it goes nowhere where that is no reader's doing, as a full disk; empty otherwise.
+    """
+
+    def __init__(self, stream: TextIO | None) -> None:
+        # Python has none where it was closed before, as by `>&-`
+        self._stream = stream or Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - it is the process's
+        self.lost = ""
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -31,19 +37,21 @@ class Lasting:
     def _without_reader(self) -> Iterator[None]:
         try:
             yield
-        except BrokenPipeError:
+        except OSError as error:
+            self.lost = "" if isinstance(error, BrokenPipeError) else error.strerror or str(error)
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self._stream.fileno())
             os.close(nowhere)
 
 
 @contextmanager
-def lasting() -> Iterator[None]:
-    """Let stdout and stderr outlast their readers."""
+def lasting() -> Iterator[Lasting]:
+    """Let stdout and stderr outlast their readers; what stands for stdout, which knows what it lost."""
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = (cast(TextIO, Lasting(stream)) for stream in before)
+    out, errors = (Lasting(stream) for stream in before)
+    sys.stdout, sys.stderr = cast(TextIO, out), cast(TextIO, errors)
     try:
-        yield
+        yield out
     finally:
         sys.stdout.flush()
         sys.stderr.flush()

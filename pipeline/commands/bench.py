@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from pipeline.commands import complain, say
+from pipeline.commands.given import file_of
 
 HELP = "run time against error; rivals; a stress study"
 
@@ -25,6 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; 1 where a claim or a stress scene failed; 2 on wrong input."""
+    problems = _wrong(args)
+    return complain(problems, "the command line") if problems else _measured(args)
+
+
+def _measured(args: argparse.Namespace) -> int:
+    """Measure, write and say; the exit code, as ``main``."""
     from pipeline.benchmark import page, scenes
     from pipeline.benchmark.claims import STUDIES, measure_claims
     from pipeline.benchmark.cost import measure_cost
@@ -42,7 +49,7 @@ def main(args: argparse.Namespace) -> int:
     random = {"snaps": study_of_steps, "resolution": study_of_resolution}
     studies = [make(args.seed, quick=args.quick) for name, make in random.items() if plain or getattr(args, name)]
     try:
-        cases = read_manifest(args.manifest).cases if plain and args.manifest is not None else []
+        cases = read_manifest(file_of(args.manifest)).cases if plain and args.manifest is not None else []
         chosen = [scene_of(case, Config()) for case in cases]
     except (ManifestError, NoScene, LoadError) as error:
         return complain(getattr(error, "problems", [str(error)]), str(args.manifest))
@@ -63,3 +70,13 @@ def main(args: argparse.Namespace) -> int:
         sound &= measure_claims(args.out, say, [*STUDIES, friction, *studies] if plain else studies)
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1
+
+
+def _wrong(args: argparse.Namespace) -> list[str]:
+    """What of the command line cannot be carried out."""
+    problems = [f"--seed {args.seed}: expected 0 or more"] * (args.seed < 0)
+    problems += [f"--scenes {args.scenes}: expected 1 or more, or leave it out"] * (args.scenes < 0)
+    studies = [f"--{name}" for name in ("stress", "peers", "snaps", "resolution") if getattr(args, name)]
+    if args.manifest is not None and studies:
+        problems.append(f"{args.manifest}: {', '.join(studies)} make scenes of their own; leave the manifest out")
+    return problems

@@ -6,17 +6,19 @@ import sys
 
 from pipeline.commands import complain, say
 
-HELP = "the stage store"
+HELP = "lumens, traces and the like that are kept, so that no run computes them again"
 UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What may follow the verb."""
     action = parser.add_mutually_exclusive_group(required=True)
-    action.add_argument("--info", action="store_true", help="where the stage store lies and how large it is")
+    action.add_argument("--info", action="store_true", help="where they lie and how much room they take")
     action.add_argument("--check", action="store_true", help="read every result; remove those that are not whole")
-    action.add_argument("--limit", metavar="SIZE", help="how large it may grow (20G, 500M): the oldest used go first")
-    action.add_argument("--prune", action="store_true", help="empty it")
+    action.add_argument(
+        "--limit", metavar="SIZE", help="how much room they may take (20G, 500M): the oldest used go first"
+    )
+    action.add_argument("--prune", action="store_true", help="remove all of them")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -28,7 +30,7 @@ def main(args: argparse.Namespace) -> int:
         whole, damaged = store.check()
         for path in damaged:
             sys.stderr.write(f"{path}: not as it was written; removed, the next run computes it again\n")
-        say(f"{store.root}: {whole} stage results are whole, {len(damaged)} were not")
+        say(f"{store.root}: {whole} kept results are whole, {len(damaged)} were not")
         return 1 if damaged else 0
     if args.limit is not None:
         limit = _bytes(args.limit)
@@ -37,10 +39,10 @@ def main(args: argparse.Namespace) -> int:
         store.set_limit(limit)
     if args.prune or args.limit is not None:
         count, size = store.trim(0 if args.prune else None)
-        say(f"removed {count} stage results, {size / 2**20:.1f} MiB, from {store.root}")
+        say(f"removed {count} kept results, {size / 2**20:.1f} MiB, from {store.root}")
     entries = store.entries()
     taken = sum(size for _, size, _ in entries) / 2**20
-    say(f"{store.root}: {len(entries)} stage results, {taken:.1f} MiB of at most {store.limit / 2**30:g} GiB")
+    say(f"{store.root}: {len(entries)} kept results, {taken:.1f} MiB of at most {store.limit / 2**30:g} GiB")
     return 0
 
 

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameters.toml and calibration.html (or design.html) go there",
     )
     add("--design", action="store_true", help="predict from planned lumen, wire, depths and rolls; nothing is fitted")
-    add("--no-cache", action="store_true", help="neither read nor write the stage store")
+    add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_settings(parser)
 
 
@@ -51,7 +51,7 @@ def main(args: argparse.Namespace) -> int:
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Fit, write, and say what was found."""
     from pipeline.run.calibration import calibrate, file_in, gathered
-    from pipeline.run.calibration_files import misfit, write_parameters, write_record
+    from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
     from reports.calibration import render_calibration
 
     found = gathered(cases, config, store, say)
@@ -64,7 +64,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
         sd = f"{100 * one.sd:.2g} %" if one.logarithmic else f"{one.sd:.2g}"
         verdict = "" if one.seen else f"  UNIDENTIFIABLE, as stated; fitted {one.value:g}: {one.why}"
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
-    for warning in misfit(fit):
+    for warning in (*misfit(fit), *flattened(found)):
         say(f"warning: {warning}")
     for note in found.left_out:
         say(note)

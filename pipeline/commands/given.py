@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from pipeline.study.manifest import Case, Manifest
 
-NAME = "manifest.toml"
+NAME, INFERRED = "manifest.toml", "manifest.inferred.toml"
 Inferred = tuple[str, tuple[str, ...], tuple[str, ...]]
 """The text of a manifest, sentences that say what was seen, and what is assumed."""
 
@@ -69,15 +69,23 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
         )
     path = file_of(path)
     if not path.is_dir():
+        if unused := _said_of_scans(args):
+            raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
     text, seen, _ = inferred(args)
     say("\n".join([text, *seen]))
     if keep is None:
         keep = Path(tempfile.mkdtemp())
         atexit.register(shutil.rmtree, keep, ignore_errors=True)  # until then its hash may be asked for
-    written = keep / "manifest.inferred.toml"
+    written = keep / INFERRED
     write_text(written, text)
     return read_manifest(written)
+
+
+def _said_of_scans(args: argparse.Namespace) -> list[str]:
+    """The options that were given for a folder of scans."""
+    names = ("entry", "direction", "reference", "wire_radius")
+    return [f"--{name.replace('_', '-')}" for name in names if getattr(args, name) is not None]
 
 
 def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:

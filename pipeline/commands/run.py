@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.commands import add_settings, add_verbosity, resolved_settings, say, settings_of
-from pipeline.commands.given import add_calibrated, add_manifest, assumed_in, given
+from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
     from pipeline.run.launch import Plan
@@ -40,11 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_calibrated(parser)
     add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
-    add(
-        "--no-cache",
-        action="store_true",
-        help="neither read nor write the stage store; inputs are hashed for provenance",
-    )
+    add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_verbosity(parser)
 
 
@@ -88,10 +84,8 @@ def _plan(args: argparse.Namespace) -> "Plan":
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
     from pipeline.run.guards import guard_apart, guard_kept, guard_out, guard_stages
-    from pipeline.run.launch import Plan, UsageError, chosen
-    from pipeline.run.log import STAGES
+    from pipeline.run.launch import Plan, chosen
     from pipeline.run.sweep import points_of
-    from pipeline.status import did_you_mean
     from pipeline.study.sources import files_of
 
     if args.executor:  # workers elsewhere know nothing of this process's working folder
@@ -100,10 +94,6 @@ def _plan(args: argparse.Namespace) -> "Plan":
     manifest = given(args, None if args.dry_run else args.out)
     guard_apart(args.out, (path.parent for case in manifest.cases for path in files_of(case).values()))
     settings = resolved_settings(args)
-    if args.until not in STAGES:
-        raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
-    if args.jobs < 1:
-        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     limits = _limits(args)
     cache = None if args.no_cache else default_root()
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
@@ -120,15 +110,26 @@ def _plan(args: argparse.Namespace) -> "Plan":
     guard_kept(args.out, {case.id for case in manifest.cases} - {case.id for case in cases}, settings)
     if not args.fresh:
         guard_stages(args.out, args.until)
+    folder = args.manifest if manifest.path.name == INFERRED else None
     left_out = tuple(case.id for case in manifest.cases if args.only and case.id not in args.only)
-    return Plan(manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes, left_out)
+    return Plan(
+        manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes, left_out, folder
+    )
 
 
 def _limits(args: argparse.Namespace) -> "Limits":
-    """What a case may take."""
+    """What a case may take; UsageError for this and other numbers and names that are none."""
     from pipeline.run.launch import UsageError
+    from pipeline.run.log import STAGES
     from pipeline.run.workers import Limits, resident_mib
+    from pipeline.status import did_you_mean
 
+    if args.until not in STAGES:
+        raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
+    if args.resume and args.fresh:
+        raise UsageError(["--resume and --fresh: keep what fits, or compute again; give one of them"])
+    if args.jobs < 1:
+        raise UsageError([f"-j {args.jobs}: expected 1 or more"])
     limits = Limits(args.case_timeout, args.case_memory)
     for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
         if not value > 0:

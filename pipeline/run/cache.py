@@ -88,7 +88,7 @@ class Store:
                 temporary.write_bytes(encoded(key, result))
         except OSError as error:
             self._writable = False
-            self.warn(f"the stage store keeps nothing from here on: {error}")
+            self.warn(f"the cache keeps nothing from here on: {error}")
 
     @staticmethod
     def _path(root: Path, stage: str, key: str) -> Path:

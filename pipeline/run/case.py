@@ -226,4 +226,4 @@ def load_kernels(progress: CaseProgress) -> None:
     cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
     if not cached:
         progress.warn("compiling the solver, once per installation: half a minute to two")
-    progress.write(f"kernels ready in {_kernels_loaded():.2f} s")
+    progress.write(f"compiled code ready in {_kernels_loaded():.2f} s")

@@ -1,6 +1,7 @@
 """What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
 
-from collections.abc import Mapping
+import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,18 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
         f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
-    then = then or f"do what the message says, then {next_command(cases, typed(plan.out))}"
+    then = then or _next(plan, cases)
     aside = [text] if (text := left_over_sentence(plan.out)) else []
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
+
+
+def _next(plan: Plan, cases: Sequence[str]) -> str:
+    """What to do about failures: where the manifest was inferred there is none yet to correct."""
+    again = next_command(cases, typed(plan.out))
+    if plan.inferred_from is None:
+        return f"do what the message says, then {again}"
+    folder = shlex.quote(str(plan.inferred_from))
+    return f"wireval init {folder}, correct in it what is assumed and what the message says, then {again}"
 
 
 def last_line(totals: Totals, index: Path) -> str:

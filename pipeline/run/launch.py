@@ -47,7 +47,7 @@ class Plan:
 
     limits : what a case may take.
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
-    left_out : ids of the manifest's cases that --only does not name.
+    left_out : ids of the manifest's cases that --only does not name.     inferred_from : folder of scans without one.
     """
 
     manifest: Manifest
@@ -60,6 +60,7 @@ class Plan:
     shard: str = ""
     assumptions: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    inferred_from: Path | None = None
 
     @property
     def out(self) -> Path:

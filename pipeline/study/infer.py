@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,14 @@ UNSUBTRACTED = (
     "; without a reference to subtract the brightest thing there may be a filled vessel or a bone: such a guess is "
     "several mm off, look at the first frame and correct both, or scan the phantom without the wire"
 )
+SEED = (
+    "lumen_seed_mm: the entry, from where the vessel is segmented in the first frame, with the wire in it: name a "
+    "point in the filled vessel beyond the wire's tip"
+)
+HOW_TO_CORRECT = """# entry_mm: where the wire enters the vessel; entry_direction: from there the way it is pushed.
+# Both in LPS mm: 3D Slicer shows R A S, change the signs of the first two numbers.
+"""
+SEED_LINE = "# lumen_seed_mm = [[x, y, z]]      # in the vessel beyond the wire's tip of the first frame, LPS mm\n"
 MANIFEST = """schema = 1
 
 [wires.assumed]
@@ -34,9 +43,9 @@ id = "{id}"
 {reference}frames = [{frames}]
 assumed = [
 {assumed}]
-entry_mm = {entry}
+{how}entry_mm = {entry}
 entry_direction = {direction}
-material_axis = {axis}
+{seed}# material_axis = [x, y, z]        # where the curved tip points at roll 0; left out: follows entry_direction
 wire = "assumed"
 [case.wall]
 stiffness_N_mm2 = {wall.stiffness_N_mm2}
@@ -150,7 +159,7 @@ def infer_manifest(
         *(f"left out: {path.name}, named as a scan without wire" for path in left_out),
     )
     entry, direction, where = _stated_or_seen(entry, direction, frames[0], reference, config)
-    notes = _assumed(radius_mm, where)
+    notes = _assumed(radius_mm, [where] * bool(where) + [SEED] * (reference is None))
     text = MANIFEST.format(
         radius=radius_mm or DEFAULT_RADIUS_MM,
         id=re.sub(r"[^A-Za-z0-9._-]", "_", folder.resolve().name).lstrip("._-") or "case",
@@ -159,18 +168,19 @@ def infer_manifest(
         frames=", ".join(_named(p, base) for p in frames),
         entry=[round(float(x), 3) for x in entry],
         direction=[round(float(x), 5) for x in direction],
-        axis=np.eye(3)[np.argmin(np.abs(direction))].tolist(),
+        how=HOW_TO_CORRECT * bool(where),
+        seed=SEED_LINE * (reference is None),
         wall=Wall(),
     )
     return text, seen, tuple(notes)
 
 
-def _assumed(radius_mm: float | None, where: str) -> list[str]:
-    """What nobody has said of a case. radius_mm : where it was said.     where : how the entry was found, if it was."""
+def _assumed(radius_mm: float | None, places: Sequence[str]) -> list[str]:
+    """What nobody has said of a case. radius_mm : where it was said.     places : sentences on entry and seed."""
     stiffness = "stiffness and tip curve of a common 0.014 inch wire"
     return [
         f"wire: {stiffness}" if radius_mm else f"wire: radius {DEFAULT_RADIUS_MM} mm, {stiffness}",
-        *[where] * bool(where),
+        *places,
         "material_axis: the world axis least along entry_direction, as nothing tells of it",
         f"wall: {Wall().stiffness_N_mm2} N/mm2, friction {Wall().friction:g}",
         'roll_deg: 0, that is, a curved tip bends towards material_axis; roll_deg = "fit" where it is unknown',

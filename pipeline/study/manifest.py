@@ -117,7 +117,13 @@ class Case(Strict):
     @property
     def unconfirmed(self) -> tuple[str, ...]:
         """What is assumed, less what another key has made void."""
-        return tuple(text for text in self.assumed if self.roll_deg != "fit" or not text.startswith("roll_deg:"))
+        void = {
+            "roll_deg:": self.roll_deg == "fit",
+            "material_axis:": self.material_axis is not None,
+            "lumen_seed_mm:": self.lumen_seed_mm != (self.entry_mm,) or self.lumen is not None,
+            "insertion_mm:": self.insertion_mm is not None,
+        }
+        return tuple(text for text in self.assumed if not void.get(text.partition(" ")[0]))
 
     @property
     def stated_roll_deg(self) -> float | tuple[float, ...]:

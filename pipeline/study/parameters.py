@@ -103,8 +103,10 @@ def read_parameters(path: Path) -> Parameters:
         raise ParametersError(
             [f"{path}: no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"]
         ) from None
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParametersError([f"{path}: cannot be read as TOML: {error}"]) from None
+    except OSError as error:
+        raise ParametersError([f"{path}: cannot be read: {error.strerror}; name a file"]) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParametersError([f"{path}: not valid TOML: {error}"]) from None
     try:
         return Parameters.model_validate(data)
     except ValidationError as error:

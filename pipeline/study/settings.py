@@ -14,7 +14,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from pipeline.budget.config import BudgetConfig
 from pipeline.compare.config import CompareConfig
+from pipeline.load import LoadError
 from pipeline.load.config import LoadConfig
+from pipeline.load.guard import read_text, status_of
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
@@ -89,9 +91,13 @@ def parse_assignment(text: str, source: str = "command line") -> Setting:
 def read_settings(path: Path) -> list[Setting]:
     """All settings of a TOML file of tables."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SettingsError([f"{path}: cannot be read as TOML: {error}"]) from None
+        if status_of(path) is None:
+            raise SettingsError([f"{path}: no such file; wireval settings prints one"])
+        data = tomllib.loads(read_text(path))
+    except LoadError as error:
+        raise SettingsError([str(error)]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError([f"{path}: not valid TOML: {error}"]) from None
     found: list[Setting] = []
     for table, values in data.items():
         if not isinstance(values, dict):

@@ -148,6 +148,7 @@ def test_command_writes_tables_and_a_page(tmp_path: Path, capsys: pytest.Capture
         resolution=False,
         quick=True,
         seed=0,
+        scenes=0,
         out=tmp_path,
     )
     assert command.main(missing) == 2

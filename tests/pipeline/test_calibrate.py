@@ -23,7 +23,7 @@ from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import as_calibrated, data_of
 from pipeline.run.calibration import gathered
-from pipeline.run.calibration_files import misfit
+from pipeline.run.calibration_files import flattened, misfit
 from pipeline.run.log import Log
 from pipeline.run.outputs import error_row, summary_row
 from pipeline.run.stages import Context, Known
@@ -358,3 +358,17 @@ def test_what_was_assumed_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None
         gathered([SimpleNamespace(id="a")], Config(), Store(None), heard.append)  # type: ignore[list-item]
     assert len(error.value.problems) == 1
     assert heard == ["a: the phantom did not move"]
+
+
+def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():
+    """In scans alone: own curves were not traced here."""
+
+    def found(voxel_mm, **case):
+        one = SimpleNamespace(**({"id": "a", "frames": ("scan",), "traces": ()} | case))
+        return SimpleNamespace(
+            cases=[one], trials=[SimpleNamespace(wire=SimpleNamespace(radius_mm=0.18), voxel_mm=voxel_mm)]
+        )
+
+    assert flattened(found(0.375)) == []
+    assert "a: the wire's diameter is 0.48 voxels" in flattened(found(0.75))[0]
+    assert flattened(found(0.75, frames=("scan",), traces=("curve",))) == []

@@ -16,8 +16,9 @@ import SimpleITK as sitk
 
 from pipeline.cli import main
 from pipeline.run.gate import Gate, gate
-from pipeline.study.explain import described, in_words
+from pipeline.study.explain import described
 from pipeline.study.settings import Config, SettingsError, parse_assignment, read_settings, resolve
+from pipeline.wording import in_words
 
 
 @pytest.fixture(scope="module")
@@ -64,16 +65,34 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("init STUDY --to y --wire-radius -1", "radius_mm"),
         ("init STUDY --to y --reference STUDY/none.mha", "no such scan"),
         ("settings solver.segmnt_mm", "did you mean 'solver.segment_mm'?"),
+        ("run", "missing: MANIFEST, -o; wireval run --help lists what there is"),
+        ("run STUDY -o", "-o: its value is missing"),
+        ("run STUDY -o EMPTY", "an empty argument"),
+        ("run STUDY -o y -j x", "-j 'x': expected a whole number"),
+        ("run STUDY -o y -q -v", "-v and -q: give one of them"),
+        ("run STUDY -o y --resume --fresh", "--resume and --fresh: keep what fits, or compute again"),
+        ("run STUDY -o y --entry 1,2,3", "--entry: of a folder of scans"),
+        ("check STUDY --wire-radius 3", "--wire-radius: of a folder of scans"),
+        ("run STUDY -o y -c STUDY", "this is a folder"),
+        ("run STUDY -o y -c STUDY/none.toml", "none.toml: no such file; wireval settings prints one"),
+        ("synth straight -o y --format foo", "--format 'foo': allowed: 'mha', 'nrrd'"),
+        ("bench -o y --stress --scenes -1", "--scenes -1: expected 1 or more"),
+        ("bench -o y --snaps --seed -1", "--seed -1: expected 0 or more"),
+        ("bench STUDY -o y --stress", "leave the manifest out"),
+        ("cache", "missing: one of --info, --check, --limit, --prune"),
     ],
 )
 def test_what_is_wrong_is_said(
     words: str, said: str, study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    typed = [str(tmp_path / "y") if w == "y" else w.replace("STUDY", str(study)) for w in words.split()]
+    typed = [
+        str(tmp_path / "y") if w == "y" else w.replace("STUDY", str(study)).replace("EMPTY", "") for w in words.split()
+    ]
     assert main(typed) == 2
     heard = capsys.readouterr().err.strip().splitlines()
     assert said in heard[0]
     assert len(heard) == 2, "the problem, and how many there are"
+    assert "usage:" not in "".join(heard)
     assert not (tmp_path / "y").exists(), "nothing is left behind"
 
 
@@ -139,6 +158,27 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     told = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["case"][0]
     assert (told["entry_mm"], told["entry_direction"]) == ([1, 2, 3], [0, 0, 1])
     assert not [text for text in told["assumed"] if text.startswith("entry")]
+
+
+def test_without_a_reference_init_says_what_to_correct_and_how(
+    scans: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The entry lies on the wire, and the lumen was to be found from there."""
+    next(scans.glob("reference.*")).unlink()
+    assert main(["run", str(scans), "-o", str(tmp_path / "out"), "--until", "trace", "-q"]) == 1
+    assert f"next: wireval init '{scans}', correct in it what is assumed" in capsys.readouterr().err
+    assert main(["init", str(scans)]) == 0
+    assert "lumen_seed_mm: the entry, from where the vessel is segmented" in capsys.readouterr().out
+    manifest = scans / "manifest.toml"
+    text = manifest.read_text(encoding="utf-8")
+    assert "change the signs of the first two numbers" in text
+    assert "# lumen_seed_mm = [[x, y, z]]" in text
+    assert "\nmaterial_axis" not in text, "it would be that of a direction which is corrected"
+    manifest.write_text(
+        text.replace("# lumen_seed_mm = [[x, y, z]]", "lumen_seed_mm = [[0.5, -1.0, 10.0]]"), encoding="utf-8"
+    )
+    assert main(["check", str(scans)]) == 0
+    assert "lumen_seed_mm" not in capsys.readouterr().out, "what is stated is no longer assumed"
 
 
 def test_a_wire_thinner_than_half_a_voxel_is_warned_of_and_a_fitted_roll_not_assumed(
@@ -326,3 +366,24 @@ def test_diff_says_where_the_candidate_is_no_run(
         capsys.readouterr()
         assert main(["diff", str(out), str(second)]) == said
         assert ("no case below it: is this what `wireval run` wrote?" in capsys.readouterr().err) == said
+
+
+def test_an_output_that_cannot_be_written_is_no_success() -> None:
+    """A full disk under `wireval settings > FILE` was a traceback."""
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "pipeline", "settings"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines() == [
+        "the output cannot be written: No space left on device; make room, then give the command again"
+    ]
+
+
+def test_a_closed_output_is_no_trouble() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m pipeline settings >&-", shell=True, stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")

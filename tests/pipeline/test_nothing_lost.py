@@ -225,7 +225,7 @@ def test_a_store_that_cannot_be_written_costs_a_warning(
     (tmp_path / "file").write_text("", encoding="utf-8")
     monkeypatch.setenv("WIREVAL_CACHE", str(tmp_path / "file" / "store"))
     assert run(study, tmp_path / "out") == 0
-    assert capsys.readouterr().err.count("the stage store keeps nothing from here on") == 1
+    assert capsys.readouterr().err.count("the cache keeps nothing from here on") == 1
     assert differences(whole, tmp_path / "out") == []
 
 

@@ -29,7 +29,7 @@ def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]
-    assert "greater than or equal to 0.01" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
+    assert "expected a number from 0.01 to 100" in wireval.check(study, settings={"solver.segment_mm": -1})[0]
     assert wireval.check(tmp_path)[0].endswith("here or in frames/"), "a folder without scans"
 
 
