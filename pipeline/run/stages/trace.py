@@ -54,7 +54,7 @@ def trace_frames(run: Context, known: Known) -> Known:
 
 
 class _Part(NamedTuple):
-    """What becomes of one frame. window : the grey values that are shown of it; None where it could not be read."""
+    """What becomes of one frame. window : the grey values that are shown of all frames from the first traced one on."""
 
     frame: Frame
     window: tuple[float, float] | None
@@ -95,9 +95,9 @@ class _Tracing:
 
     def look(
         self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
-    ) -> tuple[Frame, tuple[float, float]]:
-        """One frame read, put in place and traced, and its grey window; LoadError where it cannot be read."""
-        log, settings = run.log, run.config.trace
+    ) -> tuple[Frame, tuple[float, float] | None]:
+        """One frame read, put in place and traced, and the grey window of the wires so far; LoadError if unreadable."""
+        log = run.log
         volume = run.load(Crop(header, self.box, self.load), frame.index)
 
         def read_moved(motion: Motion) -> Volume:
@@ -107,11 +107,17 @@ class _Tracing:
         with log.timed("trace", frame.index):
             here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
+        done = self.follow(run, replace(frame, registration=registration), here, earlier)
         before = (earlier(k) for k in range(frame.index))
-        window = next((part.window for part in before if part.window), None) or grey_window(shown)
-        done = replace(frame, registration=registration, projections=projections(shown, window))
+        window = next((part.window for part in before if part.window), None)
+        if window is None and done.trusted_curve is not None:
+            window = grey_window(shown, done.trusted_curve.points_mm)
+        return _pictured(done, shown, window or grey_window(shown)), window
+
+    def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Frame:
+        """One frame with its wire, as the user's file has it or as it is traced."""
         if self.given:
-            return _along(_as_given(run, done, self.given[frame.index]), shown, window), window
+            return _as_given(run, frame, self.given[frame.index])
         curve = run.stored(
             "trace",
             trace,
@@ -124,15 +130,16 @@ class _Tracing:
             previous=Before(lambda: _last_curve(frame.index, earlier)),
             expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
             opacity=run.case.wire.opacity,
-            config=settings,
+            config=run.config.trace,
         )
         if run.case.catheter is not None and np.isnan(frame.expected_mm):
             curve = of_catheter(curve, frame.catheter_mm)
-        return _along(_traced(done, curve), shown, window), window
+        return _traced(frame, curve)
 
 
-def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
-    """The frame with its scan pulled straight along the traced wire, where it has one."""
+def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
+    """The frame with its scan projected, and pulled straight along the traced wire where it has one."""
+    frame = replace(frame, projections=projections(shown, window))
     if frame.curve is None or not frame.traced:
         return frame
     return replace(frame, straightened=straightened(shown, frame.curve.points_mm, window))
