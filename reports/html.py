@@ -34,6 +34,8 @@ from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored
 from reports.viewer import viewer_data
 
 R = TypeVar("R")
+_NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0.69  0 0 0 1 0"
+"""The matrix by which paper becomes the dark page and ink light, while colours stay theirs."""
 
 
 class Each(Protocol):
@@ -73,7 +75,7 @@ def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed
     numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
     shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
     said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
-    return {**entry, **shown, **said, "graded": drawing.graded}
+    return {**entry, **shown, **said, "kept": drawing.kept}
 
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
@@ -83,8 +85,13 @@ def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
         loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     # style and scripts stand in every page: a copied one works from a disk without a network
-    fixed = {"colours": colours, "part": lambda name: Markup((templates / name).read_text(encoding="utf-8"))}
-    write_text(path, environment.get_template(template).render(fixed | dict(page)))
+    fixed = {
+        "colours": colours,
+        "night": _NIGHT,
+        "part": lambda name: Markup((templates / name).read_text(encoding="utf-8")),
+    }
+    environment.globals.update(fixed)  # macros see these, and nothing of the page
+    write_text(path, environment.get_template(template).render(page))
     return path
 
 
@@ -153,16 +160,14 @@ def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
 
 def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
-    cases, failures = _read_cases(out_dir)
-    summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
-    summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    cases, failures = readable_cases(out_dir)
+    files = run_files(out_dir, cases)
+    summary, errors, whole = files.summary, files.errors, read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos = list(runs.values())
-    found = {case.name: case.errors for case in cases}
-    errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
@@ -181,14 +186,22 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
-        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed, each), key=_is_tall),
+        "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
         "cases": _content.cases(summary, links),
-        "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
+        "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
         "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
         "version": _version(infos),
     }
     return write_page("index.html.j2", page, out_dir / "index.html")
+
+
+def run_files(out_dir: Path, cases: Sequence[CaseFiles]) -> RunFiles:
+    """The tables of a run, its cases worst first."""
+    summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
+    summary, found = _content.worst_first(summary), {case.name: case.errors for case in cases}
+    names = dict.fromkeys([*summary["case"], *found])
+    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep)
 
 
 def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
@@ -242,7 +255,7 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     return [*(row | {"link": links.get(row["case"], "")} for row in own), *theirs]
 
 
-def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
+def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     """Every case that can be read, and a failure for each that cannot: one bad file must not hide the others."""
     cases, broken = [], []
     for folder in find_cases(out_dir):
