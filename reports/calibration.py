@@ -7,7 +7,7 @@ import pandas as pd
 
 from reports._content import NOTHING, flatten, grid, number
 from reports.case_files import read_json
-from reports.html import draw_sections, write_page
+from reports.page import draw_sections, write_page
 from reports.schema import Column
 
 PRIOR = (

@@ -10,7 +10,7 @@ import pandas as pd
 from reports import _content
 from reports.case_files import counted, find_cases, not_run_sentence, warnings_of
 from reports.figures.simulators import OURS, SimulatorFiles, leads
-from reports.html import draw_sections, write_page
+from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
 from reports.verdict import TIPS_OFF, badge, tips_off, verdict

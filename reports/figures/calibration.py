@@ -44,7 +44,7 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
     return Drawing(figure, pd.DataFrame(table))
 
 
-def _curve(row: Mapping[str, Any], points: Sequence[Sequence[float]]) -> np.ndarray:
+def _curve(row: Mapping[str, Any], points: Sequence[list[float]]) -> np.ndarray:
     """Values and rises (n, 2) from the least value up; without ``points`` the parabola of the standard deviation."""
     if points:
         curve = np.array(sorted([*points, [row["value"], 0.0]]))

@@ -22,7 +22,7 @@ from reports.figures._drawing import LEAST_MM, positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
-from reports.html import draw_sections
+from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
