@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports.case_files import GOOD, WORST
-from reports.schema import SUMMARY, Column
+from reports.schema import ERRORS, SUMMARY, Column
 
 Grid = dict[str, Any]
 NOTHING = "–"
@@ -101,9 +101,16 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            named = " " + str(statistics.get(entry["name"], "")).replace("_", " ") if entry.get("name") else ""
+            named = f" {_rival(column)}" if entry.get("name") else ""
             shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
     return shown
+
+
+def _rival(column: Column) -> str:
+    """A trivial predictor as figures call it; its name where they show none of it."""
+    name = column.name.removeprefix("null_").removesuffix("_rms_mm").replace("_", " ")
+    shown = (ERRORS[column.name] if column.name in ERRORS.names else column).shown
+    return shown.get("predictors") or shown.get("rivals") or name
 
 
 def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[dict[str, str]]:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from reports._content import NOTHING, Grid, grid
 from reports.figures.benchmark import BenchFiles
-from reports.html import draw_sections, write_page
+from reports.page import draw_sections, write_page
 from reports.schema import BENCH, CLAIMS, ORDERS, STRESS, Column
 from reports.tables import read, read_if_there, write_csv
 

@@ -7,16 +7,20 @@ import pandas as pd
 
 from reports._content import NOTHING, flatten, grid, number
 from reports.case_files import read_json
-from reports.html import draw_sections, write_page
+from reports.page import draw_sections, write_page
 from reports.schema import Column
 
+PRIOR = (
+    "what was taken for likely before any trace was seen: mean and standard deviation; of a factor the latter is "
+    "of its logarithm"
+)
 COLUMNS = (
     Column("parameter", "-", "a factor on what the manifest states, or in the unit that its name ends with", "text"),
-    Column("value", "-", "where the traces are fitted best", "text"),
-    Column("sd", "-", "one standard deviation of the posterior; of a factor in percent", "text"),
+    Column("value", "-", "where the wires meet the traces best", "text"),
+    Column("sd", "-", "one standard deviation: how far the true value may be off; of a factor in percent", "text"),
     Column("used", "-", "what parameters.toml holds: the stated value where the parameter is not seen", "text"),
     Column("seen", "-", "known well enough to be taken", "text"),
-    Column("prior", "-", "mean and standard deviation; of a factor the latter is of its logarithm", "text"),
+    Column("prior", "-", PRIOR, "text"),
     Column("bounds", "-", "values outside are not tried", "text"),
     Column("meaning", "-", "what it is", "text"),
 )

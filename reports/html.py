@@ -1,17 +1,12 @@
 """The pages: one per case, one for the run. Built from files on disk, so they can be rebuilt at any time."""
 
-import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 from urllib.parse import quote
 
-import jinja2
-from markupsafe import Markup
-
-from reports import _content, colours
+from reports import _content
 from reports._content import flatten, settings, size
-from reports.atomic import write_text
 from reports.case_files import (
     GOOD,
     CaseFiles,
@@ -25,74 +20,13 @@ from reports.case_files import (
     read_json,
     said_by_cases,
 )
-from reports.figures import RunFiles, declared, figures_of
-from reports.figures._drawing import DOTS_PER_INCH, save
+from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
+from reports.page import Each, draw_sections, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
 from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
-
-R = TypeVar("R")
-
-
-class Each(Protocol):
-    """Does a work for every number below a count: here one after the other, or shared out among processes."""
-
-    def __call__(self, work: Callable[[int], R], count: int) -> list[R]:
-        """Their results, in order; none of them may be None."""
-
-
-def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
-    """One after the other."""
-    return [work(number) for number in range(count)]
-
-
-def draw_sections(page: str, data: Any, folder: Path, embed: bool, each: Each = one_by_one) -> list[dict[str, Any]]:
-    """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
-
-    Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or the files
-    themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
-    gone is removed, so that nobody finds it in the folder.
-    """
-    entries = declared(page)
-    return list(filter(None, each(lambda i: _section(page, entries[i], data, folder, embed), len(entries))))
-
-
-def _section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed: bool) -> dict[str, Any]:
-    """One figure, drawn and described; empty without data."""
-    path = folder / "figures" / f"{entry['figure']}.png"
-    drawing = figures_of(page)[entry["figure"]](data)
-    if drawing is None:
-        path.unlink(missing_ok=True)
-        path.with_suffix(".csv").unlink(missing_ok=True)
-        return {}
-    save(drawing, path)
-    width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
-    source = _link(path, folder, "image/png", embed)
-    numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
-    shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-    said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
-    return {**entry, **shown, **said, "graded": drawing.graded}
-
-
-def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
-    """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
-    templates = Path(__file__).parent / "templates"
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    )
-    # style and scripts stand in every page: a copied one works from a disk without a network
-    fixed = {"colours": colours, "part": lambda name: Markup((templates / name).read_text(encoding="utf-8"))}
-    write_text(path, environment.get_template(template).render(fixed | dict(page)))
-    return path
-
-
-def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
-    if not embed:
-        return path.relative_to(folder).as_posix()
-    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
-
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
@@ -143,26 +77,24 @@ def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
     entries = declared("case")
 
     def part(number: int) -> dict[str, Any]:
-        return _section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
+        return section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
 
     viewer, *sections = each(part, 1 + len(entries))
     frames = viewer["of"]["frames"] if viewer["of"] else ()
     curves = {name for frame in frames for name in frame["curves"]}
-    return {"viewer": viewer["of"], "curves": curves, "sections": [section for section in sections if section]}
+    return {"viewer": viewer["of"], "curves": curves, "sections": [one for one in sections if one]}
 
 
 def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) -> Path:
     """Draw the figures of the run and write index.html; returns its path. Arguments as for ``render_case``."""
-    cases, failures = _read_cases(out_dir)
-    summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
-    summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
+    cases, failures = readable_cases(out_dir)
+    files = run_files(out_dir, cases)
+    summary, errors, whole = files.summary, files.errors, read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     pages = {case.name: case.folder / "report.html" for case in cases}
     links = {name: f"cases/{quote(p.parent.name)}/{p.name}" for name, p in pages.items() if p.exists()}
     failures += _run_failures(out_dir, cases, links)
     runs = {path.name: read_json(path) for path in sorted(out_dir.glob("run*.json"))}
     infos = list(runs.values())
-    found = {case.name: case.errors for case in cases}
-    errors = {name: found[name] for name in dict.fromkeys([*summary["case"], *found]) if name in found}
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
@@ -181,14 +113,22 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
-        "sections": sorted(draw_sections("run", RunFiles(errors, summary, sweep), out_dir, embed, each), key=_is_tall),
+        "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
         "cases": _content.cases(summary, links),
-        "sweep": _content.grid(sweep, SWEEP.columns) if len(sweep) else None,
+        "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
         "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
         "version": _version(infos),
     }
     return write_page("index.html.j2", page, out_dir / "index.html")
+
+
+def run_files(out_dir: Path, cases: Sequence[CaseFiles]) -> RunFiles:
+    """The tables of a run, its cases worst first."""
+    summary, sweep = (read_if_there(out_dir / table.file, table) for table in (SUMMARY, SWEEP))
+    summary, found = _content.worst_first(summary), {case.name: case.errors for case in cases}
+    names = dict.fromkeys([*summary["case"], *found])
+    return RunFiles({name: found[name] for name in names if name in found}, summary, sweep)
 
 
 def _case_failures(case: CaseFiles) -> list[dict[str, Any]]:
@@ -242,7 +182,7 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
     return [*(row | {"link": links.get(row["case"], "")} for row in own), *theirs]
 
 
-def _read_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
+def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
     """Every case that can be read, and a failure for each that cannot: one bad file must not hide the others."""
     cases, broken = [], []
     for folder in find_cases(out_dir):

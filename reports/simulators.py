@@ -10,7 +10,7 @@ import pandas as pd
 from reports import _content
 from reports.case_files import counted, find_cases, not_run_sentence, warnings_of
 from reports.figures.simulators import SimulatorFiles, leads
-from reports.html import draw_sections, write_page
+from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
 from reports.verdict import OURS, TIPS_OFF, badge, tips_off, verdict
@@ -103,7 +103,10 @@ def _where(rows: pd.DataFrame) -> _content.Grid | None:
     if rows.empty:
         return None
     bins = ["along", "low_mm", "high_mm"]
-    table = rows.pivot_table(index=bins, columns="simulator", values="rms_mm", sort=False).reset_index()
+    table = rows.pivot_table(index=bins, columns="simulator", values="rms_mm").reset_index()
+    # as in the file, whose bins ascend: left unsorted, a pivot has 10 mm before 5
+    kinds = list(dict.fromkeys(rows["along"]))
+    table = table.sort_values("along", key=lambda along: along.map(kinds.index), kind="stable", ignore_index=True)
     names = list(dict.fromkeys(rows["simulator"]))
     lead = leads(rows).rename(columns={"simulator": "nearest"})
     ends = ["ratio_to_next", "ratio_to_next_low", "ratio_to_next_high"]

@@ -14,8 +14,8 @@ import pandas as pd
 from reports._content import Grid, grid
 from reports.atomic import write_text
 from reports.diff import CLOSING
-from reports.html import write_page
 from reports.junit import Outcome, write_junit
+from reports.page import write_page
 from reports.schema import ERRORS, SUMMARY, Column
 from reports.simulators import folders_in
 from reports.tolerance import RATIO

@@ -23,7 +23,6 @@ _PICTURES_BYTES = 1_000_000  # of all scans together, so that a page stays below
 _QUALITY = 60  # of JPEG: a wire of one voxel still shows
 _PLANES, _MOST_PLANES = 1_800, 60  # across the wires, of all frames and of one: 10 kB
 _MAX_FRAMES = 120
-_WINDOW_PERCENTILES = (2.0, 99.8)
 RANGES_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Offsets to which the strips along the wire may reach."""
 _RANGE_MM, _SEEN_PERCENT = 1.0, 95  # the first where nothing was compared
@@ -171,9 +170,7 @@ def _shrink(frame: FrameArrays, count: int, most_bytes: int) -> float:
 
 
 def _jpeg(picture: NDArray[np.uint8], scale: float) -> str:
-    low, high = np.percentile(picture, _WINDOW_PERCENTILES)
-    stretched = np.clip((picture - low) * (255.0 / max(high - low, 1.0)), 0, 255).astype(np.uint8)
-    image = _picture(stretched)
+    image = _picture(picture)
     size: Sequence[int] = [max(1, round(scale * n)) for n in image.size]
     return _uri(image if scale == 1.0 else image.resize((size[0], size[1])), "jpeg", quality=_QUALITY)
 

@@ -27,7 +27,8 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import writing
-from reports.html import Each, render_case
+from reports.html import render_case
+from reports.page import Each
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up
 from solver._compile import hash_of

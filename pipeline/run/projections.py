@@ -31,8 +31,22 @@ def slabs(volume: Volume, point_mm: Array) -> tuple[NDArray[np.uint8], ...]:
     return tuple(np.clip((peak - low) * (255.0 / max(high - low, 1e-9)), 0, 255).astype(np.uint8) for peak in peaks)
 
 
-def grey_window(volume: Volume) -> tuple[float, float]:
-    """Grey values from the darkest projection pixels to the wire's: 1st and 99.9th percentile of a projection."""
+def grey_window(volume: Volume, wire_mm: Array | None = None) -> tuple[float, float]:
+    """Grey values from the darkest projection pixels to the wire's: the median of the brightest voxels along it.
+
+    wire_mm : points (n, 3) of the wire, LPS; where it is not known, the 99.99th percentile of a projection: of a short
+    wire's pixels there are fewer than one in a thousand, and a window that ends below them shows it as bright as bone.
+    """
     peak = volume.values.max(axis=2)
-    low, high = np.percentile(peak, (1.0, 99.9))
+    low, high = np.percentile(peak, (1.0, 99.99))
+    if wire_mm is not None and len(wire_mm):
+        high = max(np.median(_brightest_near(volume, wire_mm)), low + 1e-9)
     return float(low), float(high)
+
+
+def _brightest_near(volume: Volume, points_mm: Array) -> Array:
+    """The brightest of the 27 voxels about each point (n, 3): a curve may run half a voxel beside its wire."""
+    around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)
+    index = np.rint(volume.to_index(points_mm)).astype(int)[:, None] + around
+    inside = np.clip(index, 0, np.array(volume.values.shape) - 1)
+    return np.asarray(volume.values[tuple(np.moveaxis(inside, -1, 0))].max(axis=1), dtype=float)

@@ -12,7 +12,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import QuadMesh
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -31,6 +30,7 @@ WIDTH_INCH = 8.0
 LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 LEAST_MM = 1e-3  # of a logarithmic axis: a trace is known to 0.01 mm at best, and equal curves differ by 1e-16
 _ERROR_COLOURS = LinearSegmentedColormap.from_list("error", (SIMULATED, FAR))  # the viewer's
+_COLOURS = LinearSegmentedColormap.from_list("sequential", SEQUENTIAL)
 _ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
 _GREYS = 52  # finer than the noise of any scan worth a picture
 
@@ -45,17 +45,25 @@ class FrameAxis(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A figure and the numbers that it shows; ``compact`` stores it in a palette, for noisy grey scans."""
+    """A figure and the numbers that it shows; ``scans``: its pictures are of scans, stored in a palette of greys."""
 
     figure: Figure
     table: pd.DataFrame
-    compact: bool = False
+    scans: bool = False
     frames: Sequence[FrameAxis] = ()
 
     @property
-    def graded(self) -> bool:
-        """It shows greys or a scale of colours: on a dark page bright must not become dark."""
-        return any(a.images or any(isinstance(c, QuadMesh) for c in a.collections) for a in self.figure.axes)
+    def kept(self) -> list[list[float]]:
+        """The panels that show scans, once drawn: their boxes, in shares; on a dark page all around them is turned."""
+        return [[share / 100.0 for share in _box(a)] for a in self.figure.axes if self.scans and a.images]
+
+    def pixels(self) -> Image.Image:
+        """The figure as a picture at its own size and resolution."""
+        canvas: Any = self.figure.canvas
+        # drawn once: savefig would draw twice, and most of a page's time is drawing
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+        return _in_palette(pixels) if self.scans else Image.fromarray(np.ascontiguousarray(pixels))
 
     @property
     def marks(self) -> list[dict[str, Any]]:
@@ -69,16 +77,20 @@ def frames_of(table: pd.DataFrame, column: str) -> dict[int, float]:
     return {int(n): float(v) for n, v in zip(known["frame"], known[column], strict=True)}
 
 
+def _box(axes: Axes) -> list[float]:
+    """Left, top, width and height of a panel, percent of the figure."""
+    box = axes.get_position()
+    return [round(100.0 * float(v), 2) for v in (box.x0, 1.0 - box.y1, box.width, box.height)]
+
+
 def _mark(figure: Figure, panel: FrameAxis) -> dict[str, Any]:
-    box = panel.axes.get_position()
     size = figure.get_size_inches() * figure.dpi
     way = panel.axes.get_xaxis_transform() if panel.across else panel.axes.get_yaxis_transform()
     points = [(v, 0.5) if panel.across else (0.5, v) for v in panel.of_frame.values()]
     places = way.transform(np.array(points).reshape(-1, 2)) / size
     where = places[:, 0] if panel.across else 1.0 - places[:, 1]
-    percent = [round(100.0 * float(v), 2) for v in (box.x0, 1.0 - box.y1, box.width, box.height)]
     at = {str(n): round(100.0 * float(v), 2) for n, v in zip(panel.of_frame, where, strict=True)}
-    return {"box": percent, "across": panel.across, "at": at}
+    return {"box": _box(panel.axes), "across": panel.across, "at": at}
 
 
 def new_figure(height_inch: float, width_inch: float = WIDTH_INCH, fitted: bool = True) -> Figure:
@@ -161,13 +173,13 @@ def error_scale() -> Normalize:
 def heat_map(
     axes: Axes, grid: Array, edges: tuple[Array, Array], label: str, scale: Normalize, bar: Look, **cells: Any
 ) -> None:
-    """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left light grey.
+    """Draw ``grid`` (rows, columns) between ``edges`` (across, up), with a colour bar; NaN is left blank.
 
     scale : of the colours; what lies outside has that of the nearer end.
     bar, cells : what else matplotlib is told of the colour bar and of the cells.
     """
     logarithmic, least = isinstance(scale, LogNorm), float(scale.vmin or 0.0)
-    colours = _ERROR_COLOURS if logarithmic else SEQUENTIAL
+    colours = _ERROR_COLOURS if logarithmic else _COLOURS
     mesh = axes.pcolormesh(*edges, np.maximum(grid, least), cmap=colours, norm=scale, **cells)
     figure: Any = axes.get_figure()
     extend = "both" if logarithmic else "max"
@@ -175,18 +187,13 @@ def heat_map(
     if logarithmic:
         shown.set_ticks(_ERROR_TICKS_MM, labels=[f"{mm:g}" for mm in _ERROR_TICKS_MM])
         shown.ax.minorticks_off()
-    axes.set_facecolor("0.93")
     plain(axes)
     axes.grid(visible=False)
 
 
 def save(drawing: Drawing, path: Path) -> None:
     """Write the PNG and, beside it, the CSV of what it shows."""
-    canvas: Any = drawing.figure.canvas
-    # drawn once: savefig would draw twice, and most of a page's time is drawing
-    canvas.draw()
-    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
-    picture = _in_palette(pixels) if drawing.compact else Image.fromarray(np.ascontiguousarray(pixels))
+    picture = drawing.pixels()
     buffer = io.BytesIO()
     picture.save(buffer, format="png")
     write_bytes(path, buffer.getvalue())

@@ -28,7 +28,6 @@ _LPS_NAMES = ("x, towards left", "y, towards back", "z, towards head")
 _LABELS_INCH = 0.62  # what an axis title and its ticks take beside a panel
 _ROW_INCH = (1.5, 4.6)
 _MARGIN_MM = 5.0
-_WINDOW_PERCENTILES = (2.0, 99.8)  # keeps the wire's peak from making the vessels black
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +84,8 @@ class View:
         """Draw a frame's projection in grey, where it has one; pictures are indexed (across, up)."""
         if plane.along in frame.mips:
             picture = frame.mips[plane.along]
-            low, high = np.percentile(picture, _WINDOW_PERCENTILES)
-            window: Look = {"cmap": "gray", "vmin": low, "vmax": max(high, low + 1)}
+            # as stored: a window of each picture's own ends below the few pixels of a short wire
+            window: Look = {"cmap": "gray", "vmin": 0, "vmax": 255}
             extent = self.extent(plane)
             axes.imshow(picture.T, origin="lower", interpolation="nearest", extent=extent, **window)
 
@@ -116,7 +115,7 @@ class View:
         axes.set_ylim(limits[::-1] if self.aligned and plane.up == 1 else limits)
         axes.set_xlabel(self.label(plane.across), fontsize=8)
         axes.set_ylabel(self.label(plane.up), fontsize=8)
-        axes.tick_params(labelsize=7)
+        axes.tick_params(labelsize=8)
 
     def _start(self) -> Array:
         return self.scan.origin_mm if self.aligned else np.zeros(3)

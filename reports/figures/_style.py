@@ -14,7 +14,8 @@ PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
 INK, GREY = "#222222", "#767676"
 PALETTE = (SIMULATED, PURPLE, BROWN, "#1F8A8A", ROSE, SLATE)  # no wire but ours, nor what failed, has one of these
 SPARE = ("#1F8A8A", "#7A7A00")  # of columns without a style: no predictor has these colours
-SEQUENTIAL = "cividis"
+SEQUENTIAL = ("#D8CBE3", "#5B0F7A")
+"""From little to much: away from the paper, and on a dark page, where lightness is turned, away from that as well."""
 STAGE_COLOURS = {
     "load": "#C8C8C8",
     "segment": GREY,

@@ -36,4 +36,4 @@ def scan_at_entry(case: CaseFiles) -> Drawing | None:
         view.draw(axes, arrow[:1], plane, tip=8, color=BAD)
         view.dress(axes, plane)
     table = [points_table(arrow[:1], point="entry"), points_table(arrow[1:], point="along entry_direction")]
-    return Drawing(figure, pd.concat(table), compact=True)
+    return Drawing(figure, pd.concat(table), scans=True)

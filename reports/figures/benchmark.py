@@ -151,7 +151,7 @@ def _name_segments(axes: Axes, front: pd.DataFrame) -> None:
     for x, y, segment in zip(front["shape_error_mm"], front["ms_per_mm"], front["segment_mm"], strict=True):
         apart = max(np.log10(x / at[0]), abs(np.log10(y / at[1]))) if last is not None else 1.0
         if segment != last and apart > 0.1:
-            axes.annotate(f"{segment:g}", (x, y), xytext=(3, 4), textcoords="offset points", fontsize=7)
+            axes.annotate(f"{segment:g}", (x, y), xytext=(3, 4), textcoords="offset points", fontsize=8)
             last, at = segment, (x, y)
 
 

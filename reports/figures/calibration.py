@@ -1,10 +1,11 @@
 """The figures of a calibration, from what calibration.json holds."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
 from reports.colours import BAD, SIMULATED
 from reports.figures._drawing import (
@@ -20,6 +21,7 @@ from reports.figures._drawing import (
 )
 from reports.figures._style import BROWN, GREY
 
+_LIGHT = 0.99  # weight of a frame below which its mark is hollow
 HIGHEST = 12.0
 """Rise up to which profiles are drawn: what lies above is out of the question."""
 
@@ -27,33 +29,47 @@ HIGHEST = 12.0
 def profiles(record: Mapping[str, Any]) -> Drawing | None:
     """A panel for each parameter."""
     rows = {row["name"]: row for row in record["estimates"]}
-    found = {name: points for name, points in record["profiles"].items() if points}
-    if not found:
+    # a parameter whose profile was not looked at is drawn by its standard deviation: none is missing
+    points = {name: record["profiles"].get(name) or [] for name, row in rows.items() if row["sd"] > 0}
+    if not any(points.values()):
         return None
-    figure, panels = lattice(len(found), 3, row_inch=2.3)
+    figure, panels = lattice(len(points), 3, row_inch=2.3)
     table = []
-    for axes, (name, points) in zip(panels, found.items(), strict=True):
-        row = rows[name]
-        curve = np.array(sorted([*points, [row["value"], 0.0]]))
-        axes.plot(curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9), color=SIMULATED, marker=".", markersize=4)
-        axes.plot([row["value"]], [0.0], color=SIMULATED, marker="o")
-        axes.axhline(1.0, color=GREY, linestyle="--", linewidth=0.8)
-        low, high = _span(row)
-        if low < row["prior"] < high:
-            axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
-        axes.set_xlim(low, high)
-        if low > 0 and high > LOG_FROM_RATIO * low:
-            axes.set_xscale("log")
-            plain_decades(axes.xaxis, (1.0,))
-        else:
-            axes.locator_params(axis="x", nbins=4)
-        axes.set_ylim(-0.4, HIGHEST)
-        verdict = "" if row["seen"] else ": not seen"
-        axes.set_title(f"{name}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
-        plain(axes)
+    for axes, (name, found) in zip(panels, points.items(), strict=True):
+        curve = _curve(rows[name], found)
+        axes.plot(*curve.T, color=SIMULATED, **({"marker": ".", "markersize": 4} if found else {"linestyle": "--"}))
+        _panel(axes, rows[name])
         table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
-    figure.supylabel("rise of minus twice the log-posterior", fontsize=8)
+    figure.supylabel("misfit above the least (1: one standard deviation)", fontsize=8)
     return Drawing(figure, pd.DataFrame(table))
+
+
+def _curve(row: Mapping[str, Any], points: Sequence[list[float]]) -> np.ndarray:
+    """Values and rises (n, 2) from the least value up; without ``points`` the parabola of the standard deviation."""
+    if points:
+        curve = np.array(sorted([*points, [row["value"], 0.0]]))
+        return np.column_stack([curve[:, 0], np.clip(curve[:, 1], 0.0, 1e9)])
+    off = np.linspace(-3.0, 3.0, 25)
+    value = row["value"] * np.exp(off * row["sd"]) if row["logarithmic"] else row["value"] + off * row["sd"]
+    return np.column_stack([value, off**2])
+
+
+def _panel(axes: Axes, row: Mapping[str, Any]) -> None:
+    axes.plot([row["value"]], [0.0], color=SIMULATED, marker="o")
+    axes.axhline(1.0, color=GREY, linestyle="--", linewidth=0.8)
+    low, high = _span(row)
+    if low < row["prior"] < high:
+        axes.axvline(row["prior"], color=BROWN, linestyle=":", linewidth=1.2)
+    axes.set_xlim(low, high)
+    if low > 0 and high > LOG_FROM_RATIO * low:
+        axes.set_xscale("log")
+        plain_decades(axes.xaxis, (1.0,))
+    else:
+        axes.locator_params(axis="x", nbins=4)
+    axes.set_ylim(-0.4, HIGHEST)
+    verdict = "" if row["seen"] else ": not seen"
+    axes.set_title(f"{row['name']}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
+    plain(axes)
 
 
 def _span(row: Mapping[str, Any]) -> tuple[float, float]:
@@ -90,7 +106,7 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
         own = table[table["case"] == case]
         for column, colour, label in (("before_mm", GREY, "as stated"), ("after_mm", SIMULATED, "calibrated")):
             axes.plot(own["frame"], own[column], color=colour, marker="o", markersize=3.5, linewidth=1.0, label=label)
-        light = own[own["weight"] < 0.99]
+        light = own[own["weight"] < _LIGHT]
         axes.plot(light["frame"], light["after_mm"], "o", markersize=5, markerfacecolor="white", color=SIMULATED)
         axes.set_title(str(case), fontsize=9)
         axes.set_xlabel("frame")
@@ -99,4 +115,5 @@ def residuals(record: Mapping[str, Any]) -> Drawing | None:
         positive_axis(axes, [own["before_mm"].dropna(), own["after_mm"].dropna()])
     panels[0].set_ylabel("mm rms")
     legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
-    return Drawing(figure, table)
+    light = table["weight"] < _LIGHT
+    return Drawing(figure, table.assign(mark=np.where(light, "hollow", "full")))

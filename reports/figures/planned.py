@@ -21,11 +21,12 @@ def planned_within(run: RunFiles) -> Drawing | None:
         return None
     figure = new_figure(3.4)
     axes = figure.subplots()
+    curves = {}
     if len(planned) > 1:
         pale = min(1.0, _CLEAR_CURVES / len(planned))  # hundreds become a cloud, dense where most cases are
         for case, values in found.items():
-            curve = _curve(values, planned[case], everything[-1])
-            axes.step(*curve, where="post", color=GREY, linewidth=0.8, alpha=pale)
+            curves[case] = _curve(values, planned[case], everything[-1])
+            axes.step(*curves[case], where="post", color=GREY, linewidth=0.8, alpha=pale)
     across, share = _curve(everything, sum(planned.values()), everything[-1])
     axes.step(across, share, where="post", color=SIMULATED, linewidth=2.0)
     axes.set_ylim(0.0, 1.02)
@@ -33,7 +34,9 @@ def planned_within(run: RunFiles) -> Drawing | None:
     axes.set_xlabel("95th percentile of the distance, simulated to traced wire, mm")
     axes.set_ylabel("share of all planned frames")
     plain(axes)
-    return Drawing(figure, pd.DataFrame({"p95_mm": across, "share_of_planned": share}))
+    parts = [pd.DataFrame({"p95_mm": across, "share_of_planned": share})]
+    parts += [pd.DataFrame({"case": case, "p95_mm": x, "share_of_planned": y}) for case, (x, y) in curves.items()]
+    return Drawing(figure, pd.concat(parts))
 
 
 def _planned(run: RunFiles) -> dict[str, int]:

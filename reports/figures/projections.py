@@ -5,17 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patheffects import withStroke
 
 from reports.case_files import WORST, CaseFiles, thinned
 from reports.colours import SIMULATED, TRACED, TRUE
 from reports.figures._drawing import Drawing
 from reports.figures._planes import PLANES, Plane, View, around, points_table, whole
-from reports.figures._style import Look
+from reports.figures._style import BROWN, Look
 from reports.frames_file import FrameArrays, ScanCrop
 
 _BAND: Look = {"facecolor": SIMULATED, "alpha": 0.3, "linewidth": 0}
@@ -26,6 +25,7 @@ _LOOKS: dict[str, Look] = {
     "true": {"color": TRUE, "linestyle": ":", "linewidth": 1.4},
     "simulated": {"color": SIMULATED, "linestyle": (0, (4, 2)), "linewidth": 1.4},
 }
+_DEPTHS = LinearSegmentedColormap.from_list("depths", (BROWN, SIMULATED))
 _MAX_FAILED = 3
 _TIP_WINDOW_MM = 10.0
 _MAX_WIRES = 12  # of a case without scans
@@ -73,7 +73,7 @@ def simulated_wires(case: CaseFiles) -> Drawing | None:
     view = whole(case.scan)
     figure, (row,) = view.sheet(1)
     depths = [depth for _, depth, _ in wires]
-    scale = ScalarMappable(Normalize(min(depths), max(max(depths), min(depths) + 1e-9)), colormaps["viridis"])
+    scale = ScalarMappable(Normalize(min(depths), max(max(depths), min(depths) + 1e-9)), _DEPTHS)
     # deep wires first and wide, shallow ones over them and thin: each is seen where it differs
     widths = np.linspace(3.2, 1.0, len(wires))
     for axes, plane in zip(row, PLANES, strict=True):
@@ -106,7 +106,7 @@ def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) ->
     handles, labels = rows[0][0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
-    return Drawing(figure, pd.concat([_table(frame) for frame in frames]), compact=True)
+    return Drawing(figure, pd.concat([_table(frame) for frame in frames]), scans=True)
 
 
 def _panel(axes: Axes, frame: FrameArrays, view: View, plane: Plane) -> None:

@@ -12,7 +12,8 @@ from reports.tables import has
 
 def run_time(case: CaseFiles) -> Drawing | None:
     """Stacked seconds per frame, and the totals of the case."""
-    names = {stage: f"{stage}_s" for stage in STAGE_COLOURS if has(case.timings, f"{stage}_s")}
+    seconds = {stage: f"{stage}_s" for stage in STAGE_COLOURS}
+    names = {stage: name for stage, name in seconds.items() if has(case.timings, name) and case.timings[name].any()}
     if not names:
         return None
     whole = case.timings["frame"].isna()

@@ -98,9 +98,6 @@
     show();
     hint(box.querySelector(".scroll"), box.querySelector(".beyond"), table);
   }
-  all("button.enlarge").forEach((button) => button.addEventListener("click", () => {
-    button.setAttribute("aria-pressed", String(button.closest("figure").querySelector(".pan").classList.toggle("large")));
-  }));
   // a case's folder that was copied alone has no page of the run above it
   all("a.up").forEach((link) => { link.hidden = !/\/cases\/[^/]+\/[^/]*$/.test(location.pathname); });
   for (const pane of all(".pan")) { // a figure that is panned on a phone

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pipeline.cli import main
 from pipeline.run.simulators import side_by_side, write_comparison
 from reports import tables
-from reports.schema import ERRORS, POINTS, SUMMARY
-from reports.simulators import render_simulators
+from reports.schema import ERRORS, POINTS, SUMMARY, WHERE
+from reports.simulators import _where, render_simulators
 
 Array = NDArray[np.float64]
 Law = Callable[[Array, Array, np.random.Generator], Array]
@@ -114,6 +114,19 @@ def test_who_is_nearest_where(compared: Path) -> None:
     depth = where[where["along"] == "insertion depth"]
     assert set(depth["low_mm"]) == set(DEPTHS)
     assert list(depth.query("low_mm == 50")["frames"]) == [CASES - 2] * 3, "frames that count for all"
+
+
+def test_bins_stand_in_their_order(tmp_path: Path) -> None:
+    """On the page depths stood as 10, 5, 20, though the file had them in order."""
+    made = {name: write_tree(tmp_path / name, even(level)) for name, level in (("soft", 0.3), ("wireval", 0.2))}
+    write_comparison(tmp_path, made)
+    rows = tables.read(tmp_path / WHERE.file, WHERE)
+    grid = _where(rows.sample(frac=1.0, random_state=0))
+    assert grid is not None
+    cells = [[cell["value"] for cell in row["cells"]] for row in grid["rows"]]
+    for along in {row[0] for row in cells}:
+        lows = [float(row[1]) for row in cells if row[0] == along]
+        assert lows == sorted(lows)
 
 
 def test_who_has_its_tips_off_is_nearest_nowhere(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from reports import colours, tables
+from reports._content import caption
 from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
@@ -21,7 +22,7 @@ from reports.figures._drawing import LEAST_MM, positive_axis
 from reports.figures._style import STAGE_COLOURS, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
-from reports.html import draw_sections
+from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -407,15 +408,15 @@ def test_errors_have_the_colours_of_the_viewer_in_figures(tmp_path: Path) -> Non
     assert ends == [colours.SIMULATED.lower(), colours.FAR.lower()]
 
 
-def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:
+def test_pictures_of_scans_keep_white_and_the_colours_of_the_curves(tmp_path: Path) -> None:
     sizes = []
-    for compact in (False, True):
+    for scans in (False, True):
         figure = _drawing.new_figure(2.0, 3.0, fitted=False)
         axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
         axes.imshow(np.random.default_rng(0).integers(0, 120, (90, 120)), cmap="gray", vmin=0, vmax=255)
         axes.plot([0, 110], [40, 40], color=TRACED, linewidth=6)
-        path = tmp_path / f"{compact}.png"
-        _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), compact), path)
+        path = tmp_path / f"{scans}.png"
+        _drawing.save(_drawing.Drawing(figure, pd.DataFrame({"a": [1]}), scans), path)
         sizes.append(path.stat().st_size)
     pixels = np.asarray(Image.open(path).convert("RGB"))
     exact = np.asarray(Image.open(tmp_path / "False.png").convert("RGB"))
@@ -425,7 +426,57 @@ def test_compact_pictures_keep_white_and_the_colours_of_the_curves(tmp_path: Pat
     assert sizes[1] < 0.6 * sizes[0]
 
 
-def test_what_is_bright_by_its_value_is_known_as_such(tmp_path: Path) -> None:
+def test_panels_of_scans_are_known_and_no_other_figure_has_any(tmp_path: Path) -> None:
+    """Maps of errors and correlations stayed light on a dark page, as the paper around scans did."""
     case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
-    graded = {name for name, draw in CASE_FIGURES.items() if (drawing := draw(case)) is not None and drawing.graded}
-    assert graded == {"projections", "error_along_wire", "contact_along_wire"}
+    sections = {one["figure"]: one for one in draw_sections("case", case, tmp_path, embed=False)}
+    assert {name for name, one in sections.items() if one["kept"]} == {"projections"}
+    scans = Image.open(tmp_path / "figures" / "projections.png").convert("RGB")
+    kept = np.array(sections["projections"]["kept"])
+    assert len(kept) == 4 * 3, "three projections and the tip, of three frames"
+    for left, top, width, height in kept:
+        inside = np.array([left + 0.5 * width, top + 0.5 * height]) * scans.size
+        above = np.array([left + 0.9 * width, top - 0.004]) * scans.size
+        assert scans.getpixel(tuple(above.astype(int).tolist())) == (255, 255, 255)
+        assert scans.getpixel(tuple(inside.astype(int).tolist())) != (255, 255, 255)
+
+
+def test_scans_are_shown_as_bright_as_they_are_kept() -> None:
+    """A window of each picture's own ended below the few pixels of a short wire: it was as white as the bone."""
+    picture = np.full((40, 50), 150, np.uint8)
+    picture[20, 25] = 255
+    axes = Figure().subplots()
+    scan = ScanCrop(np.ones(3), np.zeros(3), np.eye(3), (40, 30, 50))
+    _planes.whole(scan).show(axes, FrameArrays(0, mips={1: picture}), _planes.PLANES[0])
+    assert axes.images[0].get_clim() == (0, 255)
+
+
+def test_every_parameter_of_a_calibration_has_a_panel() -> None:
+    """The depth that is added had none: six parameters, and five panels."""
+    row = {"value": 1.0, "prior": 1.0, "sd": 0.1, "seen": True, "logarithmic": False}
+    rows = [{"name": name, **row} for name in ("taper", "depth_offset_mm")]
+    record = {"estimates": rows, "profiles": {"taper": [[0.9, 1.2], [1.1, 0.9]]}}
+    drawing = figures_of("calibration")["profiles"](record)
+    assert drawing is not None
+    panels = {axes.get_title(): axes.get_lines()[0] for axes in drawing.figure.axes}
+    assert list(panels) == ["taper", "depth_offset_mm"]
+    assert panels["taper"].get_xydata().tolist() == [[0.9, 1.2], [1.0, 0.0], [1.1, 0.9]]
+    assert panels["depth_offset_mm"].get_linestyle() == "--"
+    values, rises = panels["depth_offset_mm"].get_xydata().T
+    np.testing.assert_allclose(rises, ((values - 1.0) / 0.1) ** 2, atol=1e-9)
+    (entry,) = [entry for entry in declared("calibration") if entry["figure"] == "profiles"]
+    assert "dashed curve" in caption(entry["read"], drawing.table)
+    assert "dashed curve" not in caption(entry["read"], drawing.table.query("parameter == 'taper'"))
+
+
+@pytest.mark.parametrize(("cases", "said"), [(1, False), (2, True)])
+def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, tmp_path: Path) -> None:
+    """It told of thin lines beside a single one."""
+    out = write_run(tmp_path / "out", tuple(FakeCase(f"c{n}", frames=3) for n in range(cases)))
+    errors = {f"c{n}": read_case(out / "cases" / f"c{n}").errors for n in range(cases)}
+    run = RunFiles(errors, tables.read(out / "summary.csv", SUMMARY), tables.read_if_there(None, SWEEP))
+    drawing = RUN_FIGURES["planned_within"](run)
+    assert drawing is not None
+    (entry,) = [entry for entry in declared("run") if entry["figure"] == "planned_within"]
+    assert ("thin: each case" in caption(entry["read"], drawing.table)) == said
+    assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases

@@ -61,8 +61,8 @@ def trace_frames(run: Context, known: Known) -> Known:
 class _Part(NamedTuple):
     """What becomes of one frame.
 
-    window : the grey values that are shown of it; None where it could not be read.     voxels : by which its scan is
-    known again; empty where it could not be read.
+    window : the grey values that are shown of all frames from the first traced one on.     voxels : by which its scan
+    is known again; empty where it could not be read.
     """
 
     frame: Frame
@@ -124,9 +124,12 @@ class _Tracing:
 
     def look(
         self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
-    ) -> tuple[Frame, tuple[float, float], bytes]:
-        """One frame read, put in place and traced, its grey window and hash; LoadError where it cannot be read."""
-        log, settings = run.log, run.config.trace
+    ) -> tuple[Frame, tuple[float, float] | None, bytes]:
+        """One frame read, put in place and traced, the grey window of the wires so far and a hash of its voxels.
+
+        LoadError where it cannot be read.
+        """
+        log = run.log
         volume = run.load(Crop(header, self.box, self.load), frame.index)
         voxels = _known_by(volume)
 
@@ -137,11 +140,17 @@ class _Tracing:
         with log.timed("trace", frame.index):
             here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
+        done = self.follow(run, replace(frame, registration=registration), here, earlier)
         before = (earlier(k) for k in range(frame.index))
-        window = next((part.window for part in before if part.window), None) or grey_window(shown)
-        done = replace(frame, registration=registration, projections=projections(shown, window))
+        window = next((part.window for part in before if part.window), None)
+        if window is None and done.trusted_curve is not None:
+            window = grey_window(shown, done.trusted_curve.points_mm)
+        return _pictured(done, shown, window or grey_window(shown)), window, voxels
+
+    def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Frame:
+        """One frame with its wire, as the user's file has it or as it is traced."""
         if self.given:
-            return _along(_as_given(run, done, self.given[frame.index]), shown, window), window, voxels
+            return _as_given(run, frame, self.given[frame.index])
         curve = run.stored(
             "trace",
             trace,
@@ -154,15 +163,16 @@ class _Tracing:
             previous=Before(lambda: _last_curve(frame.index, earlier)),
             expected_mm=None if np.isnan(frame.expected_mm) else frame.expected_mm,
             opacity=run.case.wire.opacity,
-            config=settings,
+            config=run.config.trace,
         )
         if run.case.catheter is not None and np.isnan(frame.expected_mm):
             curve = of_catheter(curve, frame.catheter_mm)
-        return _along(_traced(done, curve), shown, window), window, voxels
+        return _traced(frame, curve)
 
 
-def _along(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
-    """The frame with its scan pulled straight along the traced wire, where it has one."""
+def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
+    """The frame with its scan projected, and pulled straight along the traced wire where it has one."""
+    frame = replace(frame, projections=projections(shown, window))
     if frame.curve is None or not frame.traced:
         return frame
     return replace(frame, straightened=straightened(shown, frame.curve.points_mm, window))

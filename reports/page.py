@@ -1,0 +1,81 @@
+"""A page: its figures drawn into a folder, and a template rendered with them."""
+
+import base64
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import jinja2
+from markupsafe import Markup
+
+from reports import _content, colours
+from reports.atomic import write_text
+from reports.figures import declared, figures_of
+from reports.figures._drawing import DOTS_PER_INCH, save
+
+R = TypeVar("R")
+_NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0.69  0 0 0 1 0"
+"""The matrix by which paper becomes the dark page and ink light, while colours stay theirs."""
+
+
+class Each(Protocol):
+    """Does a work for every number below a count: here one after the other, or shared out among processes."""
+
+    def __call__(self, work: Callable[[int], R], count: int) -> list[R]:
+        """Their results, in order; none of them may be None."""
+
+
+def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
+    """One after the other."""
+    return [work(number) for number in range(count)]
+
+
+def draw_sections(page: str, data: Any, folder: Path, embed: bool, each: Each = one_by_one) -> list[dict[str, Any]]:
+    """Draw every declared figure of a page into ``folder``/figures; a figure without data is left out.
+
+    Each is described by its entry in sections.toml, by ``source`` and ``numbers``, which are links or the files
+    themselves as data URIs, and by its width and height in pixels. A picture left from an earlier run whose data is
+    gone is removed, so that nobody finds it in the folder.
+    """
+    entries = declared(page)
+    return list(filter(None, each(lambda i: section(page, entries[i], data, folder, embed), len(entries))))
+
+
+def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed: bool) -> dict[str, Any]:
+    """One figure, drawn and described; empty without data."""
+    path = folder / "figures" / f"{entry['figure']}.png"
+    drawing = figures_of(page)[entry["figure"]](data)
+    if drawing is None:
+        path.unlink(missing_ok=True)
+        path.with_suffix(".csv").unlink(missing_ok=True)
+        return {}
+    save(drawing, path)
+    width, height = (round(DOTS_PER_INCH * inch) for inch in drawing.figure.get_size_inches())
+    source = _link(path, folder, "image/png", embed)
+    numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
+    shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
+    said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
+    return {**entry, **shown, **said, "kept": drawing.kept}
+
+
+def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
+    """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
+    templates = Path(__file__).parent / "templates"
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    )
+    # style and scripts stand in every page: a copied one works from a disk without a network
+    fixed = {
+        "colours": colours,
+        "night": _NIGHT,
+        "part": lambda name: Markup((templates / name).read_text(encoding="utf-8")),
+    }
+    environment.globals.update(fixed)  # macros see these, and nothing of the page
+    write_text(path, environment.get_template(template).render(page))
+    return path
+
+
+def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:
+    if not embed:
+        return path.relative_to(folder).as_posix()
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
