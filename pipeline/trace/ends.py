@@ -86,12 +86,11 @@ def _against_dim_ends(attempt: Attempt) -> str:
 
 
 def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
-    """What may be wrong with where a curve (n, 3) begins and ends, and with the line as a whole."""
+    """What may be wrong with where a curve (n, 3) begins and ends."""
     missing_mm = attempt.tube.steps.missing_mm
     back_mm, on_mm, sure_mm = _end_range(image, attempt)
     step = length_mm / max(1, len(points) - 1)
     folded = beside_itself(points, step, TIP_BESIDE * image.voxel)
-    turn = sharpest_turn_deg(points, step, HAIRPIN_VOXELS * image.voxel)
     return (
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
@@ -113,6 +112,16 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          f"a lumen that ends at {_named(image, points[-1])} mm, and something bright beyond it",
          "a lumen that holds the tip",
          "look whether the vessel goes on there (segment.threshold, lumen), or bone touches it"),
+        (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
+         "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
+         "list a frame of a smaller depth before it, or look where the wire ends"),
+    )  # fmt: skip
+
+
+def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
+    """Why a curve (n, 3) may be no wire, or not one."""
+    turn = sharpest_turn_deg(points, length_mm / max(1, len(points) - 1), HAIRPIN_VOXELS * image.voxel)
+    return (
         (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
          "turn entry_direction round, or state insertion_mm if this is right"),
@@ -120,9 +129,6 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          f"slices {image.slices_apart:.1f} times as far apart as pixels",
          f"less than {MOST_APART} times",
          "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
-        (bool(folded[-1]) and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
-         "a tip beside another strand of the wire", f"{TIP_BESIDE} voxels between them",
-         "list a frame of a smaller depth before it, or look where the wire ends"),
         (turn > HAIRPIN_DEG and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
          f"a turn by {turn:.0f} degrees within {HAIRPIN_VOXELS * image.voxel:.1f} mm", f"{HAIRPIN_DEG:g} at most",
          "look whether two wires lie side by side; state insertion_mm if the wire is folded"),

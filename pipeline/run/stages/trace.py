@@ -1,7 +1,5 @@
 """trace: the real wire of every frame, one crop held at a time."""
 
-import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -21,6 +19,7 @@ from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.repeated import known_by, once
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
@@ -46,7 +45,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
     frames, assumed = own_dim_ends([part.frame for part in parts], voxel_mm)
     run.log.assumptions += assumed
-    frames = in_step(_once(frames, [part.voxels for part in parts]), voxel_mm)
+    frames = in_step(once(frames, [part.voxels for part in parts]), voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
@@ -69,25 +68,6 @@ class _Part(NamedTuple):
     window: tuple[float, float] | None
     log: Log
     voxels: bytes = b""
-
-
-def _once(frames: Sequence[Frame], voxels: Sequence[bytes]) -> list[Frame]:
-    """The frames; one with the voxels of an earlier one, in whatever file, is not counted again."""
-    out, first = list(frames), dict[bytes, int]()
-    for n, known in enumerate(voxels):
-        same = first.setdefault(known, n)
-        if known and same != n:
-            out[n] = frames[n].failed("load", FrameStatus.REPEATED, f"it has the voxels of frame {same}")
-    return out
-
-
-def _known_by(volume: Volume) -> bytes:
-    """A hash of the sums of the rows in memory, which noise makes as good as that of all voxels in a fifth of its time.
-
-    Whatever type the voxels are kept in.
-    """
-    rows = volume.values.sum(axis=int(np.argmin(volume.values.strides)), dtype=np.float64)
-    return hashlib.blake2b(np.ascontiguousarray(rows).data, digest_size=16).digest()
 
 
 class _Tracing:
@@ -131,7 +111,7 @@ class _Tracing:
         """
         log = run.log
         volume = run.load(Crop(header, self.box, self.load), frame.index)
-        voxels = _known_by(volume)
+        voxels = known_by(volume)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
