@@ -13,7 +13,8 @@ _A4_INCH = (8.27, 11.69)
 _LEFT, RIGHT, _TOP, BOTTOM = 0.08, 0.92, 0.95, 0.05
 _WIDE_INCH = (RIGHT - _LEFT) * _A4_INCH[0]
 _DOTS_PER_INCH = 200  # of a figure as it is printed
-_STRETCH = 0.85, 1.3  # of a figure's own height, to fill a page: labels neither touch nor lie far apart
+_STRETCH = 0.85, 1.6  # of a figure's own height, to fill a page: labels neither touch nor lie far apart
+_BESIDE_SCANS = 0.5  # that height and width are kept at least, of a figure and of scans on one page
 _LEAST_WIDTH = 0.35  # of the page: what is smaller, as the map of hundreds of cases, cannot be read
 WIDE = 104  # characters of 9 points
 _LINE = 0.0165  # of the page's height, for type of 9 points
@@ -78,11 +79,11 @@ class Page:
         """
         own = [_own_height(one.drawing) for one in figures]
         stiff = sum(high for one, high in zip(figures, own, strict=True) if one.drawing.scans)
-        soft, least = sum(own) - stiff, _STRETCH[0] * (sum(own) - stiff)
+        soft, least = sum(own) - stiff, _BESIDE_SCANS if stiff else _STRETCH[0]
         room = self.at - BOTTOM - below - sum(one.words for one in figures)
-        scans = float(np.clip((room - least) / max(stiff, 1e-9), _LEAST_WIDTH, 1.0))
+        scans = float(np.clip((room - soft) / max(stiff, 1e-9), _BESIDE_SCANS, 1.0))
         rest = room - scans * stiff
-        stretch = float(np.clip(rest / max(soft, 1e-9), *_STRETCH))
+        stretch = float(np.clip(rest / max(soft, 1e-9), least, _STRETCH[1]))
         others = min(1.0, rest / max(stretch * soft, 1e-9))
         for one, high in zip(figures, own, strict=True):
             self._picture(one, high, *((1.0, scans) if one.drawing.scans else (stretch, others)))

@@ -223,7 +223,7 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
     frames = f"{used} frame{'s' * (used != 1)}"
     note = (
         f"the clamp was estimated from {frames}: the solver's wire fitted to the first {REACH_MM:g} mm of the traces, "
-        f"with the manifest's entry as prior; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
+        f"weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
         f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
         "this off)"
     )

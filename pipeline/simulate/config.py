@@ -51,7 +51,7 @@ class SimulateConfig:
     depth: Literal["traced", "manifest"] = "traced"
     """traced (the length found in each frame) or manifest (insertion_mm)."""
     entry: Literal["traced", "manifest"] = "traced"
-    """traced (fitted to the first 10 mm of the traces, with the manifest as prior) or manifest (taken as written)."""
+    """traced (fitted to the first 10 mm of the traces, weighed with the manifest) or manifest (taken as written)."""
     bending_scale: Factor = 1.0
     """Factor on the wire's bending stiffness, for sensitivity runs; the same for the whole wire, it scales forces."""
     taper_scale: Factor = 1.0

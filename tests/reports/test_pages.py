@@ -194,7 +194,7 @@ def test_captions_speak_of_no_budget_where_none_was_drawn(tmp_path: Path) -> Non
     out = write_run(tmp_path / "out", (FakeCase("c", frames=3),))
     page = render_case(out / "cases" / "c").read_text(encoding="utf-8")
     assert "Solid: the wire traced in the scan; dashed: the simulated wire; dots: the tips." in page
-    for absent in ("median of the ensemble", "two standard deviations", "u_val is what", "{"):
+    for absent in ("median of the ensemble", "two standard deviations", "u_val is how", "{"):
         assert absent not in " ".join(re.findall(r"<figcaption>(.*?)</figcaption>", page, re.S)), absent
 
 
@@ -206,7 +206,9 @@ def test_a_lumen_that_is_not_found_is_one_failure_not_one_a_frame(tmp_path: Path
     frames = [row | told for row in result["frames"]]
     changed = result | {"status": "segment_failed", "frames": frames, "failures": [told]}
     path.write_text(json.dumps(changed), encoding="utf-8")
-    assert "Failures (1)" in render_case(path.parent).read_text(encoding="utf-8")
+    page = render_case(path.parent).read_text(encoding="utf-8")
+    assert "Failures (1)" in page
+    assert '<td data-label="frame">all</td>' in page, "an empty place told nothing of three frames"
 
 
 def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:
