@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.model import Curve
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.simulate import with_depth
+from pipeline.simulate.clamp import Clamp
+from pipeline.status import FrameStatus
 
 
 def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
@@ -46,3 +51,15 @@ def test_a_wire_that_gets_shorter_unsaid_is_a_warning() -> None:
     assert "frames 2 (-3.0 mm)" in shrinking(frames([10.0, 14.0, 11.0], nan), 0.3)[0]
     assert shrinking(frames([10.0, 14.0, 13.9], nan), 0.3) == []
     assert shrinking(frames([10.0, 14.0, 11.0], [10.0, 14.0, 11.0]), 0.3) == []
+
+
+def test_the_length_of_a_trace_that_is_not_trusted_is_no_depth_where_one_is_stated() -> None:
+    """Pages showed the failed frame at 7 mm where 18 were stated, and the wire was drawn back to 7 mm in between."""
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    lengths = [10.0, 14.0, 7.0, 22.0]
+    seen = frames(lengths, DEPTHS[:4])
+    seen[2] = seen[2].failed("trace", FrameStatus.LENGTH_MISMATCH, "")
+    assert [with_depth(f, "traced", clamp).depth_mm for f in seen] == [10.0, 14.0, 18.0, 22.0]
+    unstated = [replace(f, expected_mm=float("nan")) for f in seen]
+    assert [with_depth(f, "traced", clamp).depth_mm for f in unstated] == lengths
+    assert [with_depth(f, "manifest", clamp).depth_mm for f in seen] == DEPTHS[:4]
