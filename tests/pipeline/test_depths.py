@@ -12,7 +12,9 @@ from pipeline.run.log import Log
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
+from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
 from pipeline.trace import DIM_FROM_TIP, of_catheter
 
@@ -105,3 +107,15 @@ def test_a_frame_is_told_strands_apart_by_one_that_stands_alone() -> None:
         for seen in ([wrong], [right, wrong], [right, wrong, own_end])
     ]
     assert lengths == [0, 10, 18]
+
+
+def test_the_length_of_a_trace_that_is_not_trusted_is_no_depth_where_one_is_stated() -> None:
+    """Pages showed the failed frame at 7 mm where 18 were stated, and the wire was drawn back to 7 mm in between."""
+    clamp = Clamp(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    lengths = [10.0, 14.0, 7.0, 22.0]
+    seen = frames(lengths, DEPTHS[:4])
+    seen[2] = seen[2].failed("trace", FrameStatus.LENGTH_MISMATCH, "")
+    assert [with_depth(f, "traced", clamp).depth_mm for f in seen] == [10.0, 14.0, 18.0, 22.0]
+    unstated = [replace(f, expected_mm=float("nan")) for f in seen]
+    assert [with_depth(f, "traced", clamp).depth_mm for f in unstated] == lengths
+    assert [with_depth(f, "manifest", clamp).depth_mm for f in seen] == DEPTHS[:4]

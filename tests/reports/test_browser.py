@@ -215,7 +215,7 @@ def test_the_contents_mark_where_the_reader_is(run: Path, opened: Opener, viewpo
     assert page.evaluate(here) == ["Result"]
     for name in ("Tip", "Frames", "Files"):
         page.locator("nav.contents a", has_text=name).last.click()
-        page.wait_for_function(f"{here}.join() === '{name}'", timeout=5000)
+        page.wait_for_function(f"{here}.join() === '{name}'")
     page.evaluate("scrollTo(0, 0)")
     page.wait_for_timeout(200)
     assert page.evaluate(here) == ["Result"]

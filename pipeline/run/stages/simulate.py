@@ -160,13 +160,18 @@ def _told(frame: int, snap: Snap) -> str:
 
 
 def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
-    return tuple(_with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)
+    return tuple(with_depth(frame, run.config.simulate.depth, clamp) for frame in known.frames)
 
 
-def _with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
-    """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known."""
+def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
+    """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known.
+
+    The length of a trace that is not to be trusted is taken only where no depth is stated: a wire that were drawn back
+    to it and pushed on again would lie elsewhere in the frames that follow, where there is friction.
+    """
     depth = frame.expected_mm
-    if source == "traced" and frame.curve is not None and frame.traced:
+    told = frame.trusted_curve is not None or np.isnan(depth)
+    if source == "traced" and frame.curve is not None and frame.traced and told:
         depth = depth_from(clamp, frame.curve)
     found = replace(frame, depth_mm=depth)
     if not np.isnan(depth):
