@@ -97,13 +97,16 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     One that gets dimmer where the catheter ends is no longer doubted for that. For frames without a stated depth: where
     there is one, it says which of the two was traced.
     """
-    if abs(curve.length_mm - curve.levels.get(DIM_FROM_TIP, np.inf) - catheter_mm) < CATHETER_END_MM:
+    dim = curve.levels.get(DIM_FROM_TIP, np.inf)
+    if abs(curve.length_mm - dim - catheter_mm) < CATHETER_END_MM:
         curve = cleared(curve)
-    if curve.status is not FrameStatus.OK or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
+    open_question = curve.status is FrameStatus.OK or np.isfinite(dim)
+    if not open_question or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
         return curve
+    levels = {name: level for name, level in curve.levels.items() if name != DIM_FROM_TIP}  # other depths clear nothing
     note = f"trace: length: got {curve.length_mm:.2f} mm, where the catheter ends ({catheter_mm:.2f} mm); "
     note += "expected a wire that ends elsewhere, or a stated depth; give insertion_mm"
-    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note)
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:

@@ -27,6 +27,8 @@ noise is refused by more than its end alone, and may have the second. A stated s
 is further off than the third contradicts it."""
 HAIRPIN_DEG, HAIRPIN_VOXELS = 140.0, 7.0
 """A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were one, there and back."""
+J_MM = 6.0
+"""What goes on for no longer than this behind such a turn is the hook of a J tip, of 1 mm radius and less."""
 TIP_BESIDE = 3.5
 """Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
 
@@ -120,7 +122,8 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
 
 def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may be no wire, or not one."""
-    turn = sharpest_turn_deg(points, length_mm / max(1, len(points) - 1), HAIRPIN_VOXELS * image.voxel)
+    step = length_mm / max(1, len(points) - 1)
+    turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
     return (
         (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",

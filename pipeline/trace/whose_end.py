@@ -20,7 +20,7 @@ from pipeline.trace.verdict import note_of
 
 MARK_BLUR = 1.0
 """Voxels by which grey is blurred where a mark is looked for: half as wide as a band of 1 mm is long."""
-MARK_SHARE, MARK_SIGMAS = 0.5, 8.0
+MARK_SHARE, MARK_SIGMAS = 0.35, 8.0
 """Share of the wire's own height, and standard deviations of noise, from which something is a mark."""
 MARK_VOXELS, MARK_OFF = 4, 4.0
 """Voxels that it has at the least, and how many it lies off the tip: what is nearer is the tip's own."""
@@ -38,7 +38,9 @@ def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
     h, blur = image.voxel, MARK_BLUR * image.voxel
     voxels = voxels_of(image.region.runs)
     at = tuple(voxels.T)
-    least = MARK_SHARE * tube.peak
+    levels = tube.steps.levels
+    # a mark is held against the wire's body, which a coil of platinum outshines
+    least = MARK_SHARE * tube.peak * min(1.0, float(levels[levels > LEAST_LEVEL].min(initial=1.0)))
     voxels = voxels[(image.grey[at] > least) & (image.region.box.values[at] < -h)]
     flat = np.ravel_multi_index(tuple(voxels.T), image.grey.shape)
     seen = smooth_voxels(image.grey, gaussian_taps(MARK_BLUR), flat)

@@ -12,6 +12,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
+from pipeline.run.stages.repeated import once
 from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
 from pipeline.simulate.clamp import Clamp
@@ -95,6 +96,21 @@ def test_a_wire_is_dimmer_beyond_a_stated_catheter() -> None:
     assert frame.curve is not None
     assert of_catheter(frame.curve, 18.3).status is FrameStatus.OK
     assert of_catheter(frame.curve, 25.0) is frame.curve
+
+
+def test_what_ends_with_a_stated_catheter_is_not_cleared_by_other_depths() -> None:
+    """A catheter pushed with the wire, its end stated: 15 of 15 frames were ok, 4 to 5 mm too deep."""
+    seen = dim([20.0, 25.0, 30.0], [8.0, 8.0, 8.0])
+    ends = [replace(f, curve=of_catheter(f.curve, f.curve.length_mm)) for f in seen if f.curve is not None]
+    found, said = own_dim_ends(ends, 0.3)
+    assert not said
+    assert not any(f.ok for f in found)
+
+
+def test_a_copy_of_a_frame_is_no_third_that_agrees() -> None:
+    seen = once(dim([20.0, 30.0, 20.0], [8.0, 8.0, 8.0]), [b"a", b"b", b"a"])
+    assert seen[2].status == FrameStatus.REPEATED.identifier
+    assert not any(f.ok for f in own_dim_ends(seen, 0.3)[0])
 
 
 def test_a_frame_is_told_strands_apart_by_one_that_stands_alone() -> None:

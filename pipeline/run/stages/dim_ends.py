@@ -24,7 +24,7 @@ def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame],
     A catheter that stays where it is shows less of itself the further the wire is pushed.
     """
     out = list(frames)
-    doubted = [i for i, f in enumerate(out) if f.curve is not None and DIM_FROM_TIP in f.curve.levels]
+    doubted = [i for i, f in enumerate(out) if f.stage == "trace" and f.curve and DIM_FROM_TIP in f.curve.levels]
     curves = [curve for i in doubted if (curve := out[i].curve) is not None]
     if not curves:
         return out, []

@@ -43,9 +43,9 @@ def trace_frames(run: Context, known: Known) -> Known:
     for part in parts:
         run.log.add(part.log)
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
-    frames, assumed = own_dim_ends([part.frame for part in parts], voxel_mm)
+    frames, assumed = own_dim_ends(once([p.frame for p in parts], [p.voxels for p in parts]), voxel_mm)
     run.log.assumptions += assumed
-    frames = in_step(once(frames, [part.voxels for part in parts]), voxel_mm)
+    frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
