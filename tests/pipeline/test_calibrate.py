@@ -271,7 +271,7 @@ def test_one_frame_in_common_is_enough(study):
             ("[[wall]]", "[stated]\nbending_stiffness_N_mm2 = 2.0\nrest_curvature_per_mm = 0.0\n[[wall]]"),
             "stated otherwise",
         ),
-        (("schema = 1", "schema = "), "cannot be read as TOML"),
+        (("schema = 1", "schema = "), "not valid TOML"),
     ],
 )
 def test_bad_parameters_are_told(study, change, told):

@@ -70,6 +70,7 @@ def test_one_population_everywhere(study: Path) -> None:
     page = render_index(study).read_text(encoding="utf-8")
     assert f"<b>{rms:.3f}</b>" in page
     curve = pd.read_csv(study / "figures" / "planned_within.csv")
+    curve = curve[curve["case"].isna()]  # the others are those of single cases
     assert curve["share_of_planned"].max() == pytest.approx(7 / 9), "frames that failed are planned ones, too"
     assert curve.loc[curve["p95_mm"] < BAD, "p95_mm"].max() == pytest.approx(GOOD * 1.2)
     assert whole["within_1mm"] == pytest.approx(7 / 9)
