@@ -90,7 +90,8 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
     """The numbers at the head of a page; those that do not apply are left out.
 
     entries : ``column`` and ``label`` of each, as in sections.toml; ``{name}`` within a column's name is the value of
-    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label.
+    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label. The number of
+    frames is said of a skill that is over fewer than the numbers beside it.
     """
     shown = []
     for entry in entries:
@@ -101,16 +102,24 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
             interval_95 = f" (95 %: {ends})" if ends else ""
-            named = f" {_rival(column)}" if entry.get("name") else ""
-            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}"})
+            named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
+            part = fewer_frames(statistics) if name == "skill_strongest" else ""
+            fewer = f"; {part}, of which all predictors have a guess (the rms beside it are over more)" * bool(part)
+            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}"})
     return shown
 
 
-def _rival(column: Column) -> str:
+def predictor_label(name: str) -> str:
     """A trivial predictor as figures call it; its name where they show none of it."""
-    name = column.name.removeprefix("null_").removesuffix("_rms_mm").replace("_", " ")
-    shown = (ERRORS[column.name] if column.name in ERRORS.names else column).shown
-    return shown.get("predictors") or shown.get("rivals") or name
+    column = f"null_{name}_rms_mm"
+    shown = next((table[column].shown for table in (ERRORS, SUMMARY) if column in table.names), {})
+    return shown.get("predictors") or shown.get("rivals") or name.replace("_", " ")
+
+
+def fewer_frames(statistics: Mapping[str, Any]) -> str:
+    """``over 5 of 6 frames``: of those with a result, the ones that skill_strongest is over; empty where it is all."""
+    judged, good = (number(statistics.get(key)) for key in ("strongest_frames", "frames_ok"))
+    return "" if NOTHING in (judged, good) or float(judged) >= float(good) else f"over {judged} of {good} frames"
 
 
 def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[dict[str, str]]:

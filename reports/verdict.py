@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from reports._content import NOTHING, interval, number
+from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
 from reports.case_files import WORST, counted, find_cases, read_json, warnings_of
 from reports.schema import SUMMARY
 
@@ -131,18 +131,36 @@ def _skill(statistics: Mapping[str, Any]) -> tuple[str, float, float, float]:
     return "", nan, nan, nan
 
 
+def in_short(statistics: Mapping[str, Any]) -> str:
+    """The number to quote for a line of text, after what it means where the wire does not beat the predictor."""
+    _, skill, least, _ = _skill(statistics)
+    if isnan(skill):
+        return ""
+    name = statistics.get("strongest_null") if number(statistics.get("skill_strongest")) != NOTHING else "centreline"
+    rival = f"the predictor {predictor_label(str(name))!r}"
+    value = ", ".join(filter(None, (f"skill {skill:.3f}", fewer_frames(statistics))))
+    said = {
+        TIPS_OFF: f"the tips lie off, judge by tip_median_mm ({value} against {rival})",
+        WORSE: f"the simulated wire is worse than {rival} ({value})",
+        NO_BETTER: f"the simulated wire is no better than {rival} ({value})",
+        NOT_SHOWN: f"the simulated wire is not shown to be better than {rival} ({value}, {_interval_of(least)})",
+    }
+    return said.get(standing(statistics), f"{value} against {rival}")
+
+
 def _against(statistics: Mapping[str, Any]) -> str:
     """Whether the skill, and its interval where there is one, is above zero; of how many of the planned frames."""
     rival, skill, least, _ = _skill(statistics)
     if not rival:
         return ""
+    value = ", ".join(filter(None, (f"skill {number(skill)}", fewer_frames(statistics))))
     said = {
-        TIPS_OFF: f"By rms_mm alone it would be better (skill {number(skill)})",
-        WORSE: f"That is worse (skill {number(skill)})",
-        NO_BETTER: f"That is no better (skill {number(skill)})",
-        NOT_SHOWN: f"It is not shown to be better (the skill's interval {_down_to(least)})",
+        TIPS_OFF: f"By rms_mm alone it would be better ({value})",
+        WORSE: f"That is worse ({value})",
+        NO_BETTER: f"That is no better ({value})",
+        NOT_SHOWN: f"It is not shown to be better ({value}, {_interval_of(least)})",
     }
-    how = said.get(standing(statistics), f"That is better (skill {number(skill)})")
+    how = said.get(standing(statistics), f"That is better ({value})")
     return " ".join(filter(None, (f"{how} than {rival}.", _of_frames(statistics))))
 
 
@@ -156,8 +174,8 @@ def _of_frames(statistics: Mapping[str, Any]) -> str:
     return f"This speaks of {good:.0f} of {planned:.0f} planned frames alone, and {weaker}: it may flatter."
 
 
-def _down_to(least: float) -> str:
-    return "has no lower end" if least == -inf else f"reaches {number(least)}"
+def _interval_of(least: float) -> str:
+    return f"its interval {'has no lower end' if least == -inf else f'reaches {number(least)}'}"
 
 
 def _rival(name: str) -> str:

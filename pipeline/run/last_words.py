@@ -1,9 +1,8 @@
 """What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from pipeline.run.sweep import heads_of, lost_points
 from reports.case_files import counted, left_over_sentence
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
-from reports.verdict import next_command, typed
+from reports.verdict import in_short, next_command, typed
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
@@ -64,7 +63,7 @@ def last_line(totals: Totals, index: Path) -> str:
         judged = int(totals.pooled.get("cases") or totals.cases)
         over = f" over the {counted(judged, 'case')} that are scored" * (judged < totals.cases)
         parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm{over} ({in_words(low, high, said)})")
-        parts += _skill(totals.pooled)
+        parts += filter(None, [in_short(totals.pooled)])
     if totals.unscored:
         parts.append(totals.unscored.rstrip("."))
     if totals.frames and totals.solver_s:
@@ -72,11 +71,3 @@ def last_line(totals: Totals, index: Path) -> str:
     sweep = index.parent / SWEEP.file
     parts += [f"sweep: {sweep}"] * sweep.exists()
     return ".  ".join([*parts, f"report: {index}"])
-
-
-def _skill(pooled: Mapping[str, Any]) -> list[str]:
-    """The number to quote: skill against the strongest predictor, and in a word where a guess is nearer."""
-    value, null = pooled.get("skill_strongest"), pooled.get("strongest_null")
-    if value is None or not null or not np.isfinite(value):
-        return []
-    return [f"skill {value:.3f} against the predictor {null}" + ", which is nearer" * bool(value < 0)]

@@ -43,6 +43,14 @@ def test_a_tile_may_be_the_number_that_another_column_names() -> None:
     assert _content.cards(entries, {}) == _content.cards(entries, {"strongest_null": pd.NA}) == []
 
 
+def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> None:
+    entries = [{"column": "skill_strongest", "label": "skill"}]
+    row = {"skill_strongest": 0.9, "strongest_frames": 5, "frames_ok": 6}
+    label = _content.cards(entries, row)[0]["label"]
+    assert label == "skill; over 5 of 6 frames, of which all predictors have a guess (the rms beside it are over more)"
+    assert _content.cards(entries, row | {"strongest_frames": 6})[0]["label"] == "skill"
+
+
 def test_a_caption_speaks_of_what_is_there() -> None:
     text = "Dashed: simulated{band|, in its band}{u_mm|; bars: u}."
     table = pd.DataFrame({"curve": ["simulated", "band"], "u_mm": [math.nan, math.nan]})

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import badge, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, worst_frames
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from reports.verdict import badge, next_command, typed, unscored, verdict, worst
     [
         (0.9, 0.7, "That is better (skill 0.900) than "),
         (0.9, None, "That is better (skill 0.900) than "),
-        (0.4, -0.1, "It is not shown to be better (the skill's interval reaches -0.100) than "),
+        (0.4, -0.1, "It is not shown to be better (skill 0.400, its interval reaches -0.100) than "),
         (-0.2, -0.5, "That is no better (skill -0.200) than "),
         (-0.05, None, "That is no better (skill -0.0500) than "),
         (-38.6, None, "That is worse (skill -38.6) than "),
@@ -28,6 +28,31 @@ def test_the_verdict_follows_the_strongest_rival(skill: float, low: float | None
     # a newcomer is told what "roll unknown" means
     rival = "the simulator that does not know the roll, mean of 12 wires 30 degrees apart."
     assert text.endswith(f"{said}the strongest trivial predictor: {rival}")
+
+
+@pytest.mark.parametrize(
+    ("skill", "low", "said"),
+    [
+        (0.9, None, "skill 0.900 against the predictor 'least bending'"),
+        (0.4, -0.1, "not shown to be better than the predictor 'least bending' (skill 0.400, its interval reaches"),
+        (-0.05, None, "no better than the predictor 'least bending' (skill -0.050)"),
+        (-2.0, None, "worse than the predictor 'least bending' (skill -2.000)"),
+    ],
+)
+def test_the_terminal_says_in_words_what_a_negative_skill_means(skill: float, low: float | None, said: str) -> None:
+    """It said "6 ok" and "skill -2.000 against the predictor min_bending, which is nearer"."""
+    row = {"rms_mm": 0.25, "skill_strongest": skill, "skill_strongest_low": low, "strongest_null": "min_bending"}
+    assert said in in_short(row)
+    assert in_short({"rms_mm": 0.25}) == ""
+    assert "the predictor 'another insertion'" in in_short(row | {"strongest_null": "another"})
+
+
+def test_a_skill_over_fewer_frames_says_so() -> None:
+    """The two rms beside it were over six frames and the skill over five: divided they gave another one."""
+    row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "frames": 6, "frames_ok": 6}
+    for text in (in_short, verdict):
+        assert ", over 5 of 6 frames" in text(row | {"strongest_frames": 5})
+        assert "over" not in text(row | {"strongest_frames": 6})
 
 
 @pytest.mark.parametrize(
@@ -116,7 +141,7 @@ def test_an_end_that_nothing_bounds_is_no_better() -> None:
     row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "interval": "wide: 4 insertions"}
     assert "That is better" in verdict(row)
     row["interval"] += "; not bounded: rms_high_mm, skill_strongest_low"
-    assert "It is not shown to be better (the skill's interval has no lower end)" in verdict(row)
+    assert "It is not shown to be better (skill 0.900, its interval has no lower end)" in verdict(row)
     assert badge("ok", True, row)["look"] == "poor"
 
 
