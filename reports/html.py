@@ -7,6 +7,7 @@ from urllib.parse import quote
 
 from reports import _content
 from reports._content import flatten, settings, size
+from reports.alike import alike
 from reports.case_files import (
     GOOD,
     CaseFiles,
@@ -55,7 +56,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "next": next_command([case.name], typed(case_dir)),
         **_drawn(case, embed, each),
         **{key: result.get(key, "") for key in ("role", "group", "simulator")},
-        "failures": failures,
+        "failures": alike(failures),
         **{key: result.get(key, ()) for key in ("warnings", "assumptions", "inputs")},
         "numbers": _content.in_tiles(_content.cards(declared("cards"), case.statistics)),
         "points": (case_dir / "points.csv.gz").exists(),
@@ -105,7 +106,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
         "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
-        "failures": failures,
+        "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
         "left_over": left_over_sentence(out_dir),
         "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],

@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.backends.backend_pdf import PdfPages
 
 from reports import _content, colours
+from reports.alike import alike
 from reports.atomic import replacing
 from reports.case_files import WORST, CaseFiles, counted, not_reached, read_case, read_json, results_in, said_by_cases
 from reports.figures import RunFiles, declared, figures_of
@@ -57,20 +58,27 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, files: Run
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
     page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
     if len(failures):
-        page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
-        rows = failures[["simulator", "case", "frame", "status", "message"]].head(_MOST_FAILURES)
-        for name, case, frame, status, text in rows.to_numpy():
-            case = case if pd.isna(name) else f"{name}: {case}"
-            place = f"{case}" if pd.isna(frame) else f"{case}, frame {frame}"
-            page.text(f"{place}: {status}. {textwrap.shorten(str(text), 300, placeholder='…')}")
-        if len(failures) > _MOST_FAILURES:
-            page.text(f"… and {len(failures) - _MOST_FAILURES} more in failures.csv")
-        command = next_command(failures["case"], typed(out_dir))
-        page.text(f"Next: do what the message says, then {command}", width=WIDE * 9 // 10, weight="bold")
+        _failures(page, failures, out_dir)
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         page.text(f"{tile['value']}  {tile['label']}")
     page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases", _MOST_WARNINGS)
     return _draw(page, "run", files, ("case_frame_map",))
+
+
+def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
+    """What failed, alike frames once, and the next command. failures : of failures.csv, at least a row."""
+    page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
+    blank = failures.astype(object).where(failures.notna(), "")
+    rows = alike({str(k): v for k, v in row.items()} for row in blank.to_dict("records"))
+    for row in rows[:_MOST_FAILURES]:
+        case = ": ".join(filter(None, (row["simulator"], row["case"])))
+        frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
+        text = textwrap.shorten(str(row["message"]), 300, placeholder="…")
+        page.text(f"{case}{frames}: {row['status']}. {text}")
+    if rest := sum(row["count"] for row in rows[_MOST_FAILURES:]):
+        page.text(f"… and {rest} more in failures.csv")
+    command = next_command(failures["case"], typed(out_dir))
+    page.text(f"Next: do what the message says, then {command}", width=WIDE * 9 // 10, weight="bold")
 
 
 def _over_all(out_dir: Path, run: Mapping[str, Any], files: RunFiles) -> Page:

@@ -138,7 +138,7 @@ def in_short(statistics: Mapping[str, Any]) -> str:
         return ""
     name = statistics.get("strongest_null") if number(statistics.get("skill_strongest")) != NOTHING else "centreline"
     rival = f"the predictor {predictor_label(str(name))!r}"
-    value = ", ".join(filter(None, (f"skill {skill:.3f}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {skill:.3f}", fewer_frames(statistics))))
     said = {
         TIPS_OFF: f"the tips lie off, judge by tip_median_mm ({value} against {rival})",
         WORSE: f"the simulated wire is worse than {rival} ({value})",
@@ -153,7 +153,7 @@ def _against(statistics: Mapping[str, Any]) -> str:
     rival, skill, least, _ = _skill(statistics)
     if not rival:
         return ""
-    value = ", ".join(filter(None, (f"skill {number(skill)}", fewer_frames(statistics))))
+    value = " ".join(filter(None, (f"skill {number(skill)}", fewer_frames(statistics))))
     said = {
         TIPS_OFF: f"By rms_mm alone it would be better ({value})",
         WORSE: f"That is worse ({value})",

@@ -1,8 +1,9 @@
 """What a run says when it is done: what went wrong and what comes next, the numbers, where the report lies."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from pipeline.run.launch import Plan
 from pipeline.run.overall import shared_scans
 from pipeline.run.results import found_results
 from pipeline.run.sweep import heads_of, lost_points
+from reports.alike import alike
 from reports.case_files import counted, left_over_sentence
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
@@ -26,10 +28,8 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     found, cases = found_results(plan.out), []
     lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
     for result in found:
-        for row in result.failures:
-            cases.append(row["case"])
-            frame = f" frame {row['frame']}" if row.get("frame") is not None else ""
-            lines.append(f"{row['case']}{frame}: {row['status']}: {row['message'] or row['sentence']}")
+        cases += [row["case"] for row in result.failures]
+        lines += map(_failure, alike(result.failures))
     lines += [
         f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
@@ -37,6 +37,14 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     then = then or _next(plan, cases)
     aside = [text] if (text := left_over_sentence(plan.out)) else []
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
+
+
+def _failure(row: Mapping[str, Any]) -> str:
+    """One line for all frames that failed alike."""
+    several = row["count"] > 1
+    of = f" frame{'s' * several} {row['frames']}" * bool(row["frames"])
+    said = f"in frame {row['frame']}: {row['message']}" if several and row["message"] else row["message"]
+    return f"{row['case']}{of}: {row['status']}: {said or row['sentence']}"
 
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:

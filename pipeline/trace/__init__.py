@@ -12,6 +12,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace.attempt import EntryPose
 from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
+from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, missed_mm
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracted
@@ -55,7 +56,8 @@ def trace(
         again = _seen(scans, stated, previous, config)
         curve = again if again.status is FrameStatus.OK else curve
     if len(curve.points_mm) == 0:
-        return curve
+        line = brightest_line(frame, reference, stated.point)
+        return replace(curve, note=f"{curve.note}; {line}") if line else curve
     axis = np.asarray(config.rotation_axis, float) if config.rotation_axis else frame.direction[:, 2]
     in_plane = near_rotation_plane(curve.points_mm, axis, config.in_plane_deg)
     in_plane_mm = float(in_plane.mean()) * curve.length_mm

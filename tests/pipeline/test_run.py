@@ -214,7 +214,7 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
     assert run(study, out, "--set", "simulate.friction=0.1", "--resume") == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert "sweep:" not in last
-    assert re.search(r"skill 0\.\d+ against the predictor '[a-z ]+'\.", last)
+    assert re.search(r"skill 0\.\d+ over 3 of 4 frames against the predictor '[a-z ]+'\.", last)
     assert not (out / "sweep.csv").exists()
     assert not (out / "summary.pdf").exists()
 

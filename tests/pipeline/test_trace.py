@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import lru_cache
 
@@ -19,6 +20,7 @@ from pipeline.segment import segment
 from pipeline.status import FrameStatus
 from pipeline.trace import of_catheter, of_length, trace
 from pipeline.trace.config import TraceConfig
+from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted
 from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
@@ -70,6 +72,22 @@ def test_what_is_measured_is_never_summed():
     for stage in (curve, lumen):
         assert not set(stage.counters) & set(stage.levels)
         assert not [name for name in stage.counters if "cnr" in name or "blur" in name or "fraction" in name]
+
+
+@pytest.mark.parametrize("has_reference", [True, False])
+def test_a_wrong_entry_is_told_where_the_brightest_line_is(has_reference):
+    """It was told to check that the frame shows a wire, which it did: 6 mm beside the entry."""
+    frame, reference, lumen = scans(8)
+    *_, wire, entry, direction = vessel()
+    beside = np.cross(direction, [0.0, 0.0, 1.0])
+    wrong = entry + 6.0 * beside / np.linalg.norm(beside)
+    curve = trace(frame, lumen, wrong, direction, reference=reference if has_reference else None)
+    away = float(np.linalg.norm(wire - wrong, axis=1).min())
+    assert curve.status in (FrameStatus.NO_WIRE, FrameStatus.TRACE_LOW_CONTRAST)
+    said = float(re.search(r"the brightest line near it passes (\S+) mm from entry_mm, at \[", curve.note)[1])
+    assert said == pytest.approx(away, abs=2 * VOXEL), "voxels of the line, a tenth of them"
+    assert brightest_line(reference, None, wrong) is None, "a vessel without a wire has no such line"
+    assert brightest_line(frame, reference, entry) is None, "a line that passes the entry is no news"
 
 
 @pytest.mark.parametrize(("cnr", "mean_bar", "tip_bar"), [(16, 0.05, 0.4), (8, 0.08, 0.7), (4, 0.15, 1.1)])

@@ -51,7 +51,7 @@ def test_a_skill_over_fewer_frames_says_so() -> None:
     """The two rms beside it were over six frames and the skill over five: divided they gave another one."""
     row = {"rms_mm": 0.25, "skill_strongest": 0.9, "strongest_null": "previous", "frames": 6, "frames_ok": 6}
     for text in (in_short, verdict):
-        assert ", over 5 of 6 frames" in text(row | {"strongest_frames": 5})
+        assert " over 5 of 6 frames" in text(row | {"strongest_frames": 5})
         assert "over" not in text(row | {"strongest_frames": 6})
 
 

@@ -1,0 +1,40 @@
+"""Failures that say the same of many frames, said once."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+_SCAN = re.compile(r" \(scan [^()]*\)$")
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone as the first of them.
+
+    Each has ``count``, how many it stands for, and ``frames``, their numbers as a reader says them; empty for a whole
+    case.
+    """
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        message = _NUMBER.sub("#", _SCAN.sub("", str(row.get("message") or "")))
+        key = (*(str(row.get(name) or "") for name in ("simulator", "case", "stage", "status")), message)
+        groups.setdefault(key, []).append(row)
+    return [
+        {**own[0], "count": len(own), "frames": in_words([row["frame"] for row in own if _stated(row)])}
+        for own in groups.values()
+    ]
+
+
+def in_words(frames: Sequence[int]) -> str:
+    """``0 to 3, 5`` of frames' numbers."""
+    runs: list[list[int]] = []
+    for frame in map(int, frames):
+        if runs and frame == runs[-1][-1] + 1:
+            runs[-1].append(frame)
+        else:
+            runs.append([frame])
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
+
+
+def _stated(row: Mapping[str, Any]) -> bool:
+    return str(row.get("frame")) not in ("", "None", "nan", "<NA>")

@@ -1,0 +1,33 @@
+"""Failures of many frames that say the same."""
+
+from __future__ import annotations
+
+from reports.alike import alike, in_words
+
+
+def row(frame: int | None, message: str, case: str = "a", status: str = "no_wire") -> dict[str, object]:
+    return {"case": case, "frame": frame, "stage": "trace", "status": status, "message": message}
+
+
+def test_what_differs_in_numbers_and_scans_is_said_once() -> None:
+    """A wrong entry without a reference said the same of each of 30 frames, a line each."""
+    rows = [row(n, f"got nothing above {200 + n}.5 grey (scan frame_{n:03}.mha)") for n in (0, 1, 2, 5)]
+    rows += [
+        row(3, "got a line 1.1 noises bright"),
+        row(0, "got nothing above 3 grey", case="b"),
+        row(None, "no lumen"),
+    ]
+    found = alike(rows)
+    assert [(one["case"], one["frames"], one["count"]) for one in found] == [
+        *[("a", "0 to 2, 5", 4), ("a", "3", 1), ("b", "0", 1), ("a", "", 1)]
+    ]
+    assert found[0]["message"] == rows[0]["message"], "the first one's, numbers and all"
+
+
+def test_other_statuses_are_not_alike() -> None:
+    assert len(alike([row(0, "x"), row(1, "x", status="trace_failed")])) == 2
+
+
+def test_numbers_of_frames_in_words() -> None:
+    assert in_words([4]) == "4"
+    assert in_words([0, 1, 3, 4, 5]) == "0, 1, 3 to 5"
