@@ -18,6 +18,7 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.plausible import implausible
     from pipeline.study.same_scans import shared
     from reports.case_files import counted
 
@@ -27,7 +28,7 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
-    for note in shared(manifest.cases):
+    for note in (*implausible(manifest.cases), *shared(manifest.cases)):
         say(f"warning: {note}")
     frames = sum(case.frame_count for case in manifest.cases)
     say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")

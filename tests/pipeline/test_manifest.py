@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 from pipeline.load.order import natural_key
 from pipeline.study.manifest import ManifestError, read_manifest
+from pipeline.study.plausible import implausible
 
 GOOD = """
 schema = 1
@@ -141,3 +143,27 @@ def test_a_clamp_cannot_be_borrowed_from_nowhere_or_in_a_ring(tmp_path: Path) ->
     )
     assert "shows no clamp" in problems(tmp_path, f'{GOOD}\nentry = "case:run1"\n')
     assert "unknown key" in problems(tmp_path, f"{GOOD}\nentry_case = {{}}\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("[[0.0, 0.5], [30.0, 5.0]]", "[[0.0, 500.0], [30.0, 5000.0]]"), "bending_stiffness_N_mm2 of 5e+03"),
+        (("[[0.0, 0.5], [30.0, 5.0]]", "0.005"), "bending_stiffness_N_mm2 of 0.005"),
+        (("radius_mm = 0.18", "radius_mm = 0.89"), "radius_mm = 0.89: guide wires have 0.1 to 0.5 mm; is it the diam"),
+        (("radius_mm = 0.18", "radius_mm = 0.007"), "radius_mm = 0.007: guide wires have 0.1 to 0.5 mm; is it in an"),
+    ],
+)
+def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    """EI a thousand times too large, or a diameter of 0.035 inch as the radius, ran without a word."""
+    assert implausible(read_manifest(written(tmp_path, GOOD)).cases) == []
+    notes = implausible(read_manifest(written(tmp_path, GOOD.replace(*change))).cases)
+    assert f"wire 'soft': {said}" in notes[0]
+
+
+@pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])
+def test_real_wires_are_no_warning(tmp_path: Path, radius_mm: float, modulus_gpa: float) -> None:
+    """Moduli measured by Harrison et al. 2011; the catalogue's own wires are softer."""
+    stiffness = 1000.0 * modulus_gpa * math.pi * radius_mm**4 / 4.0
+    text = GOOD.replace("0.18", str(radius_mm)).replace("[30.0, 5.0]", f"[30.0, {stiffness}]")
+    assert implausible(read_manifest(written(tmp_path, text)).cases) == []
