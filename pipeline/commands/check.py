@@ -18,17 +18,18 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
-    from pipeline.study.plausible import implausible
+    from pipeline.study.plausible import first_of, implausible, leads_out
     from pipeline.study.same_scans import shared
     from reports.case_files import counted
 
-    manifest, settings = given(args), resolved_settings(args)
-    problems = check(manifest.cases, settings.config)
+    manifest, config = given(args), resolved_settings(args).config
+    problems = check(manifest.cases, config)
     if problems:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
-    for note in (*implausible(manifest.cases), *shared(manifest.cases)):
+    ways = [f"case {one.id!r}: {text}" for one in manifest.cases for text in leads_out(one, first_of(one, config))]
+    for note in (*implausible(manifest.cases), *ways, *shared(manifest.cases)):
         say(f"warning: {note}")
     frames = sum(case.frame_count for case in manifest.cases)
     say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")

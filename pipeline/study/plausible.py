@@ -1,11 +1,13 @@
-"""What a manifest says of a wire and no guide wire has: most of all a value in another unit."""
+"""What a manifest says and hardly can be: a wire that no guide wire is, an entry that leads out of the scan."""
 
 from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from pipeline.load import Header, read_header
 from pipeline.model import Wire
 from pipeline.study.manifest import Case
+from pipeline.study.settings import Config
 
 RADII_MM = (0.1, 0.5)
 """Guide wires of 0.008 to 0.038 inch: radii of 0.10 to 0.48 mm."""
@@ -35,3 +37,42 @@ def _oddities(wire: Wire) -> Iterator[str]:
             f"rubber) to {largest:.3g} N mm2 (of tungsten), and guide wires lie between; is it in another unit, or the "
             "radius wrong?"
         )
+
+
+SHORT_WAY = 0.5
+"""Share of the largest stated depth that the scan holds ahead of the entry at least; a vessel may turn."""
+SHORT_MM = 10.0
+"""Where no depth is stated: what it holds at least."""
+LONGER_BACK = 3.0
+"""Times as much as it holds the other way, for the direction to be doubted."""
+
+
+def first_of(case: Case, config: Config) -> Header | None:
+    """The header of a scan of the case; None without any."""
+    source = case.reference or next(iter(case.frames), None)
+    return None if source is None else read_header(source, config.load, case.spacing_mm)
+
+
+def leads_out(case: Case, header: Header | None) -> list[str]:
+    """A sentence where entry_direction points to the near edge of the scan. header : of a scan with that entry."""
+    if header is None:
+        return []
+    ahead, behind = (_to_the_edge(case, header, sign) for sign in (1.0, -1.0))
+    least = SHORT_WAY * max(case.insertion_mm) if case.insertion_mm else SHORT_MM
+    if ahead >= least or behind < LONGER_BACK * ahead:
+        return []
+    stated = f", for insertion_mm up to {max(case.insertion_mm):g} mm" if case.insertion_mm else ""
+    return [
+        f"entry_direction leads out of the scan {ahead:.1f} mm from entry_mm{stated}; the other way it holds "
+        f"{behind:.0f} mm: entry_direction points the way the wire is pushed; is it turned round?"
+    ]
+
+
+def _to_the_edge(case: Case, header: Header, sign: float) -> float:
+    """How far the scan reaches from the entry along its direction, or against it, mm."""
+    points = np.asarray(case.entry_mm) + sign * np.outer([0.0, 1.0], case.entry_direction)
+    start, one = header.grid.to_index(points)
+    step = one - start
+    limit = np.where(step > 0.0, np.array(header.shape) - 0.5, -0.5)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(max(0.0, np.nanmin(np.where(step != 0.0, (limit - start) / step, np.inf))))

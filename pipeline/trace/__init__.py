@@ -111,6 +111,10 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
+HARDLY_BEGUN = 0.25
+"""Share of the stated depth below which a trace may have been followed the wrong way."""
+
+
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
     """The curve, traced or given; one that is ok but too far from the expected length has that as its status."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
@@ -118,4 +122,6 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
     note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
     note += "trace.length_tolerance_mm"
+    if curve.length_mm < HARDLY_BEGUN * float(expected_mm or 0.0):
+        note += "; or entry_direction points back along the wire: turn it round"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

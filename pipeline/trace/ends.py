@@ -120,14 +120,20 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
     )  # fmt: skip
 
 
+def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
+    """Why a curve may run the wrong way: said before all else, since what else is odd of it follows from that."""
+    return (
+        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
+         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
+         "turn entry_direction round, or state insertion_mm if this is right"),
+    )  # fmt: skip
+
+
 def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)
     turn = sharpest_turn_deg(points[: -max(1, round(J_MM / max(step, 1e-9)))], step, HAIRPIN_VOXELS * image.voxel)
     return (
-        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
-         f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
-         "turn entry_direction round, or state insertion_mm if this is right"),
         (image.slices_apart >= MOST_APART, FrameStatus.TRACE_AMBIGUOUS,
          f"slices {image.slices_apart:.1f} times as far apart as pixels",
          f"less than {MOST_APART} times",

@@ -12,7 +12,7 @@ from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import Attempt, tube_length
-from pipeline.trace.ends import Objection, beside_itself, of_the_ends, of_the_whole
+from pipeline.trace.ends import Objection, beside_itself, of_the_ends, of_the_way, of_the_whole
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import LEAST_LEVEL, Steps
 from pipeline.trace.section import out_of_round
@@ -165,7 +165,8 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
         double |= _doubled(alone, oblong, np.maximum(DOUBLE, 1.0 + 4.0 * noise), doubtful)
     outside = _outside(image, points)
     faint_mm, double_mm = (float(np.count_nonzero(m)) * step for m in (faint & ~bridged, double))
-    objections = _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
+    objections = of_the_way(attempt, length_mm)
+    objections += _of_the_line(image, attempt, points, (share, noise, outside), (faint_mm, double_mm, length_mm))
     objections += of_the_ends(image, attempt, points, length_mm) + of_the_whole(image, attempt, points, length_mm)
     first = next(((status, note_of(*why)) for holds, status, *why in objections if holds), (FrameStatus.OK, ""))
     return Verdict(*first, bridged | faint | double | outside, faint_mm, double_mm)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -387,3 +388,18 @@ def test_a_closed_output_is_no_trouble() -> None:
         f"{sys.executable} -m pipeline settings >&-", shell=True, stderr=subprocess.PIPE, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It said "no problem found", and the run had a depth below zero."""
+    text = (study / "manifest.toml").read_text(encoding="utf-8")
+    assert main(["check", str(study)]) == 0
+    assert "leads out of the scan" not in capsys.readouterr().out
+    back = re.sub(
+        r"entry_direction = \[(.*)\]",
+        lambda found: f"entry_direction = {[-float(v) for v in found[1].split(',')]}",
+        text,
+    )
+    (study / "back.toml").write_text(back, encoding="utf-8")
+    assert main(["check", str((study / "back.toml"))]) == 0
+    assert "entry_direction leads out of the scan" in capsys.readouterr().out

@@ -17,7 +17,8 @@ from pipeline.run.stages.simulate import with_depth
 from pipeline.run.stages.trace import _last_curve, _Part
 from pipeline.simulate.clamp import Clamp
 from pipeline.status import FrameStatus
-from pipeline.trace import DIM_FROM_TIP, of_catheter
+from pipeline.trace import DIM_FROM_TIP, of_catheter, of_length
+from pipeline.trace.config import TraceConfig
 
 
 def frames(lengths: list[float], expected: list[float]) -> list[Frame]:
@@ -135,3 +136,19 @@ def test_the_length_of_a_trace_that_is_not_trusted_is_no_depth_where_one_is_stat
     unstated = [replace(f, expected_mm=float("nan")) for f in seen]
     assert [with_depth(f, "traced", clamp).depth_mm for f in unstated] == lengths
     assert [with_depth(f, "manifest", clamp).depth_mm for f in seen] == DEPTHS[:4]
+
+
+def test_a_tip_behind_the_entry_names_entry_direction() -> None:
+    """It was "depths_mm: got -0.0317; allowed: a number from 0", of the solver, and the whole case was lost."""
+    clamp = Clamp(np.array([0.0, 0.0, 10.5]), np.array([0.0, 0.0, 1.0]))
+    frame = with_depth(frames([10.0], [float("nan")])[0], "traced", clamp)
+    assert (frame.status, np.isnan(frame.depth_mm)) == ("simulate_failed", True)
+    assert "ends 0.50 mm behind the entry" in frame.message
+    assert "entry_direction" in frame.message
+
+
+def test_a_trace_that_hardly_begins_may_run_the_wrong_way() -> None:
+    short, long = (of_length(f.curve, 14.0, TraceConfig()) for f in frames([0.1, 9.0], DEPTHS[:2]) if f.curve)
+    assert "entry_direction points back along the wire" in short.note
+    assert long.status is FrameStatus.LENGTH_MISMATCH
+    assert "entry_direction" not in long.note

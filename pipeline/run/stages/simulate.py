@@ -173,6 +173,10 @@ def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
     told = frame.trusted_curve is not None or np.isnan(depth)
     if source == "traced" and frame.curve is not None and frame.traced and told:
         depth = depth_from(clamp, frame.curve)
+    if depth <= 0.0:
+        note = f"the traced wire ends {-depth:.2f} mm behind the entry, where nothing can be pushed to; "
+        note += "check that entry_direction points the way the wire is pushed, and that entry_mm lies before its tip"
+        return replace(frame, depth_mm=float("nan")).failed("simulate", FrameStatus.SIMULATE_FAILED, note)
     found = replace(frame, depth_mm=depth)
     if not np.isnan(depth):
         return found
