@@ -401,5 +401,5 @@ def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys:
         text,
     )
     (study / "back.toml").write_text(back, encoding="utf-8")
-    assert main(["check", str((study / "back.toml"))]) == 0
+    assert main(["check", str(study / "back.toml")]) == 0
     assert "entry_direction leads out of the scan" in capsys.readouterr().out
