@@ -62,7 +62,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     write_record(args.out / "calibration.json", found, fit)
     for one in written.estimate:
         sd = f"{100 * one.sd:.2g} %" if one.logarithmic else f"{one.sd:.2g}"
-        verdict = "" if one.seen else f"  UNIDENTIFIABLE, as stated; fitted {one.value:g}: {one.why}"
+        verdict = "" if one.seen else f"  not seen, as stated; fitted {one.value:g}: {one.why}"
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     for warning in (*misfit(fit), *flattened(found)):
         say(f"warning: {warning}")
@@ -86,7 +86,7 @@ def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config
     for note in notes:
         say(f"planned: {note}")
     for row in rows:
-        verdict = "seen" if row.seen else "NOT SEEN"
+        verdict = "seen" if row.seen else "not seen"
         say(f"{row.unknown.name:20s} +- {row.sd:8.3g}  ({row.unknown.enough:g} counts as seen)  {verdict}")
     write_design(args.out / "design.json", rows, notes)
     say(f"page: {render_design(args.out)}")

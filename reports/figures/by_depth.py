@@ -39,6 +39,9 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
     return Drawing(figure, _table(case, shown), frames=_depths(case, axes))
 
 
+OTHER_BRANCH = "tips in different branches"
+
+
 def tip_by_depth(case: CaseFiles) -> Drawing | None:
     """Distance of the tips and angle between their tangents."""
     good = _by_depth(case.good)
@@ -47,12 +50,14 @@ def tip_by_depth(case: CaseFiles) -> Drawing | None:
     figure, (top, tips), (bottom, angles) = _two_panels(good, 4.6, "tip_by_depth", "tip_angle_by_depth")
     wrong = good[good["branch_ok"].eq(other=False).fillna(value=False).astype(bool)]
     if len(wrong):
-        _line(top, wrong, "tip_mm", "tips in different branches", marker="X", linestyle="", color=BAD)
+        _line(top, wrong, "tip_mm", OTHER_BRANCH, marker="X", linestyle="", color=BAD)
     positive_axis(top, [good[column] for column in tips])
     bottom.set_ylim(bottom=0.0)
     _mark_failed(top, case)
     _finish({top: "tip distance, mm", bottom: "tip angle, degrees"})
-    return Drawing(figure, _table(case, [*tips, *angles, "branch_ok"]), frames=_depths(case, top, bottom))
+    table = _table(case, [*tips, *angles, "branch_ok"])
+    table.loc[wrong.index, "note"] = OTHER_BRANCH  # the caption speaks of the cross where there is one
+    return Drawing(figure, table, frames=_depths(case, top, bottom))
 
 
 def truth_by_depth(case: CaseFiles) -> Drawing | None:

@@ -295,7 +295,7 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert [used.case for used in found.used] == ["a"]
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
     said = capsys.readouterr().out
-    assert "UNIDENTIFIABLE" in said
+    assert "not seen, as stated" in said
     assert "calibrated with a: 0 of 6 parameters seen.  parameters: " in said.splitlines()[-1]
     for one in found.estimate:
         assert f"{one.name:20s} {one.used:10g}  +-" in said, "the number that runs take, not one of another fit"

@@ -480,3 +480,26 @@ def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, 
     (entry,) = [entry for entry in declared("run") if entry["figure"] == "planned_within"]
     assert ("thin: each case" in caption(entry["read"], drawing.table)) == said
     assert len(drawing.figure.axes[0].get_lines()) == 1 + said * cases
+
+
+@pytest.mark.parametrize("frame", [None, 1])
+def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp_path: Path) -> None:
+    """It named "a filled cross" in cases whose tips all lie in the right branch."""
+    out = write_run(tmp_path / "out", [FakeCase("c", frames=3)])
+    path = out / "cases" / "c" / "errors.csv"
+    errors = tables.read(path, ERRORS)
+    tables.write(path, ERRORS, errors.assign(branch_ok=[n != frame for n in range(3)]))
+    drawing = CASE_FIGURES["tip_by_depth"](read_case(path.parent))
+    assert drawing is not None
+    (entry,) = [entry for entry in declared("case") if entry["figure"] == "tip_by_depth"]
+    assert ("filled cross" in caption(entry["bad"], drawing.table)) == (frame is not None)
+
+
+def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None:
+    """The quickstart's exact wire was "bad" by its caption: 0.36 mm with the manifest's entry, measured to 2 degrees."""
+    entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.06, "distal10_rms_mm": 0.06}
+    far = entry | {"clamp": "manifest", "rms_mm": 0.36, "tip_median_mm": 0.3}
+    tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.1}, far])
+    (said,) = [s for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False) if s["figure"] == "budget"]
+    assert "no fault by itself" in said["read"]
+    assert "further from the manifest's than that was measured to" in said["bad"]

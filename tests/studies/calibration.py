@@ -91,15 +91,15 @@ def judged(found: Parameters, physics: Physics) -> bool:
     true, good = truths(physics), True
     for row in found.estimate:
         if row.name not in true:
-            print(f"  {row.name:18s} {row.value:8.4f} +- {row.sd:.4f}{'' if row.seen else '  unidentifiable'}")
+            print(f"  {row.name:18s} {row.value:8.4f} +- {row.sd:.4f}{'' if row.seen else '  not seen'}")
             continue
         off = row.value / true[row.name] - 1.0 if row.logarithmic else row.value - true[row.name]
         z = (np.log(row.value / true[row.name]) if row.logarithmic else off) / row.sd
         bar = BARS.get(row.name)
         met = not row.seen if bar is None else row.seen and abs(off) <= bar
         good &= bool(met)
-        aim = "shall be unidentifiable" if bar is None else f"bar {bar:g}"
-        seen = "" if row.seen else f"  unidentifiable: {row.why}"
+        aim = "shall not be seen" if bar is None else f"bar {bar:g}"
+        seen = "" if row.seen else f"  not seen: {row.why}"
         values = f"{row.value:8.4f} true {true[row.name]:8.4f} off {off:+.4f} ({z:+.1f} sd; {aim})"
         print(f"  {row.name:18s} {values} {'met' if met else 'MISSED'}{seen}")
     return good
