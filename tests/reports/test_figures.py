@@ -496,7 +496,7 @@ def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp
 
 
 def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None:
-    """The quickstart's exact wire was "bad" by its caption: 0.36 mm with the manifest's entry, measured to 2 degrees."""
+    """The exact wire of the quickstart was "bad": 0.36 mm with the entry of the manifest, measured to 2 degrees."""
     entry = {"clamp": "estimated", "depth": "traced", "frames": 3, "rms_mm": 0.06, "distal10_rms_mm": 0.06}
     far = entry | {"clamp": "manifest", "rms_mm": 0.36, "tip_median_mm": 0.3}
     tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.1}, far])
