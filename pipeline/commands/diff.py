@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression; InputError on wrong input."""
     from pipeline.run.launch import UsageError
+    from pipeline.toml_words import not_toml
     from reports.case_files import find_cases
     from reports.two_runs_files import write
 
@@ -45,7 +46,10 @@ def main(args: argparse.Namespace) -> int:
         raise UsageError(problems)
     try:
         verdict = _verdict(args)
-    except (ValueError, OSError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
+        text = args.tolerance.read_text(encoding="utf-8")
+        raise UsageError([not_toml(args.tolerance, text, error)]) from None
+    except (ValueError, OSError) as error:
         raise UsageError([str(error)]) from None
     write(verdict, **places)
     if not find_cases(args.second):

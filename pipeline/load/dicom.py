@@ -98,10 +98,14 @@ def _planes_in(folder: Path, wanted: str) -> list[Plane]:
         raise unusable(folder, which + "They may be cut short: copy them again, or take them out of the folder.")
     images = {uid: files for uid, files in series.items() if not wanted or uid == wanted}
     if len(images) != 1:
-        groups = "\n".join(f"    {uid}: {len(files)} files" for uid, files in series.items()) or "    none"
+        groups = "".join(f"\n    {uid}: {len(files)} files" for uid, files in series.items())
         below = [d.name for d in entries if d.is_dir()]
-        hint = f"  It has sub-folders: {', '.join(below[:5])}; name one of them.\n" if below else ""
-        found = f"found {len(images)} DICOM image series, expected one:\n{groups}\n{hint}"
+        hint = (
+            f"It has sub-folders: {', '.join(below[:5])}; name one of them, as in {folder.name}/{below[0]}.\n"
+            if below
+            else ""
+        )
+        found = f"found {len(images)} DICOM image series, expected one{':' * bool(groups)}{groups or '.'}\n  {hint}"
         raise unusable(folder, f"{found}  Keep one series a folder, or name one as FOLDER#SERIES_UID.")
     return [plane for path, data in next(iter(images.values())) for plane in planes_of(path, data)]
 

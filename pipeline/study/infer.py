@@ -64,6 +64,23 @@ def _is_dicom(path: Path) -> bool:
     return path.is_file() and path.stat().st_size > 0 and path.name != "DICOMDIR" and is_dicom(path)
 
 
+DEEPEST = 4
+"""Folders below the given one in which scans are looked for, for the message alone."""
+
+
+def _deeper(folder: Path) -> str:
+    """A hint where scans lie further down than they are looked for, as archives export them; empty without."""
+    below = (p for depth in range(2, DEEPEST + 1) for p in sorted(folder.glob("/".join("*" * depth))))
+    found = [p.relative_to(folder).as_posix() for p in below if p.parent.name != "frames" and _is_scan(p)]
+    if not found:
+        return ""
+    names = ", ".join(found[:3]) + f" and {len(found) - 3} more" * (len(found) > 3)
+    return (
+        f"; further down are scans: {names}; move each frame's own folder or file up into {folder.name}/frames, or "
+        "list them in a manifest (frames = [...])"
+    )
+
+
 def _scans_in(folder: Path, stated: Path | None) -> tuple[Path | None, list[Path], list[Path]]:
     """The reference, stated or by its name, the frames, and what is neither: named as a reference beside a stated one.
 
@@ -152,7 +169,7 @@ def infer_manifest(
     if not frames:
         allowed = f"files {', '.join(SUFFIXES)} or DICOM folders, here or in frames/"
         found = f"{reference.name} alone, a reference, and no frames" if reference else "no scans"
-        raise unusable(folder, f"found {found}; allowed: {allowed}")
+        raise unusable(folder, f"found {found}; allowed: {allowed}{_deeper(folder)}")
     seen = (
         f"frames: {len(frames)} scans in natural order, {frames[0].name} to {frames[-1].name}",
         f"reference: {reference.name}" if reference else "reference: none found (a file named reference.*)",

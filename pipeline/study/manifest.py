@@ -31,6 +31,7 @@ from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
 from pipeline.study.others import OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
+from pipeline.toml_words import not_toml
 from pipeline.wording import WRITTEN_HERE, Place, as_toml, said, saying, sentences
 
 MANIFEST_BYTES = 16 * 2**20
@@ -260,11 +261,12 @@ def read_manifest(path: Path) -> Manifest:
     try:
         if status_of(path) is None:
             raise ManifestError([f"{path}: no such manifest"])
-        data = tomllib.loads(read_text(path, MANIFEST_BYTES))
+        text = read_text(path, MANIFEST_BYTES)
+        data = tomllib.loads(text)
     except LoadError as error:
         raise ManifestError([str(error)]) from None
     except (ValueError, RecursionError) as error:
-        raise ManifestError([f"{path}: not valid TOML: {str(error)[:200]}"]) from None
+        raise ManifestError([not_toml(path, text, error)]) from None
     try:
         tables = ManifestTables.model_validate(data, context={"folder": path.parent})
     except ValidationError as error:

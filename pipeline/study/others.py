@@ -53,7 +53,9 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     if len(kinds) > 1:
         return _refuse(case, here, f"it holds {' and '.join(kinds)} files; name one kind, as in {here}/*{kinds[0]}")
     if here == place and not inside:
-        return _refuse(case, here, f"no {', '.join(KINDS)} in it")
+        names = sorted((f"{p.name}/" * p.is_dir() or p.name) for p in here.iterdir())
+        found = f"; found {', '.join(names[:4])}{' ...' * (len(names) > 4)}" if names else "; it is empty"
+        return _refuse(case, here, f"no wire in it ({', '.join(KINDS)}){found}")
     return _sorted(inside)
 
 
@@ -62,7 +64,8 @@ def _sorted(paths: Any) -> list[str]:
 
 
 def _refuse(case: str, place: Path, why: str) -> list[str]:
-    do = f"give a folder with {case}/ in it, one file a frame; an empty one counts every frame as failed"
+    do = f"give a folder with one file a frame in {case}/ (left empty, every frame counts as failed), "
+    do += "or the output of a run of this manifest"
     raise InputError([f"case {case!r}: --curves {place}: {why}; {do}"])
 
 

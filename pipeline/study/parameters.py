@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.ranges import Finite, FiniteProfile, NonNegative, Positive, PositiveProfile
 from pipeline.status import InputError
+from pipeline.toml_words import not_toml
 from pipeline.wording import said, sentences
 
 if TYPE_CHECKING:
@@ -98,15 +99,18 @@ class ParametersError(InputError):
 def read_parameters(path: Path) -> Parameters:
     """Read parameters.toml; raises ParametersError."""
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        data = tomllib.loads(text)
     except FileNotFoundError:
         raise ParametersError(
             [f"{path}: no such file; wireval calibrate MANIFEST -o OUT writes OUT/parameters.toml"]
         ) from None
     except OSError as error:
         raise ParametersError([f"{path}: cannot be read: {error.strerror}; name a file"]) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParametersError([f"{path}: not valid TOML: {error}"]) from None
+    except UnicodeDecodeError as error:
+        raise ParametersError([f"{path}: not UTF-8 text (byte {error.start}); save it again in UTF-8"]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise ParametersError([not_toml(path, text, error)]) from None
     try:
         return Parameters.model_validate(data)
     except ValidationError as error:

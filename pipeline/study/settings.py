@@ -20,6 +20,7 @@ from pipeline.load.guard import read_text, status_of
 from pipeline.segment.config import SegmentConfig
 from pipeline.simulate.config import SimulateConfig, SolverConfig
 from pipeline.status import InputError, did_you_mean
+from pipeline.toml_words import not_toml
 from pipeline.trace.config import TraceConfig
 from pipeline.wording import said, sentences
 
@@ -93,11 +94,12 @@ def read_settings(path: Path) -> list[Setting]:
     try:
         if status_of(path) is None:
             raise SettingsError([f"{path}: no such file; wireval settings prints one"])
-        data = tomllib.loads(read_text(path))
+        text = read_text(path)
+        data = tomllib.loads(text)
     except LoadError as error:
         raise SettingsError([str(error)]) from None
     except tomllib.TOMLDecodeError as error:
-        raise SettingsError([f"{path}: not valid TOML: {error}"]) from None
+        raise SettingsError([not_toml(path, text, error)]) from None
     found: list[Setting] = []
     for table, values in data.items():
         if not isinstance(values, dict):

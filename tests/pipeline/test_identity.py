@@ -16,7 +16,7 @@ from pipeline.load.config import LoadConfig
 from pipeline.load.geometry import Mask
 from pipeline.load.order import natural_key
 from pipeline.run.store import digest
-from pipeline.study.infer import _scans_in
+from pipeline.study.infer import _deeper, _scans_in
 from pipeline.study.manifest import ManifestError, read_manifest
 from tests.pipeline.test_load import SPACING, image_of, numbered
 from tests.pipeline.test_manifest import GOOD
@@ -159,3 +159,18 @@ def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
         write(below / "frames" / f"f{k}")
     (below / "frames" / "notes").mkdir()
     assert [path.name for path in _scans_in(below, None)[1]] == ["f2", "f10"]
+
+
+def test_scans_further_down_are_named(tmp_path: Path) -> None:
+    """An archive's patient/study/series was "found no scans", and nobody was told where they lie."""
+    assert _deeper(tmp_path) == ""
+    for number in range(5):
+        folder = tmp_path / "patient" / f"study{number}"
+        folder.mkdir(parents=True)
+        (folder / "scan.mha").touch()
+    said = _deeper(tmp_path)
+    assert (
+        "further down are scans: patient/study0/scan.mha, patient/study1/scan.mha, patient/study2/scan.mha and 2"
+        in said
+    )
+    assert f"up into {tmp_path.name}/frames" in said

@@ -315,7 +315,9 @@ def test_what_is_not_there_or_no_scan_is_said(tmp_path: Path) -> None:
     with pytest.raises(LoadError, match="cannot read"):
         read_header(tmp_path / "text.mha")
     (tmp_path / "below" / "series").mkdir(parents=True)
-    with pytest.raises(LoadError, match=r"sub-folders: series"):
+    with pytest.raises(
+        LoadError, match=r"expected one\.\n  It has sub-folders: series; name one .* as in below/series"
+    ):
         read_header(tmp_path / "below")
 
 

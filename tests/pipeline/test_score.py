@@ -280,10 +280,13 @@ def test_the_other_vtk_layouts(tmp_path: Path) -> None:
 def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mixed = write_csv(tmp_path / "mixed", known[1])
     write_polyline_vtp(mixed / "a.vtp", known[1][0])
-    full = tmp_path / "full"
+    full, bare = tmp_path / "full", tmp_path / "bare"
     write_csv(full, known[1])
+    (bare / "deeper").mkdir(parents=True)
+    (bare / "notes.txt").touch()
     for curves, out, said in (
         (tmp_path / "nowhere", "o", "no such file or folder"),
+        (bare, "o", "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found deeper/, notes.txt; give a folder"),
         (mixed, "o", ".csv and .vtp files"),
         (f"wireval={full}", "o", "the name 'wireval'"),
         ("sofa=", "o", "no place after the name"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -16,6 +17,7 @@ from pipeline.study.explain import described
 from pipeline.study.manifest import Case, ManifestError, read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import SettingsError, parse_assignment, resolve
+from pipeline.toml_words import not_toml
 
 WRONG = (
     '"auto"', '"5"', '""', "true", "[]", "{}", "{a = 1}", "[1, 2]", '["a", "b", "c"]', "[[0.0, 1.0], [1.0]]",
@@ -146,3 +148,22 @@ def test_projections_and_parameters_speak_alike(tmp_path: Path) -> None:
     assert 'friction = "much": expected a number from 0' in found
     assert "frixion: unknown key; did you mean 'friction'?" in found
     assert not FOREIGN.search(found.replace("function", ""))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[wires.w\nradius_mm = 0.1", "f.toml, line 1: [wires.w: not valid TOML; a table is [name]"),
+        ("a = 1\nb =", "f.toml, line 2: b =: not valid TOML; a value is a number"),
+        ('a = "x', 'f.toml, line 1: a = "x: not valid TOML; a text ends with the quote'),
+        ("a = 1\na = 2", "f.toml, line 2: a = 2: not valid TOML; a key stands once"),
+        ("a = [1,\n2", "f.toml, line 2: 2: not valid TOML; a list ends with ]"),
+        ("a 1", "f.toml, line 1: a 1: not valid TOML; a line is key = value"),
+    ],
+)
+def test_no_words_of_a_parser(text: str, said: str) -> None:
+    """It said "Expected ']' at the end of a table declaration (at line 2, column 9)"."""
+    with pytest.raises(tomllib.TOMLDecodeError) as caught:
+        tomllib.loads(text)
+    assert not_toml("f.toml", text, caught.value).startswith(said)
+    assert not_toml("f.toml", text, RecursionError("too deep")).startswith("f.toml: not valid TOML; a line is")

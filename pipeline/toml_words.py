@@ -1,0 +1,42 @@
+"""What is wrong with a file that is no TOML, as a reader says it: where, the line, what is allowed."""
+
+import re
+
+_PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
+_AT_END = "end of document"
+_SHOWN = 60
+_VALUE = "a value is a number, true or false, a text in quotes, or a list in brackets"
+ALLOWED = {
+    "table declaration": "a table is [name], a case [[case]], on a line of its own",
+    "array declaration": "a table is [name], a case [[case]], on a line of its own",
+    "after a key": "a line is key = value",
+    "Invalid value": _VALUE,
+    "Invalid initial character for a key": "a line is key = value, with letters, digits, - and _ in the key",
+    "after a statement": f"a line is one key = value; {_VALUE}",
+    "overwrite": "a key stands once in its table",
+    "Cannot declare": "a table stands once; only [[case]] is repeated",
+    "mutate": "a table stands once, in one place",
+    "Unclosed array": "a list ends with ]",
+    "string": "a text ends with the quote it begins with, on its line; \\\\ stands for a backslash",
+    "Illegal character": "a text ends with the quote it begins with, on its line",
+    "escape": "in double quotes \\\\ stands for a backslash; single quotes take it as it is",
+}
+"""By a piece of what the parser says."""
+
+
+def not_toml(where: object, text: str, error: Exception) -> str:
+    """The sentence on ``text``, read from ``where``, that tomllib refused with ``error``."""
+    said = str(error)
+    general = f"a line is key = value, [table] or # a comment; {_VALUE}"
+    allowed = next((words for piece, words in ALLOWED.items() if piece in said), general)
+    return f"{where}{_line(text, said)}: not valid TOML; {allowed}"
+
+
+def _line(text: str, said: str) -> str:
+    """The line that the parser named, and what stands there; empty where it named none."""
+    lines, place = text.splitlines(), _PLACE.search(said)
+    number = int(place[1]) if place else len(lines) if _AT_END in said else 0
+    if not 0 < number <= len(lines):
+        return ""
+    line = lines[number - 1].strip()
+    return f", line {number}: {line if len(line) <= _SHOWN else f'{line[: _SHOWN - 3]}...'}"
