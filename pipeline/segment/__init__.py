@@ -1,5 +1,7 @@
 """segment: scan -> lumen. A method finds the vessel's voxels, its grey values say where the wall lies."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -9,12 +11,14 @@ from pipeline.segment import bone, uneven
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.contact import contacts, warning
 from pipeline.segment.fuzzy import fuzzy_region
-from pipeline.segment.levels import brighter, scanner_blur
+from pipeline.segment.levels import Region, brighter, scanner_blur
 from pipeline.segment.necks import add_necks, closed_necks
-from pipeline.segment.surface import prepare, wall_of
+from pipeline.segment.on_wire import beside, swallowed
+from pipeline.segment.surface import SignedDistance, Site, prepare, wall_of
 from pipeline.segment.thin import add_balls, balls
 from pipeline.segment.uneven import evened
-from solver.grid import read_only
+from pipeline.status import StageError
+from solver.grid import Grid, read_only
 
 __all__ = ["segment"]
 
@@ -22,34 +26,76 @@ METHOD = fuzzy_region
 """How the vessel's voxels are found: (grid, seeds_mm, config) -> Region."""
 
 
-def segment(volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None) -> Lumen:
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What seeds find: the grid as if the vessel were evenly filled, its region, and its wall on the site's box.
+
+    least : share of contrast that it has everywhere.  blur : the scanner's, mm.
+    """
+
+    grid: Grid
+    region: Region
+    least: float
+    site: Site
+    wall: SignedDistance
+    blur: float
+
+    @property
+    def distance(self) -> Grid:
+        """The wall as it is now."""
+        return self.site.grid.with_values(read_only(self.wall.values))
+
+
+def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> _Found:
+    region = METHOD(grid, seeds_mm, config)
+    shown, region, least = evened(grid, region, lambda filled: METHOD(filled, seeds_mm, config))
+    site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
+    wall = wall_of(site, region.levels, config.outer_mm)
+    blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
+    return _Found(shown, region, least, site, wall, blur)
+
+
+def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
+    """The vessel around what was found, where that is the wire, of this radius; else what was found."""
+    seed = beside(grid, found.distance, np.asarray(seeds_mm, float), wire_mm, found.blur)
+    if seed is None:
+        return found
+    try:
+        vessel = _found(grid, seed, config)
+    except StageError:  # nothing but tissue around it
+        return found
+    return vessel if swallowed(found.distance, vessel.distance) else found
+
+
+def segment(
+    volume: Volume, seeds_mm: ArrayLike, config: SegmentConfig | None = None, wire_radius_mm: float | None = None
+) -> Lumen:
     """The vessel that holds the seeds.
 
-    volume : grey values, brighter inside the vessel.  seeds_mm : (m, 3) LPS mm, points inside it.
+    volume : grey values, brighter inside the vessel.  seeds_mm : (m, 3) LPS mm, points inside it.  wire_radius_mm : of
+    the wire, where the scan shows one: seeds may lie on it.
     Returns a Lumen whose distance is float32 mm, negative inside, on the vessel's own box; exact to
     ``config.outer_mm`` outside; its warnings name places where two vessels have merged. Raises StageError
     (SEGMENT_FAILED) when the seeds lie in no bright vessel. The wall is the half-level surface, blur corrected.
     """
     config = config or SegmentConfig()
     grid, axes = in_memory_order(volume)
-    region = METHOD(grid, seeds_mm, config)
-    grid, region, least = evened(grid, region, lambda shown: METHOD(shown, seeds_mm, config))
-    site = prepare(grid, region.voxels, region.taps, config.margin_mm, region.thin)
-    wall = wall_of(site, region.levels, config.outer_mm)
-    blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
-    open_ones = contacts(site.grid.with_values(read_only(wall.values)))
-    bright = bone.touching(grid, site.grid.with_values(read_only(wall.values)), site.corner, wall.levels)
+    found = _found(grid, seeds_mm, config)
+    if wire_radius_mm is not None:
+        found = _around_wire(grid, found, seeds_mm, config, wire_radius_mm)
+    grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
+    open_ones = contacts(found.distance)
+    bright = bone.touching(grid, found.distance, site.corner, wall.levels)
     if len(region.thin):
-        found = balls(grid, region.thin, site.corner, region.levels, blur)
-        add_balls(wall.values, np.asarray(grid.spacing_mm), found, config.outer_mm)
-    said = warning(open_ones) + brighter(wall.levels) + bright + uneven.warning(least)
+        thin = balls(grid, region.thin, site.corner, region.levels, blur)
+        add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
+    said = warning(open_ones) + brighter(wall.levels) + bright + uneven.warning(found.least)
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)
-    distance = reorder(site.grid.with_values(read_only(wall.values)), axes)
     return Lumen(
-        distance, wall.levels.half, said,
+        reorder(found.distance, axes), wall.levels.half, said,
         {**region.counters, **wall.counters, "touching_places": float(len(open_ones))},
         {"noise": region.levels.noise, "wall_noise_mm": wall.noise_mm, "blur_mm": wall.blur_mm,
-         "scanner_blur_mm": blur, "least_filling": least},
+         "scanner_blur_mm": blur, "least_filling": found.least},
     )  # fmt: skip

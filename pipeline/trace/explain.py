@@ -48,6 +48,9 @@ WALL_ERROR, WALL_REACH = 0.13, 5.0
 PLAIN_TIP, BRIGHT_TIP, DIM_TIP = 0.08, 0.16, 0.25
 """Error (voxel) of the tip that is none of the noise: of a plain wire, of one with a bright coil or band, of one with
 a dim end. With 0.08 a platinum tip was 2.5 times its sigma off, with 0.25 a fifth of it."""
+BLUNT_TIP = 0.2
+"""The same of a thick wire, whose end is flatter than its blur: over half its radius (0.9 mm wires, 2 times too small
+without)."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
 BRIDGE_SIGMA_VOXELS = 0.5
@@ -181,11 +184,11 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
     return np.asarray(np.hypot(bends, wall))
 
 
-def _own_tip(tube: Tube) -> float:
-    """What the tip's error is besides the noise, voxels."""
-    if not len(tube.steps.edges):
-        return PLAIN_TIP
-    return DIM_TIP if tube.steps.levels[-1] < DIM_END else BRIGHT_TIP
+def _own_tip(image: Subtraction, tube: Tube) -> float:
+    """What the tip's error is besides the noise, mm."""
+    own = DIM_TIP if tube.steps.levels[-1] < DIM_END else BRIGHT_TIP if len(tube.steps.edges) else PLAIN_TIP
+    half_radius = float(np.sqrt(max(0.0, tube.sigma**2 - image.wall_blur_mm**2)))
+    return max(own * image.voxel, BLUNT_TIP * half_radius)
 
 
 def _curve(image: Subtraction, best: Candidate) -> Curve:
@@ -194,8 +197,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     across, along = inflation(image, best.points, tube)
     bias = _model_error(image, best)
     sigma = np.hypot(across * best.sigma, bias)
-    own_tip = _own_tip(tube) * image.voxel
-    tip_sigma = float(np.hypot(along[-1] * best.tip_sigma, own_tip))
+    tip_sigma = float(np.hypot(along[-1] * best.tip_sigma, _own_tip(image, tube)))
     sigma = np.where(verdict.flagged, np.maximum(sigma, BRIDGE_SIGMA_VOXELS * image.voxel), sigma)
     counters = image.counters | {
         "pieces": float(len(attempt.pieces)), "bridges": float(attempt.path.bridges),

@@ -25,10 +25,12 @@ def segment_vessel(run: Context, known: Known) -> Known:
     assert known.scans is not None
     scan = known.scans.first
     assert scan is not None, "the manifest guarantees frames, a reference or a lumen"
-    if known.scans.reference is None:
+    with_wire = known.scans.reference is None
+    if with_wire:
         log.assumptions.append("no reference scan: the lumen was segmented from frame 0, which has a wire in it")
     crop = Crop(scan, scan.box, config.load)
-    lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment)
+    radius_mm = case.wire.radius_mm if with_wire else None
+    lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment, radius_mm)
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)

@@ -43,6 +43,7 @@ class Scene:
     tip_cnr: float
     gaps: tuple = ()
     stated: dict = field(default_factory=dict)
+    wire_radius: float = 0.2
 
 
 class Draft:
@@ -95,7 +96,7 @@ class Draft:
         return Scene(
             frame, still if reference else None, self.path[n:] if self.shown else None, self.path[n] + shift,
             towards / np.linalg.norm(towards), self.axis, self.radius, float(lattice.spacing.min()), cnr,
-            cnr * min(1.0, float(self.opacity[-1])), gaps, self.stated,
+            cnr * min(1.0, float(self.opacity[-1])), gaps, self.stated, self.wire_radius,
         )  # fmt: skip
 
 
@@ -438,3 +439,26 @@ def streak(rng, seed):
     line = d.path[-1] + np.linspace(0.3, rng.uniform(4.0, 10.0), 200)[:, None] * t
     d.others = [(line, d.wire_radius, rng.uniform(0.1, 0.3))]
     return d.scan((8, 16)[seed // 2 % 2], reference=seed % 4 < 3)
+
+
+@case("0.9 mm wire, voxels of 0.1 to 0.3 mm, no reference")
+def thick_alone(rng, seed):
+    spacing = (0.1, 0.15, 0.2, 0.3)[seed % 4]
+    length = 14.0 if spacing < 0.2 else 36.0
+    d = Draft(rng, length=length, spacing=spacing, radius=rng.uniform(1.2, 2.2), wire_radius=0.45, room=0.05)
+    return d.scan((8, 12, 16)[seed // 4 % 3], reference=False)
+
+
+@case("two wires that touch all along")
+def touching(rng, seed):
+    radius = rng.uniform(0.15, 0.25)
+    d = Draft(rng, radius=2.2, wire_radius=radius, room=0.6)
+    other = sideways(d.path, rng, 2.0 * radius)
+    stop = len(other) - (0 if seed % 3 else round(rng.uniform(2, 10) / 0.05))
+    d.others = [(other[:stop], radius, 1.0 if seed % 2 else rng.uniform(0.7, 1.3))]
+    return d.scan((6, 8, 16, 24)[seed // 2 % 4], reference=seed % 4 < 2)
+
+
+@case("plain, slices of 0.4 to 0.6 mm")
+def uneven_voxels(rng, seed):
+    return Draft(rng, spacing=(0.3, 0.3, rng.uniform(0.4, 0.6))).scan((16, 8, 4)[seed % 3], reference=seed % 2 == 0)
