@@ -47,6 +47,8 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
         head["max_penetration_mm"] = max(wire.max_penetration_mm for wire in wires)
     solved = [wire.push_force_N for wire in wires if isinstance(wire, Solution)]
     head |= {"push_force_max_N": max(solved)} if solved else {}
+    if np.isfinite(known.ends_rank):
+        head["ends_rank"] = known.ends_rank
     return head | pooled(scored)
 
 

@@ -10,7 +10,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.budget import SOURCES, Nominal, Seen, alone, drawn, frame_budget, releases, sigmas_of
+from pipeline.budget import (
+    SOURCES,
+    Nominal,
+    Seen,
+    alone,
+    coefficients,
+    drawn,
+    frame_budget,
+    joint,
+    rank_of_ends,
+    releases,
+    sigmas_of,
+)
 from pipeline.budget.inputs import FRICTION, ROLL_DEG, Sigmas, members_per_lumen
 from pipeline.budget.shapes import Shapes, energy_score_mm, parted, shapes_of
 from pipeline.budget.surface import offset_field
@@ -18,6 +30,7 @@ from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.cli import main
 from pipeline.model import Array, Clamp, Wire
 from pipeline.simulate.config import SimulateConfig
+from pipeline.simulate.evidence import Sight
 from pipeline.study.manifest import ManifestError, read_manifest
 from reports import tables
 from reports.figures import figures_of
@@ -180,6 +193,67 @@ def test_a_release_is_counted_once() -> None:
     assert releases([False, False, True], [other, other, same]) == ["missed", "", ""], "the simulated one comes late"
 
 
+def spread_ends(rng: np.random.Generator, members: int = 48, frames: int = 4) -> Array:
+    """Coefficients of members and a real one (last) of one distribution, correlated over frames; (.., frames, 8)."""
+    root = np.random.default_rng(0).normal(size=(frames * 8, frames * 8)) * np.geomspace(1.0, 0.05, frames * 8)
+    return (rng.normal(size=(members + 1, frames * 8)) @ root.T).reshape(members + 1, frames, 8)
+
+
+def test_ranks_of_right_insertions_are_even() -> None:
+    """Of 400 right ones 20 are expected to be claimed; 3 standard deviations are 13."""
+    rng = np.random.default_rng(5)
+    ranks = [rank_of_ends(list(np.moveaxis(spread_ends(rng), 1, 0))) for _ in range(400)]
+    assert np.sum(np.array(ranks) <= 0.05) == pytest.approx(20, abs=13)
+    assert np.mean(ranks) == pytest.approx(0.5, abs=0.06)
+
+
+def test_a_small_error_that_all_frames_share_is_found_together() -> None:
+    """Within 2 standard deviations at every coefficient, and along what the inputs hardly move."""
+    rng = np.random.default_rng(6)
+    ends = spread_ends(rng)
+    spread = ends[:-1].std(axis=0)
+    least = np.linalg.svd(ends[:-1].reshape(48, -1) / spread.ravel())[2][-4:].sum(axis=0).reshape(spread.shape)
+    ends[-1] = 1.9 * spread * least / np.abs(least).max()
+    assert rank_of_ends(list(np.moveaxis(ends, 1, 0))) == pytest.approx(1 / 49)
+
+
+def test_the_distance_is_that_of_the_shrunk_moment() -> None:
+    rng = np.random.default_rng(7)
+    others, tried = rng.normal(size=(12, 30)), rng.normal(size=(3, 30))
+    moment = others.T @ others / 12
+    moment = (1.0 - joint.SHRUNK) * moment + joint.SHRUNK * np.diag(np.diag(moment))
+    expected = np.einsum("ti,ij,tj->t", tried, np.linalg.inv(moment), tried)
+    assert joint._squares(tried, others) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_rank_needs_members_and_traces() -> None:
+    ends = spread_ends(np.random.default_rng(8), members=12, frames=2)
+    frames = list(np.moveaxis(ends, 1, 0))
+    assert 0.0 < rank_of_ends(frames) <= 1.0
+    frames[0][:6] = np.nan  # six members came to no rest in a frame
+    assert np.isnan(rank_of_ends(frames))
+    assert np.isnan(rank_of_ends([]))
+    arc = np.linspace(0.0, 30.0, 61)
+    sight = Sight(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
+    wires = np.repeat(ALONG_Z[None], 10, axis=0)
+    assert coefficients(wires, Seen(arc, ALONG_Z), sight, 0.3, np.random.default_rng(0)) is None, "nothing traced"
+
+
+def test_a_wire_that_is_bent_otherwise_is_rare_and_one_that_is_not_is_none() -> None:
+    """Members lie off by a turn about the entry; the real wire by as much, or bent the other way at its end."""
+    rng = np.random.default_rng(9)
+    arc, foot = np.linspace(0.0, 30.0, 61), np.linspace(0.0, 30.0, 61)
+    sight = Sight(0, arc, ALONG_Z, np.full(61, 0.02), 3.0)
+    wires = ALONG_Z + rng.normal(size=(40, 1, 2)) @ np.eye(2, 3) * (arc / 30.0)[:, None]
+    for bend, rare in ((0.0, False), (1.0, True)):
+        off = 0.5 * arc / 30.0 + bend * np.clip(arc - 15.0, 0.0, None) * (arc - 25.0) / 60.0
+        curve = ALONG_Z + off[:, None] * np.array([1.0, 0.0, 0.0])
+        seen = Seen(arc, ALONG_Z, curve, foot, np.full(61, 0.02**2))
+        found = coefficients(wires, seen, sight, 0.3, rng)
+        assert found is not None
+        assert (rank_of_ends([found]) <= 0.05) == rare
+
+
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study")
@@ -213,6 +287,7 @@ def test_every_frame_has_its_uncertainty_beside_its_error(out: Path) -> None:
     summary = tables.read(out / "summary.csv", SUMMARY).iloc[0]
     assert summary["release_frames"] == errors["release"].notna().sum()
     assert summary["u_val_mm"] > 0.0
+    assert 0.0 < summary["ends_rank"] <= 1.0
     assert "budget rests on 24 insertions" in (case / "result.json").read_text(encoding="utf-8")
 
 

@@ -5,7 +5,7 @@ curvature, taper and the wall's stiffness are drawn, the true wire is that of ``
 images are made: lumen and traces are given, with errors drawn as tracing and segmenting make them. Then the same with
 an error planted into the truth alone: friction of 0.1, and a taper half as long again. Bars: 92 to 98 % of the points
 within 2u away from releases; a planted error is beyond 2u on half of the points of the last 20 mm, and no such claim is
-made in more than one study of twenty without. All frames' ends are judged together, too (``budget_joint``).
+made in more than one study of twenty without. All frames' ends are judged together, too (``ends_rank``).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from data_synthetic.geometry import rotate
 from data_synthetic.rod.replay import TrueFrame
 from data_synthetic.rod.truth import converged_truth
 from pipeline.arrays.polyline import to_length
-from pipeline.budget import frame_budget
+from pipeline.budget import coefficients, frame_budget, rank_of_ends
 from pipeline.load import Scans
 from pipeline.model import Array, Curve, Lumen, arc_length
 from pipeline.run.cache import Store
@@ -40,7 +40,6 @@ from pipeline.run.stages.simulate import simulate_frames
 from pipeline.study.manifest import Case, read_manifest
 from pipeline.study.settings import Config
 from solver import Grid
-from tests.studies.budget_joint import coefficients, surprise
 
 SCENES = ("siphon", "bend", "s-curve")
 FRAMES, VOXEL_MM, ROOM_MM, STEP_MM = 6, 0.3, 7.0, 0.3
@@ -172,13 +171,16 @@ def record(run: Context, known: Known, members: int) -> list[dict[str, Any]]:
         budget = frame_budget(wires, seen)
         if budget is None or budget.ratio is None or budget.u_mm is None:
             continue
-        ends = coefficients(wires, seen, work.trace_mm(frame), VOXEL_MM, rng).round(6).tolist()
+        ends = coefficients(wires, seen, work.sight(frame, seen), VOXEL_MM, rng)
+        assert ends is not None
         shapes = budget.shapes
         p = None if shapes is None else [shapes.simulated, shapes.real, shapes.same]
         distal = (budget.arc_mm >= budget.arc_mm[-1] - DISTAL_MM).tolist()
         ratio, u = budget.ratio.tolist(), float(np.sqrt(np.mean(budget.u_mm**2)))
         error = 0.0 if frame.comparison is None else float(frame.comparison["rms_mm"])
-        kept.append({"ratio": ratio, "distal": distal, "shapes": p, "u_mm": u, "rms_mm": error, "ends": ends})
+        kept.append(
+            {"ratio": ratio, "distal": distal, "shapes": p, "u_mm": u, "rms_mm": error, "ends": ends.round(6).tolist()}
+        )
     return kept
 
 
@@ -205,7 +207,7 @@ def beyond(frames: Sequence[dict[str, Any]], *, distal: bool) -> float:
 def rank(frames: Sequence[dict[str, Any]]) -> float:
     """The joint test of a study, away from releases."""
     ends = [np.array(f["ends"]) for f in frames if f["shapes"] is None]
-    return surprise(ends) if ends else 1.0
+    return rank_of_ends(ends) if ends else 1.0
 
 
 def line(plant: str, studies: Sequence[Sequence[dict[str, Any]]]) -> str:

@@ -110,6 +110,7 @@ class Known:
     """What is known of a case so far.
 
     clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
+    ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
     failure : why the case went no further.     at_entry : what the scan shows there, where no lumen was found.
     """
 
@@ -120,6 +121,7 @@ class Known:
     frames: tuple[Frame, ...] = ()
     sources: tuple[dict[str, Any], ...] = ()
     entries: tuple[dict[str, Any], ...] = ()
+    ends_rank: float = float("nan")
     failure: StageError | None = None
     failed_stage: str = ""
     at_entry: ScanCrop | None = None
