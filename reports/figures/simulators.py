@@ -54,7 +54,8 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     panels[0, 0].invert_xaxis()
     panels[0, 0].set_ylabel("rms distance to the traced wire, mm")
     panels[1, 0].set_ylabel("nearest", rotation=0, ha="right", va="center", fontsize=8)
-    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    # at the left and two abreast: what a phone shows of the figure before it is panned
+    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return Drawing(figure, where)
 
 
