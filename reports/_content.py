@@ -169,9 +169,14 @@ def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | No
         {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
         for record, mark in zip(table.to_dict("records"), marks, strict=True)
     ]
-    units = {c.name: f" [{c.unit}]" if c.unit not in ("-", "1") else "" for c in kept}
-    heads = [{"name": c.name, "meaning": c.meaning + units[c.name], "text": c.kind == "text"} for c in kept]
-    return {"columns": heads, "rows": rows}
+    return {"columns": [_head(column) for column in kept], "rows": rows}
+
+
+def _head(column: Column) -> dict[str, Any]:
+    """The unit stands in the heading, too, where the name does not carry it, as a simulator's."""
+    unit = "" if column.unit in ("-", "1") else column.unit
+    told = {"name": column.name, "meaning": column.meaning + f" [{unit}]" * bool(unit), "text": column.kind == "text"}
+    return told | {"unit": "" if column.name.endswith(f"_{unit}") else unit}
 
 
 def _cell(record: Mapping[Any, Any], column: Column, nothing: str) -> dict[str, Any]:

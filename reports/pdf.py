@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.backends.backend_pdf import PdfPages
 
 from reports import _content, colours
-from reports.alike import alike
+from reports.alike import alike, of_what
 from reports.atomic import replacing
 from reports.case_files import WORST, CaseFiles, counted, not_reached, read_case, read_json, results_in, said_by_cases
 from reports.figures import RunFiles, declared, figures_of
@@ -67,9 +67,9 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, files: Run
 
 def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     """What failed, alike frames once, and the next command. failures : of failures.csv, at least a row."""
-    page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
     blank = failures.astype(object).where(failures.notna(), "")
     rows = alike({str(k): v for k, v in row.items()} for row in blank.to_dict("records"))
+    page.text(f"Failures: {of_what(rows)}", size=11, weight="bold", colour=colours.BAD)
     for row in rows[:_MOST_FAILURES]:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))
         frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
