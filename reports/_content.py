@@ -161,7 +161,8 @@ def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
 def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = "") -> Grid:
     """Headings and rows for a template; columns without any value are left out.
 
-    bad : for each row, whether it is marked.     nothing : what stands in an empty cell.
+    bad : for each row, whether it is marked.     nothing : what stands in an empty cell. What else the rows
+    name is to be explained in ``about``, (name, meaning).
     """
     kept = [c for c in columns if table[c.name].notna().any()]
     marks = [False] * len(table) if bad is None else map(bool, bad)
@@ -169,7 +170,7 @@ def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | No
         {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
         for record, mark in zip(table.to_dict("records"), marks, strict=True)
     ]
-    return {"columns": [_head(column) for column in kept], "rows": rows}
+    return {"columns": [_head(column) for column in kept], "rows": rows, "about": []}
 
 
 def _head(column: Column) -> dict[str, Any]:

@@ -352,6 +352,17 @@ def test_the_sliders_stay_in_a_narrow_window(run: Path, opened: Opener) -> None:
     assert min(page.evaluate("[...document.querySelectorAll('.key')].map((k) => k.offsetWidth)")) >= 20
 
 
+def test_what_became_worse_is_read_on_a_phone(pages: list[Path], opened: Opener) -> None:
+    """What each column means stood in every row: what it is now was out of sight, and half of a row was empty."""
+    page = opened(next(path for path in pages if path.name == "diff.html"), NARROW)
+    box = page.locator("[data-table]").first
+    right = "cell => cell.getBoundingClientRect().right"
+    assert box.locator("th[data-name=after]").evaluate(right) <= NARROW["width"]
+    assert box.locator("tbody tr").first.evaluate("row => row.offsetHeight") < 35
+    box.locator("summary").click()
+    assert "root mean square distance" in box.locator("dl.meanings").inner_text()
+
+
 def test_without_javascript_the_figures_and_tables_remain(run: Path, opened: Opener) -> None:
     page = opened(run / "cases" / "good" / "report.html", java_script_enabled=False)
     assert not page.locator(".viewer").is_visible()
