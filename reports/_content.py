@@ -161,7 +161,8 @@ def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
 def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | None = None, nothing: str = "") -> Grid:
     """Headings and rows for a template; columns without any value are left out.
 
-    bad : for each row, whether it is marked.     nothing : what stands in an empty cell.
+    bad : for each row, whether it is marked.     nothing : what stands in an empty cell. What else the rows
+    name is to be explained in ``about``, (name, meaning).
     """
     kept = [c for c in columns if table[c.name].notna().any()]
     marks = [False] * len(table) if bad is None else map(bool, bad)
@@ -169,9 +170,14 @@ def grid(table: pd.DataFrame, columns: Sequence[Column], bad: Iterable[Any] | No
         {"cells": [_cell(record, column, nothing) for column in kept], "bad": mark}
         for record, mark in zip(table.to_dict("records"), marks, strict=True)
     ]
-    units = {c.name: f" [{c.unit}]" if c.unit not in ("-", "1") else "" for c in kept}
-    heads = [{"name": c.name, "meaning": c.meaning + units[c.name], "text": c.kind == "text"} for c in kept]
-    return {"columns": heads, "rows": rows}
+    return {"columns": [_head(column) for column in kept], "rows": rows, "about": []}
+
+
+def _head(column: Column) -> dict[str, Any]:
+    """The unit stands in the heading, too, where the name does not carry it, as a simulator's."""
+    unit = "" if column.unit in ("-", "1") else column.unit
+    told = {"name": column.name, "meaning": column.meaning + f" [{unit}]" * bool(unit), "text": column.kind == "text"}
+    return told | {"unit": "" if column.name.endswith(f"_{unit}") else unit}
 
 
 def _cell(record: Mapping[Any, Any], column: Column, nothing: str) -> dict[str, Any]:

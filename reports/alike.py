@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from reports.case_files import counted
+
 _SCAN = re.compile(r" \(scan [^()]*\)$")
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
@@ -34,6 +36,14 @@ def in_words(frames: Sequence[int]) -> str:
         else:
             runs.append([frame])
     return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs)
+
+
+def of_what(rows: Iterable[Mapping[str, Any]]) -> str:
+    """``2 frames, 1 case`` of what ``alike`` gave: a case without any result is no third frame."""
+    counts = {"frame": 0, "case": 0}
+    for row in rows:
+        counts["frame" if row["frames"] else "case"] += row["count"]
+    return ", ".join(counted(count, what) for what, count in counts.items() if count)
 
 
 def _stated(row: Mapping[str, Any]) -> bool:

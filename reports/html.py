@@ -152,14 +152,20 @@ def _scored(case: CaseFiles) -> Mapping[str, Any]:
 
 
 def _case_verdict(case: CaseFiles) -> str:
-    """What became of the case, how many frames have a result, and how good they are."""
+    """What became of the case, how many frames have a result, and how good they are.
+
+    Where some have none, why stands below, with the frames and the next command: said here, too, it read as if it were
+    of all.
+    """
     nothing = "the case has no result.json: it did not finish; see log.txt"
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
-    counts = f"{good} of {counted(planned, 'frame')} have a result." if planned and good != planned else ""
+    became = said[:1].upper() + said[1:] + "."
+    if planned and good != planned:
+        became = f"{good} of {counted(planned, 'frame')} have a result."
     scored = _scored(case)
     how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
-    return " ".join(filter(None, (counts, said[:1].upper() + said[1:] + ".", how)))
+    return " ".join(filter(None, (became, how)))
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:

@@ -9,6 +9,7 @@ import jinja2
 from markupsafe import Markup
 
 from reports import _content, colours
+from reports.alike import of_what
 from reports.atomic import write_text
 from reports.figures import declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
@@ -70,6 +71,7 @@ def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
         "night": _NIGHT,
         "part": lambda name: Markup((templates / name).read_text(encoding="utf-8")),
     }
+    environment.filters["of_what"] = of_what
     environment.globals.update(fixed)  # macros see these, and nothing of the page
     write_text(path, environment.get_template(template).render(page))
     return path

@@ -9,10 +9,10 @@ import pandas as pd
 from matplotlib.backends.backend_pdf import PdfPages
 
 from reports import _content, colours
-from reports.alike import alike
+from reports.alike import alike, of_what
 from reports.atomic import replacing
 from reports.case_files import WORST, CaseFiles, counted, not_reached, read_case, read_json, results_in, said_by_cases
-from reports.figures import RunFiles, declared, figures_of
+from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
 from reports.origin import mixed_settings
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
@@ -21,7 +21,9 @@ from reports.tables import read_if_there
 from reports.verdict import next_command, typed, unscored, verdict, worst_frames
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
-_MOST_WARNINGS = 4
+_MOST_WARNINGS, _FOR_ASSUMPTIONS = 4, 0.25
+_OF_THE_RUN = ("case_frame_map", "planned_within", "cases_by_error", "sensitivity")
+_MORE_OF_WORST = ("budget", "skill_by_depth", "error_over_u", "forces_by_depth")  # none of them on pages 3 and 4
 
 
 def write_pdf(out_dir: Path) -> Path:
@@ -38,15 +40,19 @@ def write_pdf(out_dir: Path) -> Path:
 def _pages(out_dir: Path, summary: pd.DataFrame) -> Iterator[Page]:
     summary, whole = _content.worst_first(summary), read_if_there(out_dir / OVERALL_FILE, SUMMARY)
     run, files = read_json(out_dir / "run.json"), run_files(out_dir, readable_cases(out_dir)[0])
-    yield _first(out_dir, summary, whole, files)
-    yield _over_all(out_dir, run, files)
-    name = _worst(summary)
-    case = read_case(out_dir / "cases" / name)
+    case = read_case(out_dir / "cases" / _worst(summary))
+    drawn = _drawn("run", files, _OF_THE_RUN)
+    page = _first(out_dir, summary, whole)
+    # figures go to the first page as far as it has room for them, to the second what is left
+    here = max(1, page.most(drawn))
+    page.pictures(drawn[:here])
+    yield page
+    yield _over_all(out_dir, run, drawn[here:], case)
     yield _worst_case(summary, case)
     yield _last(case, summary, run)
 
 
-def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, files: RunFiles) -> Page:
+def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     """Verdict, failures with the next command, tiles, warnings."""
     failures = read_if_there(out_dir / FAILURES.file, FAILURES)
     page = Page("Guide-wire validation")
@@ -62,14 +68,14 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame, files: Run
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
         page.text(f"{tile['value']}  {tile['label']}")
     page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases", _MOST_WARNINGS)
-    return _draw(page, "run", files, ("case_frame_map",))
+    return page
 
 
 def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     """What failed, alike frames once, and the next command. failures : of failures.csv, at least a row."""
-    page.text(f"Failures ({len(failures)})", size=11, weight="bold", colour=colours.BAD)
     blank = failures.astype(object).where(failures.notna(), "")
     rows = alike({str(k): v for k, v in row.items()} for row in blank.to_dict("records"))
+    page.text(f"Failures: {of_what(rows)}", size=11, weight="bold", colour=colours.BAD)
     for row in rows[:_MOST_FAILURES]:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))
         frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
@@ -81,24 +87,32 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
     page.text(f"Next: do what the message says, then {command}", width=WIDE * 9 // 10, weight="bold")
 
 
-def _over_all(out_dir: Path, run: Mapping[str, Any], files: RunFiles) -> Page:
-    """Figures over all cases, and what was assumed: as much room as that needs, up to two thirds of the page."""
+def _over_all(out_dir: Path, run: Mapping[str, Any], drawn: Sequence[Figured], worst: CaseFiles) -> Page:
+    """Figures over all cases, and what was assumed: as much as the figures leave, which are not shrunk for it.
+
+    Where that leaves room, as in a run of one case, there is more of the worst case.
+    """
     assumed = [*map(str, run.get("assumptions", ())), *said_by_cases(results_in(out_dir), "assumptions")]
     page = Page("Over all cases")
-    page = _draw(page, "run", files, ("planned_within", "cases_by_error"), min(page.height(assumed), 0.6))
+    needed = page.height(assumed)
+    drawn = drawn[: page.most(drawn, min(needed, _FOR_ASSUMPTIONS))]
+    page.pictures(drawn, min(needed, page.left(drawn)))
     page.some("Assumptions", assumed, "on the pages")
+    more = _drawn("case", worst, _MORE_OF_WORST)
+    page.pictures([one._replace(title=f"{worst.name}: {one.title}") for one in more[: page.most(more)]])
     return page
 
 
-def _draw(page: Page, part: str, files: Any, names: Sequence[str], below: float = 0.0) -> Page:
-    """Figures as a page on the screen has them, as far as there are any, with their captions.
-
-    files : what their functions take.     below : share of the page that is left free.
-    """
+def _drawn(part: str, files: Any, names: Sequence[str]) -> list[Figured]:
+    """Figures as a page on the screen has them, as far as there are any. files : what their functions take."""
     entries = {entry["figure"]: entry for entry in declared(part)}
     drawn = [(entries[name], drawing) for name in names if (drawing := figures_of(part)[name](files)) is not None]
-    said = [Figured(one, entry["title"], _content.caption(entry["read"], one.table)) for entry, one in drawn]
-    page.pictures(said, below)
+    return [Figured(one, entry["title"], _content.caption(entry["read"], one.table)) for entry, one in drawn]
+
+
+def _draw(page: Page, case: CaseFiles, names: Sequence[str]) -> Page:
+    """The page, with figures of a case."""
+    page.pictures(_drawn("case", case, names))
     return page
 
 
@@ -115,7 +129,7 @@ def _worst_case(summary: pd.DataFrame, case: CaseFiles) -> Page:
     page = Page(f"The worst case{before}: {case.name}")
     frames = [f"{row['frame']} ({row['text']} mm)" for row in worst_frames({case.name: case.errors}, {})]
     page.text(f"Worst frames by {WORST}: {', '.join(frames)}." if frames else "No frame has an error.")
-    return _draw(page, "case", case, ("projections", "simulated_wires", "error_along_wire"))
+    return _draw(page, case, ("projections", "simulated_wires", "error_along_wire"))
 
 
 def _last(worst: CaseFiles, summary: pd.DataFrame, run: Mapping[str, Any]) -> Page:
@@ -141,4 +155,4 @@ def _last(worst: CaseFiles, summary: pd.DataFrame, run: Mapping[str, Any]) -> Pa
     names = [name for name in ("wireval", "git_commit", "python") if name in known]
     page.text("; ".join(f"{name} {known[name]}" for name in names), size=8)
     page.text(f"More of {worst.name}", size=10.5, weight="bold")
-    return _draw(page, "case", worst, ("error_by_depth", "tip_by_depth"))
+    return _draw(page, worst, ("error_by_depth", "tip_by_depth"))

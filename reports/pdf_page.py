@@ -72,6 +72,16 @@ class Page:
         """The share of the page that ``some`` takes for all of the texts."""
         return sum((_lines(text) + 0.4) * _SMALL for text in texts) + 5.0 * _LINE if texts else 0.0
 
+    def most(self, figures: Sequence[Figured], below: float = 0.0) -> int:
+        """How many of the figures, from the first on, have room where a share ``below`` of the page is left free."""
+        return sum(self.left(figures[: n + 1]) >= below for n in range(len(figures)))
+
+    def left(self, figures: Sequence[Figured]) -> float:
+        """The share of the page that is left below the figures, as low as they may be drawn."""
+        least = [_BESIDE_SCANS if one.drawing.scans else _STRETCH[0] for one in figures]
+        taken = [share * _own_height(one.drawing) + one.words for share, one in zip(least, figures, strict=True)]
+        return self.at - BOTTOM - sum(taken)
+
     def pictures(self, figures: Sequence[Figured], below: float = 0.0) -> None:
         """Figures with titles and captions, that fill the rest of the page but for a share ``below``.
 

@@ -36,7 +36,6 @@ _HEADS = {
     "regressions": "frames that became worse by more than is allowed",
     "moved": "frames in which a value that has no better side changed by more than is allowed",
     "allowed": "by the tolerance",
-    "meaning": "what the column holds",
 }
 
 
@@ -54,7 +53,7 @@ def write(verdict: Verdict, **places: Path | None) -> None:
 
 
 def _page(verdict: Verdict, path: Path) -> dict[str, Any]:
-    """Title, runs and tables; a row of a column of errors.csv or overall.csv says what that is.
+    """Title, runs and tables, each with what the columns of errors.csv or overall.csv are that its rows are about.
 
     Cases and frames are links to the pages of the second run, from where the page lies.
     """
@@ -63,11 +62,11 @@ def _page(verdict: Verdict, path: Path) -> dict[str, Any]:
     for head, table in verdict.tables(ON_PAGE).items():
         if not len(table):
             continue
-        shown = table.assign(meaning=table["column"].map(known)) if "column" in table else table
-        texts = {str(n): shown[n].map(lambda v: isinstance(v, str)).any() for n in shown}
+        texts = {str(n): table[n].map(lambda v: isinstance(v, str)).any() for n in table}
         columns = [Column(n, "-", _HEADS.get(n, ""), "text" if text else "float") for n, text in texts.items()]
-        made = grid(shown, columns)
-        if {"case", "frame"} <= set(shown):
+        about = dict.fromkeys(table.get("column", ()))
+        made = grid(table, columns) | {"about": [(name, known[name]) for name in about if name in known]}
+        if {"case", "frame"} <= set(table):
             _link(verdict.runs[1], made, path.parent)
         grids.append({"id": head.lower().replace(" ", "-"), "head": head, "grid": made})
     runs = [{"name": str(run), "link": _there(run / "index.html", path.parent)} for run in verdict.runs]

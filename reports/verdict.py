@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from reports._content import NOTHING, fewer_frames, interval, number, predictor_label
-from reports.case_files import WORST, counted, find_cases, read_json, warnings_of
+from reports.case_files import WORST, counted, read_json, results_in, said_by_cases
 from reports.schema import SUMMARY
 
 _MANY = 5
@@ -200,8 +200,11 @@ def worst_frames(tables: Mapping[str, pd.DataFrame], links: Mapping[str, str]) -
 
 
 def warned(out_dir: Path) -> list[str]:
-    """What was warned of in the cases of a run, a line each, no more than a few."""
-    lines = [f"warning: {case.name}: {text}" for case in find_cases(out_dir) for text in warnings_of(case)]
+    """What was warned of in the cases of a run, a line each text, no more than a few.
+
+    Once for all cases that say it: on a screen of 30 lines the failures above are to stay in sight.
+    """
+    lines = [f"warning: {text}" for text in said_by_cases(results_in(out_dir), "warnings")]
     rest = len(lines) - _MANY
     return [*lines[:_MANY], *[f"{counted(rest, 'more warning')} on the pages of the cases"] * (rest > 0)]
 

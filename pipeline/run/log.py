@@ -139,7 +139,7 @@ class CaseProgress:
 
     def __call__(self, stage: str, done: int, total: int, text: str) -> None:
         """One step of a stage is finished."""
-        line = f"[{self.case}] {stage} {done}/{total}  {text}"
+        line = f"[{self.case}] {stage}{f' {done}/{total}' * bool(total)}  {text}"
         self.write(line)
         if total and (self.verbose or (stage in SHOWN and not self.quiet)):
             self.stream.write(line + "\n")

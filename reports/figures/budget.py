@@ -45,7 +45,7 @@ def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(5))  # more of 0.025, 0.050, ... run into each other
     axes.set_xlabel("u across the wire, mm")
     plain(axes)
-    legend(axes, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
+    legend(axes, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.1)
 
 
 def _by_entry(axes: Axes, table: pd.DataFrame) -> None:

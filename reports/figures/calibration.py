@@ -40,7 +40,7 @@ def profiles(record: Mapping[str, Any]) -> Drawing | None:
         axes.plot(*curve.T, color=SIMULATED, **({"marker": ".", "markersize": 4} if found else {"linestyle": "--"}))
         _panel(axes, rows[name])
         table += [{"parameter": name, "value": v, "rise": r} for v, r in curve]
-    figure.supylabel("misfit above the least (1: one standard deviation)", fontsize=8)
+    figure.supylabel("misfit above the least", fontsize=8)
     return Drawing(figure, pd.DataFrame(table))
 
 

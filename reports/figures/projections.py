@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 
 from reports.case_files import WORST, CaseFiles, thinned
 from reports.colours import SIMULATED, TRACED, TRUE
-from reports.figures._drawing import Drawing
+from reports.figures._drawing import Drawing, legend
 from reports.figures._planes import PLANES, Plane, View, around, points_table, whole
 from reports.figures._style import BROWN, Look
 from reports.frames_file import FrameArrays, ScanCrop
@@ -105,7 +105,7 @@ def _draw(case: CaseFiles, scan: ScanCrop, chosen: Sequence[tuple[int, str]]) ->
         row[0].set_title(f"frame {number} ({title})", loc="left", fontsize=9)
     handles, labels = rows[0][0].get_legend_handles_labels()
     if handles:
-        figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
+        legend(figure, handles, labels, loc="outside upper left", ncols=3)
     return Drawing(figure, pd.concat([_table(frame) for frame in frames]), scans=True)
 
 

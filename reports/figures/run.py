@@ -73,7 +73,7 @@ def cases_by_error(run: RunFiles) -> Drawing | None:
     axes.plot(table[column], places, marker, color=colour, fillstyle="none", label=label)
     axes.set_xlim(left=0.0)
     axes.set_xlabel("pooled rms distance to the traced wire, mm")
-    legend(figure, *axes.get_legend_handles_labels(), ncols=3, loc="outside upper right")
+    legend(figure, *axes.get_legend_handles_labels(), ncols=3, loc="outside upper left")
     plain(axes)
     return Drawing(figure, table[["case", "role", "rms_mm", "rms_low_mm", "rms_high_mm", column]])
 

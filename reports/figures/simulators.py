@@ -44,8 +44,8 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
         for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
             middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
-            # dashes show the line below where two lie on each other
-            style = ("o-", "o--")[number % 2]
+            # gaps at other places in each show the line below where two lie on each other
+            style = ("o-", "o--", "o-.", "o:")[number % 4]
             axes.plot(middle, mine["rms_mm"], style, color=shown[str(name)], label=str(name), markersize=4)
         plain(axes)
         _nearest(strip, rows, shown)
@@ -54,7 +54,8 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     panels[0, 0].invert_xaxis()
     panels[0, 0].set_ylabel("rms distance to the traced wire, mm")
     panels[1, 0].set_ylabel("nearest", rotation=0, ha="right", va="center", fontsize=8)
-    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    # at the left and two abreast: what a phone shows of the figure before it is panned
+    legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return Drawing(figure, where)
 
 

@@ -174,7 +174,9 @@
   const nice = (x) => { const power = 10 ** Math.floor(Math.log10(x)); return [1, 2, 5, 10].map((k) => k * power).find((k) => k >= x * 0.999); };
   const ruler = (pen, width, height, scale) => {
     const length = nice(width / scale / 8), text = `${Number(length.toPrecision(3))} mm`;
-    pen.strokeStyle = "#ffffff"; pen.fillStyle = "#ffffff"; pen.lineWidth = 2; pen.font = "11px system-ui, sans-serif"; pen.textAlign = "left";
+    pen.strokeStyle = "#ffffff"; pen.lineWidth = 2; pen.font = "11px system-ui, sans-serif"; pen.textAlign = "left";
+    pen.fillStyle = "#101316b0"; pen.fillRect(6, height - 27, Math.max(length * scale, pen.measureText(text).width + 2) + 8, 22); // over bright bone
+    pen.fillStyle = "#ffffff";
     pen.beginPath(); pen.moveTo(10, height - 10); pen.lineTo(10 + length * scale, height - 10); pen.stroke();
     pen.fillText(text, 12, height - 15);
   };

@@ -125,7 +125,7 @@ def test_what_kept_helpers_from_helping_stands_in_the_log(
     run(study, tmp_path / "two", "--no-cache", "-j", "2")
     assert "bifurcation: a process that helped met MemoryError('no more of it'): " in capfd.readouterr().err
     log = (tmp_path / "two" / "cases" / "bifurcation" / "log.txt").read_text(encoding="utf-8")
-    assert "trace 0/0  a process that helped met MemoryError('no more of it'): " in log
+    assert "trace  a process that helped met MemoryError('no more of it'): " in log
 
 
 def test_without_room_for_results_or_another_process_it_is_done_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+from pathlib import Path
+
 import pytest
 
-from pipeline.run.log import Log
+from pipeline.run.log import CaseProgress, Log
 
 
 def test_counts_add_up_and_levels_do_not() -> None:
@@ -22,3 +25,10 @@ def test_times_of_frames_add_up_to_the_stage() -> None:
     with log.timed("trace"):
         pass
     assert log.seconds["trace"] == pytest.approx(3.0, abs=0.1)
+
+
+def test_a_stage_that_has_no_steps_yet_counts_none(tmp_path: Path) -> None:
+    """The bar read ``compare 0/0  begins``."""
+    progress = CaseProgress("a", tmp_path / "log.txt", io.StringIO())
+    Log(progress).begins("compare")
+    assert "[a] compare  begins" in (tmp_path / "log.txt").read_text(encoding="utf-8")

@@ -156,7 +156,7 @@ def test_report_makes_every_table_of_a_score_again(tmp_path: Path, capsys: pytes
     (row,) = pd.read_csv(tmp_path / "failures.csv").to_dict("records")
     assert (row["simulator"], row["case"], row["frame"]) == ("bad", "c1", 2)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "Failures (1)" in page
+    assert "Failures: 1 frame<" in page
     assert "bad: c1" in page
     assert "side by side" in capsys.readouterr().out
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from reports.alike import alike, in_words
+from reports.alike import alike, in_words, of_what
 
 
 def row(frame: int | None, message: str, case: str = "a", status: str = "no_wire") -> dict[str, object]:
@@ -22,6 +22,13 @@ def test_what_differs_in_numbers_and_scans_is_said_once() -> None:
         *[("a", "0 to 2, 5", 4), ("a", "3", 1), ("b", "0", 1), ("a", "", 1)]
     ]
     assert found[0]["message"] == rows[0]["message"], "the first one's, numbers and all"
+
+
+def test_a_case_without_any_result_is_no_third_frame() -> None:
+    """Two failed frames and a failed case were ``Failures (3)`` below ``32 without a result``."""
+    rows = [row(10, "faint 1"), row(20, "faint 2"), row(None, "no lumen", case="b")]
+    assert of_what(alike(rows)) == "2 frames, 1 case"
+    assert of_what(alike(rows[2:])) == "1 case"
 
 
 def test_other_statuses_are_not_alike() -> None:

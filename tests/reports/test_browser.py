@@ -18,9 +18,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from reports import tables
 from reports.case_files import find_cases
 from reports.figures._drawing import DOTS_PER_INCH
 from reports.html import render_case, render_index
+from reports.schema import ERRORS
 from tests.reports.fake_pages import write_pages
 from tests.reports.fake_results import FakeCase, write_run
 
@@ -315,6 +317,53 @@ def test_paper_shows_what_is_folded_and_cuts_nothing(run: Path, opened: Opener) 
     wide = "[...document.querySelectorAll('table, img, pre')].map((e) => e.getBoundingClientRect().right)"
     assert max(page.evaluate(wide)) <= 1041
     assert page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
+    # Chromium repeats headings on every sheet of a table, but not buttons: 11 of 12 sheets of a diff had none
+    heads = "[...document.querySelectorAll('th button')].map((b) => getComputedStyle(b).display)"
+    assert set(page.evaluate(heads)) == {"contents"}
+
+
+def test_a_table_of_all_columns_fits_the_paper(run: Path, tmp_path: Path, opened: Opener) -> None:
+    """A budget adds ten columns: the table was a fifth wider than the sheet, and all pages were printed smaller."""
+    folder = shutil.copytree(run / "cases" / "good", tmp_path / "full")
+    path = folder / ERRORS.file
+    rows = tables.read(path, ERRORS)
+    numbers = [column.name for column in ERRORS.shown("frames", "work") if column.kind == "float"]
+    tables.write(path, ERRORS, rows.assign(**{name: rows[name].fillna(0.01234) for name in numbers}))
+    page = opened(render_case(folder), {"width": 1040, "height": 720})
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("table.widest th").count() > 26
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1041
+
+
+@pytest.mark.parametrize("width", [1280, 1500])
+def test_the_first_picture_can_be_read(run: Path, opened: Opener, width: int) -> None:
+    """Beside the tiles it was two thirds as large: its small print 8 pixels high."""
+    page = opened(run / "index.html", {"width": width, "height": 800})
+    size = "image => image.getBoundingClientRect().width / Number(image.getAttribute('width'))"
+    scale = page.locator(".first .plot img").evaluate(size)
+    assert scale * 8 * DOTS_PER_INCH / 72 > 11
+    tops = page.evaluate("[...document.querySelectorAll('.first .card')].map((c) => c.offsetTop)")
+    assert width > 1280 or len(set(tops)) == 1, "six tiles in one row"
+
+
+def test_the_sliders_stay_in_a_narrow_window(run: Path, opened: Opener) -> None:
+    """That of the frames reached into the margin, and the key of the error's colours shrank to a dot."""
+    page = opened(run / "cases" / "good" / "report.html", NARROW)
+    right = "n => document.querySelector(n).getBoundingClientRect().right"
+    assert page.evaluate(right, "#frame") <= page.evaluate(right, "main")
+    assert min(page.evaluate("[...document.querySelectorAll('.key')].map((k) => k.offsetWidth)")) >= 20
+
+
+def test_what_became_worse_is_read_on_a_phone(pages: list[Path], opened: Opener) -> None:
+    """What each column means stood in every row: what it is now was out of sight, and half of a row was empty."""
+    page = opened(next(path for path in pages if path.name == "diff.html"), NARROW)
+    box = page.locator("[data-table]").first
+    right = "cell => cell.getBoundingClientRect().right"
+    assert box.locator("th[data-name=after]").evaluate(right) <= NARROW["width"]
+    assert box.locator("tbody tr").first.evaluate("row => row.offsetHeight") < 35
+    box.locator("summary").click()
+    assert "root mean square distance" in box.locator("dl.meanings").inner_text()
 
 
 def test_without_javascript_the_figures_and_tables_remain(run: Path, opened: Opener) -> None:
@@ -370,7 +419,7 @@ def test_figures_are_panned_on_a_phone_where_their_labels_can_be_read(run: Path,
     page = opened(run / "cases" / "good" / "report.html", NARROW)
     scales = page.evaluate("""() => [...document.querySelectorAll('.plot img')].map(
         (i) => i.getBoundingClientRect().width / Number(i.getAttribute('width')))""")
-    assert min(scales) * 8 * DOTS_PER_INCH / 72 > 9
+    assert min(scales) * 8 * DOTS_PER_INCH / 72 > 11
     pane = page.locator("figure .pan").first
     assert pane.evaluate("pane => pane.scrollWidth - pane.clientWidth") > 200
     assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")

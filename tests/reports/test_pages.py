@@ -207,8 +207,15 @@ def test_a_lumen_that_is_not_found_is_one_failure_not_one_a_frame(tmp_path: Path
     changed = result | {"status": "segment_failed", "frames": frames, "failures": [told]}
     path.write_text(json.dumps(changed), encoding="utf-8")
     page = render_case(path.parent).read_text(encoding="utf-8")
-    assert "Failures (1)" in page
+    assert "Failures: 1 case<" in page
     assert '<td data-label="frame">all</td>' in page, "an empty place told nothing of three frames"
+
+
+def test_why_frames_failed_is_said_of_them_alone(run: Path) -> None:
+    """Below the name of a case their reason stood as if it were of all frames, and again among the failures."""
+    page = (run / "cases" / FAILED / "report.html").read_text(encoding="utf-8")
+    said = re.findall(r'<p class="verdict">(.*?)</p>', page, re.S)[0]
+    assert said.startswith("4 of 6 frames have a result. The simulated wire lies")
 
 
 def test_a_case_that_died_still_has_a_page_and_is_listed(tmp_path: Path) -> None:

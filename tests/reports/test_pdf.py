@@ -32,7 +32,7 @@ def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> N
     pages = [" ".join(text.get_text() for text in page.figure.texts) for page in pdf._pages(out, summary)]
     said = (
         ("5 of 6 frames", "0.250 mm", "frame 1: no_wire", "--only poor"),
-        ("planned frames",),
+        ("Cases side by side", "poor: Skill against trivial predictors"),
         ("worst case: poor", "stands among the assumptions", "Worst frames by p95_mm"),
         ("solver.segment_mm", "frames_failed", "More of poor", "Error against insertion depth"),
     )
@@ -89,7 +89,7 @@ def test_a_run_without_errors_has_its_four_pages(tmp_path: Path, cases: tuple[Fa
 
 
 def test_figures_have_200_dots_an_inch_and_fill_their_pages(tmp_path: Path) -> None:
-    """They were those of the screen, 100 dots an inch, and what did not fit below one left half a page empty."""
+    """They were those of the screen, 100 dots an inch, and the first two pages of a small run half empty."""
     out = write_run(tmp_path / "out", (FakeCase("fine", frames=5), FakeCase("poor", frames=4, error_mm=0.6)))
     pages = list(pdf._pages(out, tables.read(out / "summary.csv", SUMMARY)))
     for page in pages:
@@ -98,6 +98,6 @@ def test_figures_have_200_dots_an_inch_and_fill_their_pages(tmp_path: Path) -> N
             dots = picture.get_array().shape[1] / (axes.get_position().width * page.figure.get_figwidth())
             assert 195 < dots < 205
             assert axes.get_position().y0 > BOTTOM
-    assert [len(page.figure.axes) for page in pages] == [1, 2, 2, 2]
-    assert max(page.at for page in pages[2:]) < 0.2
+    assert [len(page.figure.axes) for page in pages] == [3, 2, 2, 2]
+    assert max(page.at for page in pages) < 0.2
     assert write_pdf(out).stat().st_size < 2e6

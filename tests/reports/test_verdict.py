@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, warned, worst_frames
+from tests.reports.fake_results import FakeCase, write_run
 
 
 @pytest.mark.parametrize(
@@ -172,3 +173,9 @@ def test_frames_as_bad_as_each_other_stand_by_case() -> None:
         "a",
         "b",
     ]
+
+
+def test_a_warning_of_several_cases_is_one_line_on_the_terminal(tmp_path: Path) -> None:
+    """Two cases in one phantom said all of it twice: failures and the next command scrolled out of sight."""
+    out = write_run(tmp_path / "out", [FakeCase(name, frames=3, failed=(1,)) for name in "ab"])
+    assert warned(out) == ["warning: a, b: roll is unknown and was taken as 0"]

@@ -20,6 +20,7 @@ from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.repeated import known_by, once
+from pipeline.run.stages.thickness import too_thin
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
@@ -47,6 +48,8 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.assumptions += assumed
     frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
+    blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
+    run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
