@@ -129,6 +129,15 @@ def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
     )  # fmt: skip
 
 
+def of_a_pair(pair: float, attempt: Attempt) -> tuple[Objection, ...]:
+    """Two wires in contact all along: as bright everywhere as one, and their line lies midway."""
+    return (
+        (pair > 1.0 and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
+         f"a line that is out of round all along, {pair:.1f} times as much as one wire may be", "a round one",
+         "look for a second wire in contact with it, midway to which the line lies, or list a frame with one before"),
+    )  # fmt: skip
+
+
 def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)

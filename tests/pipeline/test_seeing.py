@@ -82,6 +82,8 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("two wires 0.8 mm apart", 805, "TRACE_AMBIGUOUS"),  # along one and back along the other, and ok
         ("a longer device 0.4 to 0.6 mm beside the wire", 5, "TRACE_AMBIGUOUS"),  # to the other's tip, and ok
         ("a longer device 0.4 to 0.6 mm beside the wire", 10, "TRACE_AMBIGUOUS"),
+        ("two wires that touch all along", 4, "TRACE_AMBIGUOUS"),  # the line midway, 0.7 voxel off, and ok
+        ("two wires that touch all along", 7, "TRACE_AMBIGUOUS"),
         ("correlated noise, CNR 4 to 6", 2, "TRACE_AMBIGUOUS"),  # right, but nothing in the frame says so
         ("tip folded back on itself", 632, "TRACE_AMBIGUOUS"),  # 7 mm of it in contact, hardly out of round, and ok
         ("tip folded back on itself", 355, "TRACE_AMBIGUOUS"),  # its tip 3.5 voxels off beside the other strand, and ok
