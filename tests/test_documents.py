@@ -3,6 +3,7 @@ reference pages are what the code says."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shlex
@@ -26,6 +27,9 @@ QUICK = [DOCS / "tutorial.md", ROOT / "README.md", *(p for p in PAGES[1:] if p.n
 """The tutorial first: it makes the study and the output that the others speak of."""
 
 
+QUICKSTART = "wireval synth straight -o study", "wireval run study -o out"
+
+
 def label(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
@@ -36,15 +40,19 @@ def blocks(path: Path, *kinds: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder in which a reader types all that."""
-    return tmp_path_factory.mktemp("desk")
-
-
-@pytest.fixture(scope="module")
 def done() -> set[tuple[str, ...]]:
     """The commands that were typed so far."""
     return set()
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory, done: set[tuple[str, ...]]) -> Path:
+    """The folder in which a reader types all that, after the quickstart, in whatever order pages are read."""
+    folder = tmp_path_factory.mktemp("desk")
+    with contextlib.chdir(folder):
+        for line in QUICKSTART:
+            typed(line, done)
+    return folder
 
 
 def typed(line: str, done: set[tuple[str, ...]]) -> None:

@@ -49,7 +49,7 @@ def resolved_settings(args: argparse.Namespace) -> "Resolved":
     """The settings in force, and which parameters are given beside them; raises SettingsError listing every problem."""
     from dataclasses import replace
 
-    from pipeline.run.store import file_hash
+    from pipeline.run.hashing import file_hash
     from pipeline.study.settings import resolve
 
     found, path = resolve(settings_of(args)), getattr(args, "parameters", None)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.run.store import file_hash
+from pipeline.run.hashing import file_hash
 from pipeline.study.manifest import Case
 from pipeline.study.parameters import Parameters, ParametersError, read_parameters, with_parameters
 

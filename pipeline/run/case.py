@@ -3,10 +3,7 @@
 import functools
 import os
 import shutil
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -16,12 +13,13 @@ from pipeline.compare.metrics import METRICS
 from pipeline.compare.nulls import NULLS
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
-from pipeline.run.helpers import nothing, shared
+from pipeline.run.hashing import hashing
+from pipeline.run.helpers import shared
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.store import code_of, digest, file_hash
+from pipeline.run.store import code_of, digest
 from pipeline.run.view import write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
@@ -115,7 +113,7 @@ def _why_again(job: Job, key: str) -> str | None:
 def run_case(job: Job) -> None:
     """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
-    with _hashing(job) as hashed, held(job.folder, progress.warn):
+    with hashing(_files(job.case), job.cores) as hashed, held(job.folder, progress.warn):
         again: str | None = ""
         if not job.fresh and ledger.read(job.folder) is not None:
             hashed()
@@ -130,23 +128,10 @@ def run_case(job: Job) -> None:
         _compute(job, hashed, progress)
 
 
-@contextmanager
-def _hashing(job: Job) -> Iterator[Callable[[], None]]:
-    """Hash the files of a case, with several cores while other things are done; yields what waits for the end."""
-    sources = (job.case.reference, *job.case.frames)
-    paths = dict.fromkeys(source.path for source in sources if source is not None and source.path.exists())
-    if job.cores == 1:
-        deque(map(file_hash, paths), 0)
-        yield nothing
-        return
-    with ThreadPoolExecutor(job.cores - 1) as readers:  # the interpreter is not held meanwhile
-        hashes = readers.map(file_hash, paths)
-
-        def wait() -> None:
-            readers.shutdown()
-            deque(hashes, 0)  # an error of theirs is met here
-
-        yield wait
+def _files(case: Case) -> list[Path]:
+    """Those whose hashes the results are kept by."""
+    sources = (case.reference, *case.frames)
+    return list(dict.fromkeys(s.path for s in sources if s is not None and s.path.exists()))
 
 
 def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> None:

@@ -6,10 +6,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from pipeline.run.hashing import file_hash
 from pipeline.run.launch import UsageError
 from pipeline.run.log import STAGES, Stage
 from pipeline.run.results import jsonable
-from pipeline.run.store import file_hash
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases, read_json
 from reports.origin import ABSENT, settings_of

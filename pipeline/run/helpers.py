@@ -41,6 +41,22 @@ def nothing() -> None:
     """What is to be done first where nothing is."""
 
 
+def forked(work: Callable[[], object]) -> ForkProcess:
+    """A process that does this and no more; it ends with this one."""
+
+    def begin() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; this one is ended by its parent
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        end_with_parent()
+        work()
+
+    process = multiprocessing.get_context("fork").Process(target=begin)
+    with warnings.catch_warnings():  # Python 3.12 warns of threads; no lock of theirs is taken by a helper
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    return process
+
+
 def said(text: str) -> None:
     """Tell the reader."""
     sys.stderr.write(text + "\n")
@@ -118,14 +134,9 @@ class _Parts(Generic[R]):
         turns = os.memfd_create("turns")
         os.write(turns, np.arange(self.count, dtype=np.int32).tobytes())
         os.lseek(turns, 0, os.SEEK_SET)
-        context = multiprocessing.get_context("fork")
         try:
-            with warnings.catch_warnings():  # Python 3.12 warns of threads; no lock of theirs is taken by a helper
-                warnings.simplefilter("ignore", DeprecationWarning)
-                for _ in range(min(helpers, self.count)):
-                    helper = context.Process(target=self._help, args=(turns,))
-                    helper.start()
-                    self.helpers.append(helper)
+            for _ in range(min(helpers, self.count)):
+                self.helpers.append(forked(lambda: self._help(turns)))
             first()
             while taken := os.read(turns, 4):
                 number = int.from_bytes(taken, sys.byteorder)
@@ -180,9 +191,6 @@ class _Parts(Generic[R]):
 
     def _help(self, turns: int) -> None:
         """Do parts in a process of its own, until none is left or one fails."""
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; this one is ended by its parent
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        end_with_parent()
         self.helpers = []
         try:
             while taken := os.read(turns, 4):

@@ -18,12 +18,12 @@ from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
 from pipeline.run.case import Job, clear, each_on, finished, run_case
+from pipeline.run.hashing import file_hash
 from pipeline.run.log import last_stage
 from pipeline.run.occupied import owner_of
 from pipeline.run.outcome import Outcome
 from pipeline.run.provenance import code_state, this_run
 from pipeline.run.results import lost, write_json
-from pipeline.run.store import file_hash
 from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
 from pipeline.run.watch import Watch
 from pipeline.run.workers import NO_LIMITS, Limits

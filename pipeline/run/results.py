@@ -14,12 +14,13 @@ from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
+from pipeline.run.hashing import file_hash
 from pipeline.run.log import Log
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
-from pipeline.run.store import digest, file_hash
+from pipeline.run.store import digest
 from pipeline.study.manifest import Case
 from pipeline.study.sources import files_of
 from reports.atomic import write_text

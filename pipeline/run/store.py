@@ -5,7 +5,6 @@ that a stage is called with, so nothing can be forgotten. A file counts by its c
 that moving a study recomputes nothing.
 """
 
-import functools
 import hashlib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
@@ -18,8 +17,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import BaseModel
 
-from pipeline.load import parts_of
 from pipeline.model import Volume
+from pipeline.run.hashing import file_hash
 from solver._compile import hash_of
 
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
@@ -80,24 +79,3 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
         yield from ((str(i), part) for i, part in enumerate(value))
     else:
         raise TypeError(f"a {type(value).__name__} cannot be part of a key: its content is not known; got {value!r}")
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, with that of files which hold its voxels; of a folder, of its files in order."""
-    if path.is_dir():
-        hasher = hashlib.sha256()
-        for item in sorted(p for p in path.rglob("*") if p.is_file()):
-            hasher.update(f"{item.relative_to(path)}\0{file_hash(item)}\0".encode())
-        return hasher.hexdigest()
-    hashes = [_content_hash(p, p.stat().st_size, p.stat().st_mtime_ns) for p in (path, *parts_of(path))]
-    return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
-
-
-@functools.cache
-def _content_hash(path: Path, _size: int, _mtime_ns: int) -> str:
-    """Read a file once a process: the resume check, the stages and every point of a sweep ask for the same gigabyte.
-
-    Size and time only say whether it is still the same file here; the key is its content alone.
-    """
-    with path.open("rb") as handle:
-        return hashlib.file_digest(handle, "sha256").hexdigest()

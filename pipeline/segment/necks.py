@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import indices_of
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.solids import cones
@@ -146,13 +145,14 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
     before, and not after. distance : signed distance on the box that begins at ``corner``; least : voxels of a
     part.
     """
-    numbers, count = ndimage.label(distance < 0)
-    sizes = np.bincount(numbers.ravel())[1:] if count > 1 else np.zeros(0, np.int64)
-    large = 1 + np.flatnonzero(sizes >= least)
+    inside = distance < 0
+    numbers, _ = ndimage.label(inside)
+    voxels, number = np.argwhere(inside), numbers[inside]
+    large = np.flatnonzero(np.bincount(number, minlength=1) >= least)
     if len(large) < 2:
         return []
     necks: list[Array] = []
-    pieces = sorted((indices_of(numbers == n) + corner for n in large), key=len, reverse=True)
+    pieces = sorted((voxels[number == n] + corner for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]
     while left:
         tree = cKDTree(whole)

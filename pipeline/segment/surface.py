@@ -18,7 +18,7 @@ from pipeline.model import Counters
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
 from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
-from solver.grid import Array, Grid
+from solver.grid import Array, Grid, read_only
 
 LAYERS = 4
 """Layers around the mask in which grey is smoothed: two may still be inside, two more feed the spline."""
@@ -232,7 +232,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
         own = scanner_blur(found.blur_mm, site.taps, voxel)
-        again = plateau(site.volume, site.grid.with_values(found.values), levels, own)
+        again = plateau(site.volume, site.grid.with_values(read_only(found.values)), levels, own)
         thin = -float(found.values.min()) < 4 * found.blur_mm
         near = abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast
         # bone that has just been seen is in this surface's blur

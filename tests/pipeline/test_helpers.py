@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import multiprocessing
 import os
 import re
 import shutil
@@ -24,10 +26,9 @@ import SimpleITK as sitk
 from pipeline import THREADS
 from pipeline.cli import main
 from pipeline.model import Curve, Lumen, Volume
-from pipeline.run import case
+from pipeline.run import hashing
 from pipeline.run.helpers import Earlier, shared
 from pipeline.run.launch import Plan, cores_each
-from pipeline.run.stages import segment as segmenting
 from pipeline.run.stages import simulate as simulating
 from pipeline.run.stages import trace as tracing
 from pipeline.run.workers import Limits
@@ -236,39 +237,54 @@ def test_a_case_on_two_cores_is_the_case_on_one_file_by_file_and_so_is_what_the_
     assert result["counters"]["trace"][ASKED] > 0
 
 
-def test_files_are_hashed_while_the_lumen_is_segmented_and_nothing_is_forked_beside_a_thread(
+def test_files_are_hashed_by_another_process_while_the_lumen_is_segmented(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[tuple[str, int]] = []
-    fork, hashed, segmented = os.fork, case.file_hash, segmenting.segment
+    """Results are the same, and nothing is forked beside a thread."""
+    read_here: list[str] = []
+    fork, digest, threads = os.fork, hashlib.file_digest, set[int]()
 
-    def slowly(path: Path) -> str:
-        time.sleep(0.1)
-        told.append((path.name, threading.active_count()))
-        return hashed(path)
-
-    def segment(*given: Any, **named: Any) -> Lumen:
-        told.append(("segment", threading.active_count()))
-        return segmented(*given, **named)
+    def reading(handle: Any, name: str) -> Any:
+        read_here.append(Path(handle.name).name)
+        return digest(handle, name)
 
     def forked() -> int:
-        told.append(("fork", threading.active_count()))
+        threads.add(threading.active_count())
         return fork()
 
-    monkeypatch.setattr(case, "file_hash", slowly)
-    monkeypatch.setattr(segmenting, "segment", segment)
-    alone = threading.active_count()
-    run(study, tmp_path / "one", "--no-cache", "--until", "trace")
-    names = [name for name, _ in told]
-    assert names.index("segment") == 1 + FRAMES
-    told.clear()
+    monkeypatch.setattr(hashing.hashlib, "file_digest", reading)
     monkeypatch.setattr(os, "fork", forked)
-    run(study, tmp_path / "two", "--no-cache", "-j", "2", "--until", "trace")
-    names = [name for name, _ in told]
-    assert names.index("segment") < FRAMES
-    assert names.index("fork") == 2 + FRAMES
-    assert {count for name, count in told if name == "fork"} == {alone}
-    assert differences(tmp_path / "one", tmp_path / "two") == []
+    alone = threading.active_count()
+    scans = {"reference.mha", *(f"frame_{n:03d}.mha" for n in range(FRAMES))}
+    for name, cores in ("one", "1"), ("two", "2"), ("four", "4"):
+        hashing._hashes.clear()
+        read_here.clear()
+        run(study, tmp_path / name, "--no-cache", "-j", cores, "--until", "trace")
+        assert scans & {*read_here} == (scans if cores == "1" else set()), name
+        assert differences(tmp_path / "one", tmp_path / name) == [], name
+    assert threads == {alone}
+
+
+def test_a_process_that_hashes_may_die_or_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it has not said is hashed here, where what is wrong with a file is met."""
+    files = [tmp_path / "a", tmp_path / "b"]
+    for file in files:
+        file.write_text(file.name)
+    parent, hashes = os.getpid(), hashing._content_hash
+
+    def lost(path: Path) -> str:
+        if os.getpid() != parent:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return hashes(path)
+
+    monkeypatch.setattr(hashing, "_content_hash", lost)
+    with hashing.hashing(files, 3) as hashed:
+        hashed()
+    assert {path for path, *_ in hashing._hashes} >= {*files}
+    monkeypatch.setattr(hashing, "_content_hash", hashes)
+    with pytest.raises(FileNotFoundError), hashing.hashing([*files, tmp_path / "gone"], 2) as hashed:
+        hashed()
+    assert multiprocessing.active_children() == []
 
 
 def test_a_frame_that_asked_is_traced_again_where_the_frame_before_is_another(

@@ -14,7 +14,7 @@ import SimpleITK as sitk
 from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
-from pipeline.run.store import file_hash
+from pipeline.run.hashing import file_hash
 
 SPACING, ORIGIN = (0.4, 0.5, 0.7), (12.0, -30.0, 5.0)
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

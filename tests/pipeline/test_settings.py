@@ -10,7 +10,8 @@ import pytest
 from pipeline.commands import complain
 from pipeline.model import Curve, Lumen
 from pipeline.run.cache import Store
-from pipeline.run.store import digest, file_hash, key_of
+from pipeline.run.hashing import file_hash
+from pipeline.run.store import digest, key_of
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus

@@ -132,7 +132,7 @@ class Context:
     """A case, its settings, the store of earlier results and the log.
 
     cores : that the case may take.     simulates : it will be simulated after it is traced.
-    without_threads : waits for those of this process, before another one is forked from it.
+    hashed : waits until the files are hashed, so that processes that are forked from this one need not.
     """
 
     case: Case
@@ -141,7 +141,7 @@ class Context:
     log: Log
     cores: int = 1
     simulates: bool = False
-    without_threads: Callable[[], object] = nothing
+    hashed: Callable[[], object] = nothing
 
     def part(self) -> "Context":
         """The same for a part of the case that may be done in another process."""
@@ -162,7 +162,7 @@ class Context:
             self.log.progress(stage, 0, 0, text)
 
         if min(count, self.cores) > 1:
-            self.without_threads()
+            self.hashed()
         return shared(work, count, self.cores, first, inherited, told)
 
     def load(self, crop: Crop, frame: int | None = None) -> Volume:
