@@ -68,6 +68,7 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "config": settings(result.get("config", {})),
         "provenance": list(flatten(result.get("provenance", {}))),
         "files": _files(case_dir),
+        "view": _view(case_dir),
         "version": _version([result]),
     }
     return write_page("case.html.j2", page, case_dir / "report.html")
@@ -224,10 +225,19 @@ def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> di
 
 def _files(case_dir: Path) -> list[dict[str, str]]:
     paths = [case_dir / name for name in _LISTED_FILES]
-    paths += sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
-    found = {path.relative_to(case_dir).as_posix(): path.stat().st_size for path in paths if path.exists()}
-    listed = [{"name": name, "link": quote(name), "size": size(count)} for name, count in found.items()]
+    listed = [_file(case_dir, path) for path in paths if path.exists()]
     return listed + [{"name": n, "link": n, "size": ""} for n in _OF_THE_RUN if (case_dir / n).exists()]
+
+
+def _file(case_dir: Path, path: Path) -> dict[str, str]:
+    name = path.relative_to(case_dir).as_posix()
+    return {"name": name, "link": quote(name), "size": size(path.stat().st_size)}
+
+
+def _view(case_dir: Path) -> dict[str, Any]:
+    """The files of ``view/``, some seven a frame, and what they hold together."""
+    paths = sorted(p for p in (case_dir / "view").glob("*") if not p.name.startswith("."))
+    return {"files": [_file(case_dir, p) for p in paths], "size": size(sum(p.stat().st_size for p in paths))}
 
 
 def _version(infos: Sequence[Any]) -> str:

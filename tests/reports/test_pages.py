@@ -103,6 +103,21 @@ def test_each_kind_of_case_has_its_sections(run: Path) -> None:
     assert {name for name, found in ids.items() if "failures" in found} == {FAILED}
 
 
+def test_the_files_of_view_are_counted_and_not_printed(tmp_path: Path) -> None:
+    """Some seven a frame: they filled two sheets of paper and four screens."""
+    case = find_cases(write_run(tmp_path / "out", KINDS[:1]))[0]
+    shutil.rmtree(case / "view")
+    (case / "view").mkdir()
+    for name in ("wire_traced_000.vtp", "lumen.stl"):
+        (case / "view" / name).write_bytes(b"x" * 1500)
+    text = render_case(case).read_text(encoding="utf-8")
+    folded = re.search(r'<details class="more unprinted"><summary>(.*?)</summary>(.*?)</details>', text, re.S)
+    assert folded is not None
+    assert folded[1] == "2 files in <code>view</code>, 3.0 kB"
+    assert re.findall(r'href="(view/[^"]+)"', text) == re.findall(r'href="(view/[^"]+)"', folded[2])
+    assert ".unprinted > :not(summary) { display: none; }" in text
+
+
 def test_every_picture_has_its_numbers_beside_it(run: Path) -> None:
     pictures = list(run.rglob("figures/*.png"))
     assert len(pictures) > 20
