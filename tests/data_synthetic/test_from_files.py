@@ -17,12 +17,22 @@ from data_synthetic.anatomy.iso_wall import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.anatomy.vessel_in_scan import find_vessel, find_way
 from data_synthetic.catalogue import background_scene, build, from_anatomy
+from data_synthetic.geometry import ScanGrid, voxels_near
 from data_synthetic.scanner.coverage import lumen_coverage
 from data_synthetic.write.volumes import to_image
 from tests.data_synthetic.grids import centred_grid
 
 Z = np.linspace(0.0, 45.0, 25)
 TRUNK = np.column_stack([3 * np.sin(Z / 15), 0.02 * Z**2, Z])
+
+
+def test_voxels_near_points_are_those_within_their_radii() -> None:
+    """Up to the grid's faces, which balls may reach beyond, and with voxels that are no cubes."""
+    grid = ScanGrid((9, 8, 7), np.array([0.5, 0.7, 1.1]), np.zeros(3), np.eye(3))
+    points, radii = np.array([[0.2, 0.3, 6.1], [4.0, 7.0, 3.0]]), np.array([1.6, 1.2])
+    every = np.argwhere(np.ones(grid.shape, bool))
+    away = np.linalg.norm((every[:, None] - points) * grid.spacing_mm, axis=-1)
+    np.testing.assert_array_equal(voxels_near(points, radii, grid), every[(away <= radii).any(axis=1)])
 
 
 def write_swc(path: Path, jitter: float = 0.0) -> None:

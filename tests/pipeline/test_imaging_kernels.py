@@ -35,6 +35,7 @@ def test_jets_at_nodes_are_gaussian_derivatives():
     spacing, out, w = np.array([0.5, 0.5, 0.5]), np.empty(10), np.empty((3, 3, 64))
     jet(Blurred(grey, spacing, 0.6), np.array([7, 8, 8]) * 0.5, w, out)
     orders = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    orders += [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
     for n, order in enumerate(orders):
         expected = ndimage.gaussian_filter(grey.astype(float), 1.2, order=order, truncate=2.9)[7, 8, 8]
         assert out[n] == pytest.approx(expected / 0.5 ** sum(order), rel=0.02, abs=5e-3)

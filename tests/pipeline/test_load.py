@@ -329,6 +329,14 @@ def test_a_file_cut_short_is_said(tmp_path: Path) -> None:
         load(read_header(path))
 
 
+def test_two_slices_are_a_volume_and_one_is_none(tmp_path: Path) -> None:
+    for count in (1, 2):
+        sitk.WriteImage(image_of(numbered()[:, :, :count]), str(tmp_path / f"{count}.mha"))
+    assert load(read_header(tmp_path / "2.mha")).values.shape == (5, 7, 2)
+    with pytest.raises(LoadError, match="one slice is no volume"):
+        read_header(tmp_path / "1.mha")
+
+
 def test_nan_voxels_are_refused(tmp_path: Path) -> None:
     values = numbered().astype(np.float32)
     values[1, 2, 3] = np.nan
