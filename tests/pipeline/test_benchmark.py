@@ -264,3 +264,8 @@ def test_no_side_that_is_as_good_is_silent(seed: int, index: int) -> None:
     """Steps of 1 mm and of 0.05 mm buckled to two sides of a siphon: 1, 4, 4 and 3 depths were silently off."""
     silent = next(iter(against_short_steps(seed, 1, first=index)))
     assert silent.value == 0.0
+
+
+def test_the_closed_form_is_asked_down_to_one_millimetre_and_to_two_in_the_quick_study() -> None:
+    shortest = [min(s.segment_mm for s in settings(quick=q) if s.method == "closed_form") for q in (False, True)]
+    assert shortest == [1.0, 2.0]

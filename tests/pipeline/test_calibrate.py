@@ -372,3 +372,12 @@ def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():
     assert flattened(found(0.375)) == []
     assert "a: the wire's diameter is 0.48 voxels" in flattened(found(0.75))[0]
     assert flattened(found(0.75, frames=("scan",), traces=("curve",))) == []
+
+
+def test_a_step_of_three_prior_deviations_costs_nine():
+    """Minus twice the logarithm of a normal prior, beside the squares of the residuals."""
+    problem = Problem(tuple(all_of(trial())), {}, (Evidence(trial()),), SETTINGS)
+    means, sds = problem.prior
+    at = int(np.flatnonzero(sds > 0)[0])
+    assert problem.value(means, [np.array([2.0, 1.0])]) == pytest.approx(5.0)
+    assert problem.value(means + 3.0 * sds * (np.arange(len(means)) == at), []) == pytest.approx(9.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import zipfile
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pydicom
 import pytest
 import SimpleITK as sitk
 
+from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, LoadError, Source, each_volume, load, read_header, require_same_geometry
 from pipeline.load.config import LoadConfig
 from pipeline.load.files import parts as file_parts
@@ -391,3 +393,23 @@ def test_the_real_tilted_head_is_refused_or_resampled(real_data: Path, tmp_path:
     assert len(volume.assumed) == 2
     assert volume.values.min() >= -1500.0
     assert volume.values.max() <= 2121.0
+
+
+def test_a_rounded_quaternion_is_a_rotation_all_the_same(tmp_path: Path) -> None:
+    """b = 1.0004, rounded by its writer: half a turn about x, lengths unchanged."""
+    path = tmp_path / "scan.nii"
+    sitk.WriteImage(image_of(numbered(), np.diag([1.0, -1.0, -1.0])), str(path))
+    data = bytearray(path.read_bytes())
+    data[252:256] = struct.pack("<hh", 1, 0)  # the qform alone
+    data[256:268] = struct.pack("<fff", 1.0004, 0.0, 0.0)
+    path.write_bytes(data)
+    grid = read_header(path).grid
+    np.testing.assert_allclose(grid.direction.T @ grid.direction, np.eye(3), atol=1e-6)
+    np.testing.assert_allclose(grid.spacing_mm, SPACING, rtol=1e-6)
+
+
+def test_corners_are_the_outermost_voxels_centres(tmp_path: Path) -> None:
+    path = tmp_path / "scan.mha"
+    sitk.WriteImage(image_of(numbered()), str(path))
+    grid = read_header(path).grid
+    np.testing.assert_allclose(np.ptp(corners_mm(grid) @ TURN, axis=0), np.array(SPACING) * (4, 6, 8))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.run.log import CaseProgress, Log
+from pipeline.run.log import CaseProgress, Log, last_stage
 
 
 def test_counts_add_up_and_levels_do_not() -> None:
@@ -32,3 +32,10 @@ def test_a_stage_that_has_no_steps_yet_counts_none(tmp_path: Path) -> None:
     progress = CaseProgress("a", tmp_path / "log.txt", io.StringIO())
     Log(progress).begins("compare")
     assert "[a] compare  begins" in (tmp_path / "log.txt").read_text(encoding="utf-8")
+
+
+def test_the_last_stage_is_that_of_the_last_line_that_names_one(tmp_path: Path) -> None:
+    log = tmp_path / "log.txt"
+    assert last_stage(log) == ""
+    log.write_text("[a] load 1/2\n[a] trace 2/2  frame 1 [x] compare\n[a] warning: simulate is no stage here\n")
+    assert last_stage(log) == "trace"

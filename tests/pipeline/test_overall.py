@@ -13,7 +13,7 @@ import pytest
 from pipeline.cli import main
 from pipeline.run.aggregate import aggregate
 from pipeline.run.last_words import last_line
-from pipeline.run.overall import found_cases, overall, ratio
+from pipeline.run.overall import found_cases, overall, ratio, shared_scans
 from reports import tables
 from reports.html import render_index
 from reports.schema import ERRORS, POINTS
@@ -155,3 +155,11 @@ def test_cases_that_the_manifest_names_no_more_count_nowhere(study: Path, capsys
     assert list(pd.read_csv(study / "summary.csv")["case"]) == ["a", "b", "d"]
     (study / "run.json").write_text("{}", encoding="utf-8")
     assert [c.result.case for c in found_cases(study)] == everything
+
+
+def test_cases_of_one_stated_insertion_that_share_scans_have_nothing_to_be_told(study: Path) -> None:
+    """Only cases that state two insertions and show the same scans are told that they count as one."""
+    for group, told in (("one", 0), ("two", 1)):
+        write_case(study / group, "x", [GOOD], group="one", scans=["same"])
+        write_case(study / group, "y", [GOOD], group=group, scans=["same"])
+        assert len(shared_scans([c.result for c in found_cases(study / group)])) == told

@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from solver._kernels import closed_form, energy, newton, rollout, rotation, start
+from solver._kernels import blocks, closed_form, energy, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
@@ -61,3 +61,13 @@ def look_up_eight(field: Any, found: Any, distance_alone: bool) -> None:
         lane_field.look_first(field, lanes)
     else:
         lane_field.look_up(field, lanes)
+
+
+@entry_point
+def least_curvature(q: Any, twisting: bool) -> float:
+    return blocks.least_curvature(q, twisting)
+
+
+@entry_point
+def solve_stiffened(q: Any, more: float, twisting: bool) -> Any:
+    return blocks.solve_block(blocks.stiffened(q, more), twisting)

@@ -13,7 +13,18 @@ from numpy.typing import NDArray
 from solver import Grid, GuideWire, Status, VesselWall
 from solver.relax import Settings, base_frame
 from solver.workspace import Workspace
-from tests.solver.entry_points import aim, costate, gradients, jacobian_terms, place, sine_terms, sweep, total_energy
+from tests.solver.entry_points import (
+    aim,
+    costate,
+    gradients,
+    jacobian_terms,
+    least_curvature,
+    place,
+    sine_terms,
+    solve_stiffened,
+    sweep,
+    total_energy,
+)
 from tests.solver.scenes import bend_distance, bend_grid, sampled, tube_grid
 
 Array = NDArray[np.float64]
@@ -221,3 +232,25 @@ def turned(b: Workspace, segment: int, axis: int, angle: float) -> float:
         s.u[1, j, 2] = 0.0
         aim(b.problem.chain, s.u[1], s.x[1], s.r[1], j)
     return float(total_energy(b.problem, 1, b.k))
+
+
+@pytest.mark.parametrize("twisting", [False, True])
+def test_a_joints_block_is_judged_stiffened_and_solved_as_the_matrix_it_is(twisting: bool) -> None:
+    """Against numpy's eigenvalues and inverse; entries stand as xx yy zz xy xz yz."""
+    rng, size = np.random.default_rng(4), 3 if twisting else 2
+    for shift in (-1.0, 0.0, 3.0):
+        root = rng.normal(size=(3, 3))
+        whole = root @ root.T + shift * np.eye(3)
+        q = tuple(whole[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+        least = least_curvature(q, twisting)
+        bending = np.linalg.eigvalsh(whole[:2, :2])[0]
+        if np.linalg.eigvalsh(whole[:size, :size])[0] > 0.0:
+            assert least == pytest.approx(bending)
+        else:
+            assert least in (-math.inf, pytest.approx(bending))
+            assert least < 0.0
+        stiffer = whole + np.diag([0.7, 0.7, 0.0])
+        found = np.reshape(solve_stiffened(q, 0.7, twisting), (3, 3))
+        inverse = np.zeros((3, 3))
+        inverse[:size, :size] = -np.linalg.inv(stiffer[:size, :size])
+        np.testing.assert_allclose(found, inverse, atol=1e-9)
