@@ -75,11 +75,14 @@ def decimate(points_mm: Array, corners: Index, max_triangles: int = _MAX_TRIANGL
     size = float(np.ptp(vertices, axis=0).max()) / 400 if len(vertices) else 1.0
     while len(triangles) > max_triangles:
         keys = np.floor(points_mm / size).astype(np.int64)
-        _, inverse, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        keys -= keys.min(axis=0)
+        # one number a cell: rows would be compared byte by byte
+        cells = np.ravel_multi_index(tuple(keys.T), tuple(keys.max(axis=0) + 1))
+        _, inverse, counts = np.unique(cells, return_inverse=True, return_counts=True)
         vertices = np.zeros((len(counts), 3))
-        np.add.at(vertices, inverse.ravel(), points_mm)
+        np.add.at(vertices, inverse, points_mm)
         vertices /= counts[:, None]
-        merged = inverse.ravel()[corners]
+        merged = inverse[corners]
         a, b, c = merged.T
         triangles = merged[(a != b) & (b != c) & (c != a)].astype(np.int64)
         size *= 1.25
