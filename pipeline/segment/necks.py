@@ -147,10 +147,11 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
     """
     inside = distance < 0
     numbers, _ = ndimage.label(inside)
-    voxels, number = np.argwhere(inside), numbers[inside]
+    number = numbers[inside]
     large = np.flatnonzero(np.bincount(number, minlength=1) >= least)
     if len(large) < 2:
         return []
+    voxels = np.argwhere(inside)
     necks: list[Array] = []
     pieces = sorted((voxels[number == n] + corner for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]
