@@ -161,3 +161,11 @@ def test_the_site_has_every_page() -> None:
     """`make docs` would refuse one that is not in the contents, but it runs by itself."""
     nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert [label(p) for p in DOCS.rglob("*.md") if f": {p.relative_to(DOCS)}\n" not in nav] == []
+
+
+def test_every_file_of_a_run_is_in_the_manual(desk: Path) -> None:
+    told = re.findall(r"`([^`]+)`", (DOCS / "reference" / "files.md").read_text(encoding="utf-8"))
+    out, case = desk / "out", desk / "out" / "cases" / "straight"
+    for path in (*out.iterdir(), *case.iterdir(), *(case / "view").iterdir()):
+        name = f"{path.name}/" * path.is_dir() or path.name
+        assert name in (*told, "cases/") or name[name.find(".") :] in told, f"files.md does not tell of {path}"
