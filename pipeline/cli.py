@@ -77,6 +77,9 @@ def parsers() -> tuple[Parser, dict[str, Parser]]:
         verb = importlib.import_module(f"pipeline.commands.{name}")
         verbs[name] = commands.add_parser(name, help=verb.HELP, description=verb.HELP)
         verb.add_arguments(verbs[name])
+        for action in verbs[name]._actions:
+            if action.type is Path:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
     return parser, verbs
 
 
@@ -158,11 +161,10 @@ def _main(argv: Sequence[str] | None) -> int:
             return BAD_INPUT
         with _ended_by_signal():
             return carried_out(args)
-    except InputError as error:
+    except (InputError, StageError) as error:
+        problems, place = (error.problems, error.place) if isinstance(error, InputError) else ([str(error)], "")
         then = {"then": ""} if getattr(args, "command", "") == "check" else {}  # it runs nothing in any case
-        return complain(error.problems, error.place or str(getattr(args, "manifest", COMMAND_LINE)), **then)
-    except StageError as error:
-        return complain([str(error)], COMMAND_LINE)
+        return complain(problems, place or str(getattr(args, "manifest", COMMAND_LINE)), **then)
     except KeyboardInterrupt as why:
         number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
         print("\ninterrupted" + _kept(args), file=sys.stderr)

@@ -79,7 +79,8 @@ class InputError(Exception):
 
 
 def did_you_mean(key: str, allowed: Iterable[str]) -> str:
-    """Sentence naming the nearest allowed key, or all of them."""
+    """Sentence naming the nearest allowed key, whatever its capitals, or all of them."""
     names = sorted(allowed)
-    close = get_close_matches(key, names, n=1)
+    small = {name.lower(): name for name in names}
+    close = get_close_matches(key, names, n=1) or [small[one] for one in get_close_matches(key.lower(), small, n=1)]
     return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(names)}"

@@ -3,7 +3,9 @@ reference pages are what the code says."""
 
 from __future__ import annotations
 
+import ast
 import contextlib
+import io
 import json
 import re
 import shlex
@@ -82,8 +84,25 @@ def test_blocks_run_as_typed(
             assert block["kind"] in ("toml", "yaml", "text", "json"), "what is neither run nor said not to be"
 
 
+def told(text: str, name: str, names: dict[str, Any]) -> str:
+    """What a cell of a notebook prints and what its last line is."""
+    *before, last = ast.parse(text).body
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        exec(compile(ast.Module(before, []), name, "exec"), names)
+        if isinstance(last, ast.Expr):
+            value = eval(compile(ast.Expression(last.value), name, "eval"), names)
+            return said.getvalue() + (repr(value) if value is not None else "")
+        exec(compile(ast.Module([last], []), name, "exec"), names)
+    return said.getvalue()
+
+
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
 @pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=label)
-def test_notebooks_are_executed_and_still_run(path: Path, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_notebooks_are_executed_and_still_show_that(path: Path, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The text of a cell had told the skill of an earlier version."""
     monkeypatch.chdir(desk)
     monkeypatch.setenv("MPLBACKEND", "agg")
     cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
@@ -91,8 +110,10 @@ def test_notebooks_are_executed_and_still_run(path: Path, desk: Path, monkeypatc
     for number, cell in enumerate(cells, 1):
         assert cell["execution_count"] == number
         assert cell["outputs"], "a cell that shows nothing"
-        text = "".join(line for line in cell["source"] if not line.startswith("%"))
-        exec(compile(text, label(path), "exec"), names)
+        text = told("".join(line for line in cell["source"] if not line.startswith("%")), label(path), names)
+        kept = [out.get("text") or out["data"]["text/plain"] for out in cell["outputs"]]
+        shown = "".join("".join(one) for one in kept if "<Figure" not in "".join(one))
+        assert numbers(text) == pytest.approx(numbers(shown), abs=2e-4)
     assert not re.search(r"/(?:work|tmp|root|home)/", path.read_text(encoding="utf-8")), "a machine's path"
 
 
@@ -161,3 +182,11 @@ def test_the_site_has_every_page() -> None:
     """`make docs` would refuse one that is not in the contents, but it runs by itself."""
     nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert [label(p) for p in DOCS.rglob("*.md") if f": {p.relative_to(DOCS)}\n" not in nav] == []
+
+
+def test_every_file_of_a_run_is_in_the_manual(desk: Path) -> None:
+    told = re.findall(r"`([^`]+)`", (DOCS / "reference" / "files.md").read_text(encoding="utf-8"))
+    out, case = desk / "out", desk / "out" / "cases" / "straight"
+    for path in (*out.iterdir(), *case.iterdir(), *(case / "view").iterdir()):
+        name = f"{path.name}/" * path.is_dir() or path.name
+        assert name in (*told, "cases/") or name[name.find(".") :] in told, f"files.md does not tell of {path}"

@@ -28,7 +28,8 @@ def main(args: argparse.Namespace) -> int:
     from reports.atomic import write_text
 
     if not args.manifest.is_dir():
-        raise InputError([f"{args.manifest}: no such folder; give one that holds scans"])
+        what = "this is a file" if args.manifest.exists() else "no such folder"
+        raise InputError([f"{args.manifest}: {what}; give a folder that holds scans"])
     path: Path = args.to or args.manifest / NAME
     if problems := unwritable(path, "--to"):
         raise UsageError(problems)

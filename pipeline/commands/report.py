@@ -44,9 +44,9 @@ def main(args: argparse.Namespace) -> int:
     if not found:
         above = [f"give {one}" for one in args.out.absolute().parents[:2] if found_results(one)]
         hint = next(iter(above), "this is not an output of wireval run")
-        return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], "OUT")
+        return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
     if links_out(args.out):
-        return complain(links_out(args.out), "OUT")
+        return complain(links_out(args.out), str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))

@@ -15,6 +15,7 @@ from typing import TextIO
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Column
 
 from pipeline.run.case import Job
 from pipeline.run.log import STAGES
@@ -45,8 +46,9 @@ class Watch:
 
     @property
     def bar(self) -> bool:
-        """Whether a bar is shown, beside which cases must print nothing."""
-        return self.stream.isatty() and not (self.silent or self.lines)
+        """Whether a bar is shown, beside which cases must print nothing. TERM=dumb cannot draw one: it gets lines."""
+        able = self.stream.isatty() and Console(file=self.stream).is_interactive
+        return able and not (self.silent or self.lines)
 
     def finished(self, job: Job, error: str = "") -> None:
         """Count a job; where there is no bar a line says how far the batch is."""
@@ -66,13 +68,10 @@ class Watch:
         if not self.bar:
             yield
             return
-        columns = (
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TaskProgressColumn(),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=Console(file=self.stream), transient=True) as progress:
+        # the words come last and take what is left: on a narrow terminal they are cut, not the share and the rest
+        words = TextColumn("{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True))
+        columns = TaskProgressColumn(), TimeRemainingColumn(), BarColumn(16), words
+        with Progress(*columns, console=Console(file=self.stream), transient=True, expand=True) as progress:
             task, stop = progress.add_task("starting", total=len(self.jobs)), threading.Event()
             thread = threading.Thread(target=self._follow, args=(progress, task, stop), daemon=True)
             thread.start()

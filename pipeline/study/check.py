@@ -54,9 +54,9 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
 
     for path in dict.fromkeys(files_of(case).values()):
         found(lambda path=path: _require_there(path))  # type: ignore[misc]
-    problems += repeated(case)
     if problems:
         return problems
+    again = repeated(case)
     headers: list[Header] = []
     for source in ((case.reference,) if case.reference else ()) + case.frames:
         found(lambda source=source: headers.append(read_header(source, config.load, case.spacing_mm)))  # type: ignore[misc]
@@ -81,7 +81,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
             read_parameters(case.parameters)
         except ParametersError as error:
             problems += error.problems
-    return problems + list(_lumen_problems(case, config))
+    return again + problems + list(_lumen_problems(case, config))
 
 
 def _read(_content: object) -> None:

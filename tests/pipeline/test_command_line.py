@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -61,6 +62,9 @@ def scans(study: Path, tmp_path: Path) -> Path:
         ("run STUDY -o y --fail-if case>1", "no number 'case'"),
         ("init STUDY", "is there already"),
         ("init STUDY/none", "no such folder"),
+        ("init STUDY/reference.mha", "this is a file; give a folder that holds scans"),
+        ("RUN STUDY -o y", "did you mean 'run'?"),
+        ("run STUDY -o y --fail-if RMS_MM>1", "did you mean 'rms_mm'?"),
         ("init STUDY --to /proc/none/m.toml", "cannot be written"),
         ("init STUDY --to y --entry 900,0,0 --direction 0,0,1", "lies outside the scan"),
         ("init STUDY --to y --wire-radius -1", "radius_mm"),
@@ -288,11 +292,20 @@ def test_other_settings_ask_before_they_overwrite(
     assert main([*words, "--set", "solver.step_mm=0.25", "--resume"]) == code
 
 
-def test_the_package_runs_and_completes() -> None:
+def test_the_package_runs_and_completes(tmp_path: Path) -> None:
+    """Names of files, too, which it had not."""
     done = subprocess.run(
         [sys.executable, "-m", "pipeline", "--print-completion", "bash"], capture_output=True, text=True, check=True
     )
     assert "--fail-if" in done.stdout
+    (tmp_path / "study").mkdir()
+    for words in (["run", "st"], ["run", "x", "-o", "st"], ["diff", "x", "st"]):
+        typed = shlex.join(["wireval", *words])
+        asked = f'COMP_WORDS=({typed}); COMP_CWORD={len(words)}; _shtab_wireval; echo "${{COMPREPLY[@]}}"'
+        found = subprocess.run(
+            ["bash", "-c", f"{done.stdout}\n{asked}"], capture_output=True, text=True, check=True, cwd=tmp_path
+        )
+        assert found.stdout.strip() == "study", words
 
 
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
@@ -320,6 +333,36 @@ def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.Capture
 def test_check_does_not_say_that_nothing_was_run(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study / "none.toml")]) == 2
     assert "nothing was run" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "counted"),
+    [
+        ("check {}", "1 problem in {}"),
+        ("run {} -o {}/out", "1 problem in {}; nothing was run"),
+        ("init {}", "1 problem in {}; nothing was run"),
+        ("report {}", "1 problem in {}; nothing was drawn"),
+    ],
+)
+def test_an_empty_folder_is_called_by_its_name(
+    words: str, counted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It had been a problem in the command line, or in OUT."""
+    assert main(words.replace("{}", str(tmp_path)).split()) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == counted.format(tmp_path)
+
+
+def test_check_tells_a_copied_frame_and_one_that_is_cut_short_at_once(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = shutil.copytree(study, tmp_path / "study")
+    shutil.copy(folder / "reference.mha", folder / "frames" / "frame_000.mha")
+    with (folder / "frames" / "frame_001.mha").open("r+b") as file:
+        file.truncate(1000)
+    assert main(["check", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert "has the content of the reference" in said
+    assert "cut short" in said
 
 
 def test_many_damaged_cases_are_a_line_and_few_a_line_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,7 +53,11 @@ def jobs(tmp_path: Path, count: int) -> list[Job]:
     return [Job(case, resolve([]), tmp_path) for case in cases]
 
 
-def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path) -> None:
+def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On forty columns, too, where long names had pushed share, time and bar off."""
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setenv("NO_COLOR", "1")
     stream, batch = Terminal(), jobs(tmp_path, 2)
     watch = Watch(batch, stream=stream)
     batch[0].folder.mkdir(parents=True)
@@ -66,8 +70,16 @@ def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path) -> None:
         watch.finished(batch[0])
         assert watch.now()[0] == 1.0
         time.sleep(3 * EVERY_S)
-    assert "0/2 [c0] trace 3/3" in stream.getvalue(), "the name of a case is no markup"
+    assert "0/2 [c0]" in stream.getvalue(), "the name of a case is no markup"
+    assert re.search(r"\d\d%.* \S+:\d\d.* 1/2", stream.getvalue()), "share, time left and count"
     assert "1/2" in stream.getvalue()
+
+
+def test_a_terminal_that_cannot_draw_a_bar_gets_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With TERM=dumb (an editor's shell) a run of hours had said nothing at all."""
+    for term, bar in (("dumb", False), ("xterm", True)):
+        monkeypatch.setenv("TERM", term)
+        assert Watch(jobs(tmp_path, 2), stream=Terminal()).bar is bar
 
 
 def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:

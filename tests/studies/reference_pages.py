@@ -202,7 +202,8 @@ def command_line() -> str:
         "# Command line\n",
         NOTE,
         f"{parser.epilog}\n",
-        "`wireval --print-completion bash` (zsh, fish, ...) completes.\n",
+        '`eval "$(wireval --print-completion bash)"` in `~/.bashrc` completes commands, options and files; other\n'
+        "shells: `wireval --print-completion zsh`, tcsh, fish or powershell, in the file where that shell keeps it.\n",
     ]
     for name, verb in verbs.items():
         parts += [
