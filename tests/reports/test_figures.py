@@ -469,6 +469,19 @@ def test_every_parameter_of_a_calibration_has_a_panel() -> None:
     assert "dashed curve" not in caption(entry["read"], drawing.table.query("parameter == 'taper'"))
 
 
+def test_an_axis_of_a_calibration_ends_where_values_end() -> None:
+    """Friction went down to -0.2; what is not seen was said in a red that cannot be read on a dark page."""
+    row = {"name": "friction", "value": 0.02, "prior": 0.0, "sd": 0.08, "seen": False, "logarithmic": False}
+    record = {"estimates": [row | {"bounds": [0.0, 0.5]}], "profiles": {"friction": [[0.0, 0.1], [0.1, 1.0]]}}
+    drawing = figures_of("calibration")["profiles"](record)
+    assert drawing is not None
+    low, high = drawing.figure.axes[0].get_xlim()
+    assert -0.02 < low < 0.0, "the line of what is stated lies within"
+    assert high == pytest.approx(0.26)
+    title = drawing.figure.axes[0].title
+    assert (title.get_text(), title.get_color(), title.get_weight()) == ("friction: not seen", "black", "bold")
+
+
 @pytest.mark.parametrize(("cases", "said"), [(1, False), (2, True)])
 def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, tmp_path: Path) -> None:
     """It told of thin lines beside a single one."""
@@ -501,5 +514,6 @@ def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None
     far = entry | {"clamp": "manifest", "rms_mm": 0.36, "tip_median_mm": 0.3}
     tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.1}, far])
     (said,) = [s for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False) if s["figure"] == "budget"]
+    assert said["title"] == "Clamp and depth", "there is no budget"
     assert "no fault by itself" in said["read"]
     assert "further from the manifest's than that was measured to" in said["bad"]
