@@ -19,7 +19,7 @@ from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, positive_axis
-from reports.figures._style import STAGE_COLOURS, predictors
+from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
@@ -266,6 +266,15 @@ def test_a_band_is_two_sigma_to_both_sides_however_the_scan_is_turned() -> None:
         outline = axes.patches[0].get_xy()[:42]
         width = np.linalg.norm(outline[:21] - outline[21:][::-1], axis=1)
         np.testing.assert_allclose(width, 4 * 0.2, rtol=1e-9)
+
+
+def test_u_val_has_one_colour(tmp_path: Path) -> None:
+    """Its bar had the traced wire's, its line over the depth another."""
+    tables.write(tmp_path / "budget.csv", BUDGET, [{"source": "u_val", "u_mm": 0.2, "distal_u_mm": 0.3}])
+    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
+    assert drawing is not None
+    (line,) = [look for column, _, look in lines("error_by_depth") if column == "u_val_mm"]
+    assert drawing.figure.axes[0].patches[0].get_facecolor() == to_rgba(line["color"])
 
 
 def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
