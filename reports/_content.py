@@ -45,7 +45,8 @@ def caption(text: str, table: pd.DataFrame) -> str:
     shown = {str(name) for name in table if table[name].notna().any()}
     for name in table.select_dtypes(include=["object", "string"]):
         shown |= {value for value in table[name].unique() if isinstance(value, str)}
-    return " ".join(_IF.sub(lambda found: found[2] if found[1] in shown else "", text).split())
+    said = " ".join(_IF.sub(lambda found: found[2] if found[1] in shown else "", text).split())
+    return said.removesuffix(";") + "." * said.endswith(";")  # the last of several that are parted so
 
 
 def interval(low: Any, high: Any) -> str:
@@ -63,7 +64,8 @@ def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, st
         name = f"{prefix}{key}"
         if isinstance(value, Mapping) and value.keys() == _LEVEL:
             if value["median"] is not None:
-                yield name, f"{number(value['median'])} ({interval(value['min'], value['max'])})"
+                ends = f" ({interval(value['min'], value['max'])})" if value["min"] != value["max"] else ""
+                yield name, number(value["median"]) + ends
         elif isinstance(value, Mapping):
             yield from flatten(value, f"{name}.")
         elif value not in (None, "", [], ()):
@@ -77,7 +79,7 @@ def settings(config: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         for key, entry in keys.items() if isinstance(keys, Mapping) else ():
             known = isinstance(entry, Mapping) and "value" in entry
             value, source = (entry["value"], str(entry.get("source", ""))) if known else (entry, "")
-            rows.append((f"{table}.{key}", _text(value), source))
+            rows.append((f"{table}.{key}", _text(value) or NOTHING, source))
     return rows
 
 
@@ -127,8 +129,9 @@ def overall(entries: Iterable[Mapping[str, str]], table: pd.DataFrame) -> list[d
     if table.empty:
         return []
     row = {str(name): value for name, value in table.iloc[0].items()}
-    rests = f"insertions stand behind the intervals ({number(row['interval'])})"
-    return [*cards(entries, row), {"value": number(row["insertions"]), "label": rests}]
+    stand = "insertion stands" if row["insertions"] == 1 else "insertions stand"
+    rests = {"value": number(row["insertions"]), "label": f"{stand} behind the intervals ({number(row['interval'])})"}
+    return [*cards(entries, row), rests]
 
 
 def in_tiles(numbers: Sequence[Mapping[str, str]]) -> dict[str, Sequence[Mapping[str, str]]]:
@@ -195,5 +198,7 @@ def _text(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         parts = [_text(v) for v in value]
         return " ".join(parts) if all(isinstance(v, str) for v in value) else f"[{', '.join(parts)}]"
+    if value is None or isinstance(value, bool):
+        return NOTHING if value is None else str(value).lower()  # as TOML has it
     # counts arrive as floats (16777216.0 voxels), directions with sixteen digits
     return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -106,12 +106,14 @@ def _claims(claims: pd.DataFrame) -> Grid | None:
     verdicts = claims["met"].map({True: "met", False: "NOT MET"}).astype("string").fillna("")
     order = verdicts.ne("NOT MET").sort_values(kind="stable").index
     claims, verdicts = claims.loc[order], verdicts[order]
-    return _grid(claims.assign(met=verdicts).fillna({"aim": ""}), bad=verdicts == "NOT MET")
+    units = claims["unit"].replace("1", "")  # of plain numbers
+    return _grid(claims.assign(met=verdicts, unit=units).fillna({"aim": ""}), bad=verdicts == "NOT MET")
 
 
 def _grid(table: pd.DataFrame, bad: Any = None) -> Grid | None:
     """Every column, with its meaning where it has one; None without rows."""
     known = {column.name: column.meaning for column in (*BENCH, *STRESS, *CLAIMS)}
+    known |= {"target_mm": "the largest shape error that is asked for", "all": "scenes of that kind"}
     kinds = {n: "float" if pd.api.types.is_numeric_dtype(table[n]) else "text" for n in map(str, table.columns)}
     columns = [Column(name, "-", known.get(name, ""), kind) for name, kind in kinds.items()]
     return grid(table, columns, bad, nothing=NOTHING) if len(table) else None

@@ -14,11 +14,12 @@ PRIOR = (
     "what was taken for likely before any trace was seen: mean and standard deviation; of a factor the latter is "
     "of its logarithm"
 )
+USED = "what parameters.toml holds: of a parameter that is not seen what is stated; the others fitted again beside it"
 COLUMNS = (
     Column("parameter", "-", "a factor on what the manifest states, or in the unit that its name ends with", "text"),
     Column("value", "-", "where the wires meet the traces best", "text"),
     Column("sd", "-", "one standard deviation: how far the true value may be off; of a factor in percent", "text"),
-    Column("used", "-", "what parameters.toml holds: the stated value where the parameter is not seen", "text"),
+    Column("used", "-", USED, "text"),
     Column("seen", "-", "known well enough to be taken", "text"),
     Column("prior", "-", PRIOR, "text"),
     Column("bounds", "-", "values outside are not tried", "text"),

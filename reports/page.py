@@ -55,7 +55,7 @@ def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed:
     source = _link(path, folder, "image/png", embed)
     numbers = _link(path.with_suffix(".csv"), folder, "text/csv", embed)
     shown = {"source": source, "numbers": numbers, "width": width, "height": height, "marks": drawing.marks}
-    said = {part: _content.caption(entry[part], drawing.table) for part in ("read", "bad")}
+    said = {part: _content.caption(entry[part], drawing.table) for part in ("title", "read", "bad")}
     return {**entry, **shown, **said, "kept": drawing.kept}
 
 

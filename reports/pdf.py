@@ -107,7 +107,9 @@ def _drawn(part: str, files: Any, names: Sequence[str]) -> list[Figured]:
     """Figures as a page on the screen has them, as far as there are any. files : what their functions take."""
     entries = {entry["figure"]: entry for entry in declared(part)}
     drawn = [(entries[name], drawing) for name in names if (drawing := figures_of(part)[name](files)) is not None]
-    return [Figured(one, entry["title"], _content.caption(entry["read"], one.table)) for entry, one in drawn]
+    return [
+        Figured(one, *(_content.caption(entry[part], one.table) for part in ("title", "read"))) for entry, one in drawn
+    ]
 
 
 def _draw(page: Page, case: CaseFiles, names: Sequence[str]) -> Page:

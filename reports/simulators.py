@@ -8,8 +8,9 @@ from urllib.parse import quote
 import pandas as pd
 
 from reports import _content
-from reports.case_files import counted, find_cases, not_run_sentence, warnings_of
+from reports.case_files import counted, find_cases, not_reached, not_run_sentence, warnings_of
 from reports.figures.simulators import SimulatorFiles, leads
+from reports.origin import mixed_settings
 from reports.page import draw_sections, write_page
 from reports.schema import OVERALL_FILE, SIMULATORS, SUMMARY, WHERE, Column
 from reports.tables import read_if_there
@@ -29,10 +30,11 @@ def render_simulators(out_dir: Path, embed: bool = False) -> Path:
     for row, name in zip(grid["rows"], table["simulator"], strict=True):
         row["cells"][0]["link"] = links[name]
     ours = _warnings(folders[OURS]) if OURS in folders else {}
+    alone = {str(row["simulator"]): row for row in table.to_dict("records")}
     page = {
         "title": "Simulators side by side - wireval",
         "names": list(folders),
-        "said": [{"name": name, "link": links[name]} | _said(name, folder, ours) for name, folder in folders.items()],
+        "said": [{"name": name, "link": links[name]} | _said(alone[name], folders[name], ours) for name in folders],
         "ours": OURS,
         "interval": next(iter(table["interval"].dropna()), ""),
         "simulators": grid,
@@ -49,20 +51,24 @@ def folders_in(out_dir: Path) -> dict[str, Path]:
     return {name: out_dir / "simulators" / name if number else out_dir for number, name in enumerate(names)}
 
 
-def _said(name: str, folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
-    """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires."""
+def _said(alone: Mapping[Any, Any], folder: Path, ours: Mapping[str, list[str]]) -> dict[str, Any]:
+    """Badge and verdict of a simulator, and warnings of its cases that the same scans do not give with our wires.
+
+    alone : its row of simulators.csv, which counts its frames also where nothing is pooled over them.
+    """
     whole = read_if_there(folder / OVERALL_FILE, SUMMARY)
     row = {str(name): value for name, value in whole.iloc[0].items()} if len(whole) else {}
     lines = [f"{case}: {t}" for case, said in _warnings(folder).items() for t in said if t not in ours.get(case, ())]
     more = counted(rest := len(lines) - _MOST_WARNINGS, "more warning")
-    counts = f"On {row.get('frames_ok')} of {row.get('frames')} frames: " if row.get("frames_failed") else ""
-    missing, failed = not_run_sentence(folder), row.get("frames_failed") != 0
+    missing, mixed, good = not_run_sentence(folder), mixed_settings(folder), alone["frames_ok"]
+    failed = f"On {good} of {alone['frames']} frames: " if good < alone["frames"] else ""
+    status = "cases missing" if missing else "frames failed" if failed else "settings differ" if mixed else "ok"
+    said = verdict(row, alone["simulator"])
+    said = failed + said if said else mixed or not_reached(folder) or "No frame of it has a result." * (not good)
     aside = f" Of the study {missing}." if missing else ""
     return {
-        "badge": badge(
-            "cases missing" if missing else "frames failed" if failed else "ok", not (missing or failed), row
-        ),
-        "verdict": (counts + said if (said := verdict(row, name)) else "No frame of it has a result.") + aside,
+        "badge": badge(status, status == "ok", row),
+        "verdict": said + aside,
         "warnings": [*lines[:_MOST_WARNINGS], *[f"{more} on the pages of its cases"] * (rest > 0)],
     }
 

@@ -92,7 +92,8 @@ def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]
     flat = [v for v, rise in near if not rise >= RISE]
     why = ""
     if sd > unknown.enough:
-        why = f"known to {sd:.3g} only; {unknown.enough:g} or less counts as seen"
+        known, enough = (f"{100 * s:.3g} %" if unknown.logarithmic else f"{s:.3g}" for s in (sd, unknown.enough))
+        why = f"known to {known} only; {enough} or less counts as seen"
     elif flat:
         why = f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"
     elif np.isclose(value, unknown.high) or (np.isclose(value, unknown.low) and unknown.logarithmic):

@@ -31,11 +31,12 @@ BEYOND = 2.0
 def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, Any]:
     """The row of a case in summary.csv. errors : its rows of errors.csv."""
     failed = next((f for f in known.frames if not f.ok), None)
-    status = known.failure.status.identifier if known.failure else "ok" if failed is None else failed.status
+    good = "ok" if case.compared else FrameStatus.SIMULATED.identifier
+    status = known.failure.status.identifier if known.failure else good if failed is None else failed.status
     planned = [frame for frame in known.frames if frame.status != FrameStatus.ROLL_FITTED.identifier]
-    good = sum(frame.ok for frame in planned)
+    count = sum(frame.ok for frame in planned)
     head: dict[str, Any] = {"case": case.id, "group": case.group, "role": case.role, "status": status}
-    head |= {"frames": len(planned), "frames_ok": good, "frames_failed": len(planned) - good}
+    head |= {"frames": len(planned), "frames_ok": count, "frames_failed": len(planned) - count}
     head["frames_fitted"] = len(known.frames) - len(planned)
     points = [None if f.comparison is None else f.comparison.error_mm for f in known.frames]
     pairs = zip(errors, points, strict=True)

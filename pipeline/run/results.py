@@ -21,10 +21,11 @@ from pipeline.run.outputs import failure_rows, message_of
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest
+from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
 from pipeline.study.sources import files_of
 from reports.atomic import write_text
-from reports.case_files import find_cases
+from reports.case_files import GOOD, find_cases
 
 LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
@@ -79,7 +80,7 @@ class Result:
     @property
     def ok(self) -> bool:
         """Every frame is."""
-        return self.status == "ok"
+        return self.status in GOOD
 
     def write(self, folder: Path) -> None:
         """Write it into the case's folder."""
@@ -124,7 +125,8 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
         | _events(f)
         for f in known.frames
     ]
-    worst = next((f.sentence for f in known.frames if not f.ok), "every frame is ok")
+    good = "every frame is ok" if case.compared else FrameStatus.SIMULATED.value
+    worst = next((f.sentence for f in known.frames if not f.ok), good)
     sentence = str(known.failure) if known.failure else worst
     head = (case.id, case.role, case.group, summary["status"], sentence)
     source = case.lumen or case.reference

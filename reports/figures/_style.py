@@ -13,7 +13,8 @@ Look = dict[str, Any]  # what matplotlib is told of a line, a legend, cells
 PURPLE, BROWN, ROSE, SLATE = "#9A5B9F", "#8C6D1F", "#B8586B", "#5D6D8A"
 INK, GREY = "#222222", "#767676"
 PALETTE = (SIMULATED, PURPLE, BROWN, "#1F8A8A", ROSE, SLATE)  # no wire but ours, nor what failed, has one of these
-SPARE = ("#1F8A8A", "#7A7A00")  # of columns without a style: no predictor has these colours
+UNCERTAINTY = "#1F8A8A"
+SPARE = ("#7A7A00", UNCERTAINTY)  # of columns without a style: no predictor has these colours
 SEQUENTIAL = ("#D8CBE3", "#5B0F7A")
 """From little to much: away from the paper, and on a dark page, where lightness is turned, away from that as well."""
 STAGE_COLOURS = {
@@ -31,6 +32,7 @@ LINES: dict[str, Look] = {
     "truth": {"color": TRUE, "linewidth": 3.5},
     "simulated": {"color": SIMULATED, "marker": "o", "markersize": 4},
     "floor": {"color": TRACED, "linewidth": 1.0},
+    "uncertainty": {"color": UNCERTAINTY},
     "traced": {"color": TRACED, "marker": "o", "markersize": 4},
     "traced high": {"color": TRACED, "linestyle": ":", "marker": "^", "markersize": 4},
     "traced tip": {"color": INK, "linestyle": "--", "marker": "s", "markersize": 4},

@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
 from reports.figures._drawing import Drawing, legend, new_figure, plain
-from reports.figures._style import GREY, PURPLE, Look
+from reports.figures._style import GREY, PURPLE, UNCERTAINTY, Look
 from reports.schema import BUDGET, ENTRIES
 from reports.tables import has, read_if_there
 
@@ -36,7 +36,7 @@ def budget(case: CaseFiles) -> Drawing | None:
 def _by_source(axes: Axes, table: pd.DataFrame) -> None:
     """A bar for each row, and a thin one for the wire's end."""
     places = np.arange(len(table))
-    colours = [{"u_val": TRACED, "error": SIMULATED}.get(name, GREY) for name in table["source"]]
+    colours = [{"u_val": UNCERTAINTY, "error": SIMULATED}.get(name, GREY) for name in table["source"]]
     axes.barh(places - 0.15, table["u_mm"], 0.45, color=colours)
     axes.barh(places + 0.25, table["distal_u_mm"], 0.2, color=PURPLE, label="last 10 mm")
     names = [name.replace("_", " ") for name in table["source"]]
@@ -77,7 +77,7 @@ def release_frames(case: CaseFiles) -> Drawing | None:
     for frame, depth, p in zip(two["frame"], two["insertion_mm"], two["release"], strict=True):
         axes.annotate(f"{frame}", (depth, p), (7, 0), textcoords="offset points", fontsize=8)
     axes.set_xlim(*_limits(good["insertion_mm"]))
-    axes.set_ylim(0.0, 1.0)
+    axes.set_ylim(-0.05, 1.05)  # marks at the ends are whole
     axes.set_xlabel("insertion depth, mm")
     axes.set_ylabel("share of the ensemble")
     plain(axes)

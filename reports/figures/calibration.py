@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from reports.colours import BAD, SIMULATED
+from reports.colours import SIMULATED
 from reports.figures._drawing import (
     LOG_FROM_RATIO,
     Drawing,
@@ -68,15 +68,19 @@ def _panel(axes: Axes, row: Mapping[str, Any]) -> None:
         axes.locator_params(axis="x", nbins=4)
     axes.set_ylim(-0.4, HIGHEST)
     verdict = "" if row["seen"] else ": not seen"
-    axes.set_title(f"{row['name']}{verdict}", fontsize=9, color=("black" if row["seen"] else BAD))
+    # bold, not red: small print in red cannot be read on a dark page
+    axes.set_title(f"{row['name']}{verdict}", fontsize=9, weight="normal" if row["seen"] else "bold")
     plain(axes)
 
 
 def _span(row: Mapping[str, Any]) -> tuple[float, float]:
-    """Values three standard deviations to both sides."""
-    if row["logarithmic"]:
-        return row["value"] * np.exp(-3.0 * row["sd"]), row["value"] * np.exp(3.0 * row["sd"])
-    return row["value"] - 3.0 * row["sd"], row["value"] + 3.0 * row["sd"]
+    """Values three standard deviations to both sides, as far as the bounds."""
+    off = 3.0 * row["sd"]
+    ends = row["value"] * np.exp([-off, off]) if row["logarithmic"] else (row["value"] - off, row["value"] + off)
+    bounds = row.get("bounds") or (-np.inf, np.inf)
+    margin = 0.02 * (ends[1] - ends[0])  # a line at the bound is seen
+    low, high = max(ends[0], bounds[0] - margin), min(ends[1], bounds[1] + margin)
+    return float(low), float(high)
 
 
 def correlations(record: Mapping[str, Any]) -> Drawing | None:

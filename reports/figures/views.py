@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from reports.case_files import GOOD, CaseFiles, thinned
-from reports.colours import BAD, SIMULATED, TRACED
+from reports.colours import SIMULATED, TRACED
 from reports.figures._drawing import Drawing, new_figure
 
 _COLUMNS, _MOST = 6, 42
@@ -49,7 +49,7 @@ def views(case: CaseFiles) -> Drawing | None:
         axes.set_aspect("equal")
         good = row["status"] in GOOD
         text = f"{row['frame']}: {row['rms_mm']:.1f} mm" if good else f"{row['frame']}: {row['status']}"
-        axes.set_title(text, fontsize=8, loc="left", pad=2, color="black" if good else BAD)
+        axes.set_title(text, fontsize=8, loc="left", pad=2, weight="normal" if good else "bold")
     return Drawing(figure, pd.DataFrame(table[["frame", "status", "insertion_mm", "rms_mm", "tip_mm"]]))
 
 

@@ -303,7 +303,9 @@
     pen.fillStyle = ink; pen.textAlign = "center";
     for (let s = Math.ceil(from / step) * step; s <= from + length + 1e-9; s += step) { pen.strokeStyle = line; pen.lineWidth = 1; trail(pen, [[X(s), bottom], [X(s), bottom + 4]]); pen.fillText(String(Number(s.toPrecision(4))), X(s), bottom + 17); }
     pen.fillText("arc length along the traced wire, mm", LEFT + (width - LEFT - RIGHT) / 2, bottom + 33);
-    pen.textAlign = "left"; pen.fillText(`offset across the traced wire${high > 1.2 * px ? `, \u00d7 ${Number((high / px).toPrecision(2))}` : ""}${beyond ? "; the simulated wire goes beyond" : ""}`, LEFT, 13);
+    const more = `${high > 1.2 * px ? `, \u00d7 ${Number((high / px).toPrecision(2))}` : ""}${beyond ? "; the simulated wire goes beyond" : ""}`;
+    const titles = ["offset across the traced wire", "offset"].map((text) => text + more), room = width - LEFT - RIGHT;
+    pen.textAlign = "left"; pen.fillText(titles.find((text) => pen.measureText(text).width <= room) ?? titles[1], LEFT, 13);
     if (cursor) { pen.strokeStyle = css("--mark"); pen.lineWidth = 1.5; trail(pen, [[X(cursor.s), TOP], [X(cursor.s), bottom]]); }
   };
   const across = () => {

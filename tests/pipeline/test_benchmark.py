@@ -22,6 +22,7 @@ from pipeline.benchmark.reference import reference, resampled, shape_error
 from pipeline.benchmark.snaps import against_short_steps
 from pipeline.benchmark.stress import statics
 from pipeline.commands import bench as command
+from reports.schema import BENCH
 from solver import GuideWire
 from tests.analytic import elastica_tip
 
@@ -74,6 +75,7 @@ def test_second_order_is_seen_by_the_study() -> None:
     assert (rows["status"] == "converged").all()
     assert np.log2(rows["tip_error_mm"][0] / rows["tip_error_mm"][1]) == pytest.approx(2.0, abs=0.05)
     assert (rows["ms_per_mm"] > 0).all()
+    assert set(rows) <= set(BENCH.names), "half of the columns were explained nowhere"
 
 
 def test_every_setting_is_of_its_own() -> None:

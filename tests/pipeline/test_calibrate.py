@@ -6,12 +6,13 @@ import json
 from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pipeline.calibrate.design import predicted, straight_to
-from pipeline.calibrate.estimates import calibrated
+from pipeline.calibrate.estimates import _judged, calibrated
 from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import own_roll
@@ -381,3 +382,12 @@ def test_a_step_of_three_prior_deviations_costs_nine():
     at = int(np.flatnonzero(sds > 0)[0])
     assert problem.value(means, [np.array([2.0, 1.0])]) == pytest.approx(5.0)
     assert problem.value(means + 3.0 * sds * (np.arange(len(means)) == at), []) == pytest.approx(9.0)
+
+
+def test_how_well_a_factor_is_known_is_said_in_per_cent() -> None:
+    """Beside "103 %" in the table the page said that it was known to 1.03."""
+    free = {u.name: u for u in unknowns([], 0.0, weighed=False)}
+    fit: Any = SimpleNamespace(values={TAPER: 0.0, FRICTION: 0.0}, sd={TAPER: 1.034, FRICTION: 0.0754})
+    said = [_judged(free[name], fit, ()).why for name in (TAPER, FRICTION)]
+    assert said[0] == "known to 103 % only; 20 % or less counts as seen"
+    assert said[1] == "known to 0.0754 only; 0.02 or less counts as seen"

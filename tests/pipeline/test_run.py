@@ -746,6 +746,24 @@ def test_a_case_without_frames_is_simulated_only(study: Path, tmp_path: Path) ->
     assert list(table["status"]) == ["simulated"] * FRAMES
     assert table["rms_mm"].isna().all()
     assert table["joints"].notna().all()
+    page = (tmp_path / "out" / "cases" / "bifurcation" / "report.html").read_text(encoding="utf-8")
+    assert '<span class="status good">simulated</span>' in page, "ok, where nothing was compared"
+    assert "Simulated only: the case has no frames to compare with." in page
+    assert "the lumen along its three axes" in page, "there is no scan in the viewer"
+    assert "Nothing is scored: no case has scans" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_case_without_frames_is_no_frame_that_was_planned(finished: Path, study: Path, tmp_path: Path) -> None:
+    """Its depths counted among the frames that are to be within 1 mm: of a perfect study 0.5 were."""
+    head, case = (study / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
+    lines = [line for line in case.splitlines() if not line.startswith(("frames", "truth"))]
+    plan = "\n".join(lines).replace('id = "bifurcation"', 'id = "plan"')
+    manifest = study / "planned.toml"
+    manifest.write_text(f"{head}[[case]]{case}\n[[case]]{plan}", encoding="utf-8")
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out")]) == 0
+    whole = [tables.read(out / "overall.csv", SUMMARY).iloc[0] for out in (finished, tmp_path / "out")]
+    assert whole[1]["frames"] == whole[0]["frames"] == FRAMES
+    assert whole[1]["within_1mm"] == whole[0]["within_1mm"]
 
 
 def test_interruption_is_130(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

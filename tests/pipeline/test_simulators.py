@@ -207,21 +207,35 @@ def test_the_page(compared: Path) -> None:
 
 def test_the_page_says_how_good_each_is_and_what_was_warned_of(compared: Path) -> None:
     """`score` writes the first simulator beside the page; a warning that our wires get, too, is none of another's."""
-    for name, skill in (("tip", 0.5), ("worse", -1.0), ("wireval", 0.4)):
+    for name, skill in (("tip", 0.5), ("worse", 0.4), ("wireval", -1.0)):
         (compared / "simulators").mkdir(exist_ok=True)
         folder = (compared / name).rename(compared / "simulators" / name) if name != "tip" else compared
         if name == "tip":
             (compared / "tip" / "cases").rename(compared / "cases")
-        row = {"frames_failed": 0, "rms_mm": 0.3, "skill_strongest": skill, "strongest_null": "previous"}
+        row = {"rms_mm": 0.3, "skill_strongest": skill, "strongest_null": "previous"}
         tables.write(folder / "overall.csv", SUMMARY, [row])
         path = folder / "cases" / "c0" / "result.json"
         own = ["a faint frame", *["3 frames: with x and y turned most would not: are they RAS?"] * (name == "worse")]
         path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | {"warnings": own}), encoding="utf-8")
     page = render_simulators(compared).read_text(encoding="utf-8")
     assert '<span class="status poor">worse than a guess</span>' in page
-    assert page.count('<span class="status good">ok</span>') == 2
+    assert page.count('<span class="status good">ok</span>') == 1
+    assert "On 21 of 24 frames: The wire of worse lies" in page
     assert "c0: 3 frames: with x and y turned most would not: are they RAS?" in page
     assert "a faint frame" not in page
+
+
+def test_frames_whose_settings_differ_have_a_result(tmp_path: Path) -> None:
+    """Nothing is pooled over them: beside 24 of 24 ok the page said that no frame had a result."""
+    ours = write_tree(tmp_path / "simulators" / "wireval", even(0.2))
+    write_comparison(tmp_path, {"another": write_tree(tmp_path, even(0.2)), "wireval": ours})
+    for number, folder in enumerate(sorted((tmp_path / "cases").iterdir())):
+        path = folder / "result.json"
+        config = {"config": {"simulate": {"friction": {"value": 0.1 * (number > 2), "source": "command line"}}}}
+        path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | config), encoding="utf-8")
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert "No frame of it has a result" not in page
+    assert '<span class="status bad">settings differ</span>' in page
 
 
 def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
@@ -239,4 +253,6 @@ def test_a_simulator_without_any_usable_wire_is_shown(tmp_path: Path) -> None:
         0,
         0.0,
     )
-    assert "none" in render_simulators(tmp_path).read_text(encoding="utf-8")
+    page = render_simulators(tmp_path).read_text(encoding="utf-8")
+    assert page.count("No frame of it has a result.") == 1
+    assert page.count('<span class="status bad">frames failed</span>') == 1

@@ -101,6 +101,7 @@ def test_the_page_has_everything_and_keeps_extra_columns(tmp_path: Path) -> None
         assert part in text
     assert "one core of &lt;some&gt; machine" in text
     assert "cells_<wbr>skipped" in text
+    assert "the largest shape error that is asked for" in text
     assert ">nan<" not in text
     for name in ("pareto", "convergence", "stress_outcomes"):
         assert (tmp_path / "out" / "figures" / f"{name}.png").exists()
@@ -135,4 +136,5 @@ def test_broken_promises_come_first_and_are_counted_among_those_with_an_aim(tmp_
     claims.to_csv(tmp_path / "claims.csv", index=False)
     page = bench.render_bench(rows, tmp_path / "out", stress, tmp_path / "claims.csv").read_text(encoding="utf-8")
     assert "1 of 2 promises" in page
+    assert '<td class="text">1</td>' not in page, "a plain number's unit"
     assert page.index(">broken<") < page.index(">kept<") < page.index(">reported<")

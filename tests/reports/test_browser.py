@@ -366,6 +366,47 @@ def test_what_became_worse_is_read_on_a_phone(pages: list[Path], opened: Opener)
     assert "root mean square distance" in box.locator("dl.meanings").inner_text()
 
 
+@pytest.mark.parametrize("viewport", [WIDE, NARROW], ids=["1280", "390"])
+def test_names_of_settings_are_not_broken(run: Path, tmp_path: Path, opened: Opener, viewport: Any) -> None:
+    """Beside a long value their column was eight letters wide."""
+    folder = shutil.copytree(run / "cases" / "good", tmp_path / "long")
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    result["geometry"]["direction"] = [[0.123456789] * 12] * 3
+    (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    page = opened(render_case(folder), viewport)
+    page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+    lines = "[...document.querySelectorAll('table.tree code')].map((c) => [c.innerText, c.getClientRects().length])"
+    assert {name: count for name, count in page.evaluate(lines) if count > 1 and "-" not in name} == {}
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+
+
+def test_beside_a_long_first_column_there_is_room_for_the_next_on_a_phone(pages: list[Path], opened: Opener) -> None:
+    """It stays in sight and filled the screen: what a promise of the benchmark was measured as could not be read."""
+    page = opened(next(path for path in pages if path.name == "bench.html"), NARROW)
+    cell = page.locator("[data-table]", has=page.locator("th[data-name=claim]")).locator("tbody td").first
+    assert len(cell.inner_text()) > 40
+    assert cell.evaluate("cell => cell.offsetWidth") < 0.6 * NARROW["width"]
+
+
+def test_the_title_of_the_strips_fits_a_phone(run: Path, tmp_path: Path, opened: Opener) -> None:
+    """It ended in "the simulate"."""
+
+    def beyond(data: Any) -> None:
+        data["ranges_mm"], data["range_mm"] = [0.05], 0.05
+
+    page = opened(with_viewer(copied(run, "good", tmp_path), beyond), NARROW)
+    page.evaluate("""() => { const c = document.getElementById('straight'), pen = c.getContext('2d');
+        const write = pen.fillText.bind(pen), found = window.ends = [];
+        pen.fillText = (text, x, y) => { write(text, x, y);
+            if (pen.textAlign === 'left') found.push([text, x + pen.measureText(text).width]); };
+        document.getElementById('range').innerHTML = '<option value=0.05 selected>';
+        document.getElementById('place').dispatchEvent(new Event('input')); }""")
+    page.wait_for_timeout(150)
+    text, end = page.evaluate("window.ends.at(-1)")
+    assert text.endswith("the simulated wire goes beyond")
+    assert end <= page.evaluate("document.getElementById('straight').clientWidth")
+
+
 def test_without_javascript_the_figures_and_tables_remain(run: Path, opened: Opener) -> None:
     page = opened(run / "cases" / "good" / "report.html", java_script_enabled=False)
     assert not page.locator(".viewer").is_visible()

@@ -56,6 +56,8 @@ def test_a_caption_speaks_of_what_is_there() -> None:
     table = pd.DataFrame({"curve": ["simulated", "band"], "u_mm": [math.nan, math.nan]})
     assert _content.caption(text, table) == "Dashed: simulated, in its band."
     assert _content.caption(text, pd.DataFrame({"u_mm": [1.0]})) == "Dashed: simulated; bars: u."
+    several = "Bad: {rms_mm|a far dot;} {u_mm|a long bar.}"
+    assert _content.caption(several, pd.DataFrame({"rms_mm": [1.0]})) == "Bad: a far dot.", "it ended with a semicolon"
 
 
 def test_intervals_need_both_ends() -> None:
@@ -73,11 +75,21 @@ def test_a_level_is_one_text_beside_plain_counts() -> None:
     tree = {"segment": {"voxels_read": 10752.0, "blur_mm": level, "nothing": dict.fromkeys(level)}}
     rows = list(_content.flatten(tree))
     assert rows == [("segment.voxels_read", "10752"), ("segment.blur_mm", "0.830 (0.500 to 12.0)")]
+    once = {"noise": dict.fromkeys(level, 33.6)}
+    assert list(_content.flatten(once)) == [("noise", "33.6")], "33.6 (33.6 to 33.6)"
 
 
 def test_settings_keep_their_source() -> None:
     config = {"solver": {"segment_mm": {"value": 0.5, "source": "command line"}}, "odd": {"key": 1}}
     assert _content.settings(config) == [("solver.segment_mm", "0.5", "command line"), ("odd.key", "1", "")]
+    config = {"a": {"axis": {"value": []}, "scale": {"value": None}, "resample": {"value": False}}}
+    assert [value for _, value, _ in _content.settings(config)] == ["–", "–", "false"], "nothing, None, False"
+
+
+def test_one_insertion_is_no_plural() -> None:
+    table = pd.DataFrame([{"insertions": 1, "interval": "interval withheld: 1 insertion, at least 3 needed"}])
+    assert _content.overall([], table)[0]["label"].startswith("insertion stands behind the intervals")
+    assert _content.overall([], table.assign(insertions=4))[0]["label"].startswith("insertions stand")
 
 
 def test_one_thing_is_no_plural() -> None:

@@ -19,7 +19,7 @@ from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, positive_axis
-from reports.figures._style import STAGE_COLOURS, predictors
+from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
@@ -268,6 +268,15 @@ def test_a_band_is_two_sigma_to_both_sides_however_the_scan_is_turned() -> None:
         np.testing.assert_allclose(width, 4 * 0.2, rtol=1e-9)
 
 
+def test_u_val_has_one_colour(tmp_path: Path) -> None:
+    """Its bar had the traced wire's, its line over the depth another."""
+    tables.write(tmp_path / "budget.csv", BUDGET, [{"source": "u_val", "u_mm": 0.2, "distal_u_mm": 0.3}])
+    drawing = CASE_FIGURES["budget"](_empty_case(tmp_path))
+    assert drawing is not None
+    (line,) = [look for column, _, look in lines("error_by_depth") if column == "u_val_mm"]
+    assert drawing.figure.axes[0].patches[0].get_facecolor() == to_rgba(line["color"])
+
+
 def test_a_budget_is_drawn_by_source_and_by_entry(tmp_path: Path) -> None:
     rows = [{"source": n, "sigma": "", "u_mm": u, "distal_u_mm": 2 * u} for n, u in (("roll", 0.1), ("error", 0.2))]
     tables.write(tmp_path / "budget.csv", BUDGET, rows)
@@ -469,6 +478,19 @@ def test_every_parameter_of_a_calibration_has_a_panel() -> None:
     assert "dashed curve" not in caption(entry["read"], drawing.table.query("parameter == 'taper'"))
 
 
+def test_an_axis_of_a_calibration_ends_where_values_end() -> None:
+    """Friction went down to -0.2; what is not seen was said in a red that cannot be read on a dark page."""
+    row = {"name": "friction", "value": 0.02, "prior": 0.0, "sd": 0.08, "seen": False, "logarithmic": False}
+    record = {"estimates": [row | {"bounds": [0.0, 0.5]}], "profiles": {"friction": [[0.0, 0.1], [0.1, 1.0]]}}
+    drawing = figures_of("calibration")["profiles"](record)
+    assert drawing is not None
+    low, high = drawing.figure.axes[0].get_xlim()
+    assert -0.02 < low < 0.0, "the line of what is stated lies within"
+    assert high == pytest.approx(0.26)
+    title = drawing.figure.axes[0].title
+    assert (title.get_text(), title.get_color(), title.get_weight()) == ("friction: not seen", "black", "bold")
+
+
 @pytest.mark.parametrize(("cases", "said"), [(1, False), (2, True)])
 def test_a_caption_says_only_what_is_drawn_of_the_cases(cases: int, said: bool, tmp_path: Path) -> None:
     """It told of thin lines beside a single one."""
@@ -501,5 +523,6 @@ def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None
     far = entry | {"clamp": "manifest", "rms_mm": 0.36, "tip_median_mm": 0.3}
     tables.write(tmp_path / "entries.csv", ENTRIES, [entry | {"tip_median_mm": 0.1}, far])
     (said,) = [s for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False) if s["figure"] == "budget"]
+    assert said["title"] == "Clamp and depth", "there is no budget"
     assert "no fault by itself" in said["read"]
     assert "further from the manifest's than that was measured to" in said["bad"]
