@@ -5,19 +5,19 @@ DECREMENT = 1e-9
 ROUND_OFF = 1e-13
 """Energy differences below this fraction of the energy are rounding (1e-16 times a few hundred joints)."""
 ENERGY_FLOOR_ANGLE = 1e-7
-"""Joint angle in rad whose bending energy is called nothing: the scale where the energy itself is zero."""
+"""Joint angle, rad, whose bending energy counts as zero: the energy's scale where the energy itself is zero."""
 REST_ANGLE = 1e-15
-"""All joint angles of an untouched wire, root of the sum of squares in rad, that are rounding: 1e-12 mm at the tip of
-a metre of it."""
+"""Root of the sum of the squared joint angles of an untouched wire, rad, that is rounding: 1e-12 mm at the tip of a
+metre of it."""
 MOMENT = 1e-5
 """Largest residual moment accepted at a joint, relative to the largest moment in the wire."""
 CURVATURE_FLOOR = 1e-6
 """A block of the Hessian within this fraction of its joint's stiffness around zero is neutral, below it indefinite."""
 NEUTRAL = 1e-3
-"""Negative curvature, over the stiffest joint's stiffness, up to which a wire without moments is called at rest where
-no trial is lower: a turn of an angle there falls by less than a thousandth of what it would cost by itself."""
+"""Negative curvature, over the stiffest joint's stiffness, up to which a wire without moments counts as at rest where
+no trial has less energy: turning a joint releases less than a thousandth of what the turn costs by itself."""
 SWING = 0.3
-"""Angle of the first step off a saddle, rad: the fourth order of the energy takes 1 % of its fall."""
+"""Angle of the first step off a saddle, rad: there the energy's fourth-order term takes back 1 % of its fall."""
 SUFFICIENT = 1e-4
 """Armijo's constant: the fraction of the predicted fall in energy that a step must deliver."""
 STEP_ANGLE = 0.7
@@ -41,24 +41,25 @@ MATCH_DEPTH_MM = 1e-9
 SAME_LENGTH_MM = 1e-13
 """Difference of two lengths of a first segment that is rounding of the depths they were cut from."""
 FIRST_DAMPING = 1e-3
-"""Levenberg term tried first: holds a bend of 20 segments' length back by about its own stiffness."""
+"""Levenberg term tried first: it resists a bend 20 segments long about as much as that bend's own stiffness does."""
 LEAST_DAMPING = 1e-7
 """Levenberg term below which it is dropped."""
 SOFTER = 0.04
-"""Levenberg term tried next, over the last, where that held the wire so hard that no step was worth taking: the softest
-mode of k joints is k⁴ times softer than a joint, 4e-11 of it in 400 mm of wire in a sheath."""
+"""Factor from a Levenberg term to the next one tried, where the first held the wire so hard that nothing was left to
+gain: the softest mode of k joints is k⁴ times softer than a joint, 4e-11 of it in 400 mm of wire in a sheath."""
 WORST_DAMPING = 1e9
 """Levenberg term, relative to the joints' stiffness, at which no useful step is left."""
 SEARCHES = 6
 """Step lengths tried (each 0.4 of the one before) before the Levenberg term is raised instead."""
 FINE = 1e-5
-"""Fall foretold, over the energy, below which whole steps may lead uphill for a while: the shape hardly changes."""
+"""Predicted fall, over the energy, below which whole steps may lead uphill for a while: the shape hardly changes."""
 WATCHDOG_STEPS = 8
 """Whole steps that may lead uphill before the energy must be lower than where they began."""
 RISE = 0.01
 """How far uphill they may lead, over the energy."""
 POLISHES = 20
-"""Newton's steps beyond the energy's last place: where a stiff wall holds a long lever each may only halve the rest."""
+"""Newton steps taken where the energy is flat to its last digit: each may only halve the remaining decrement where a
+stiff wall holds a long lever."""
 SLIP_MM = 1e-3
 """Tangential way in mm below which a point in contact still sticks: a thousandth of a usual step."""
 FRICTION_CHANGE = 1e-4
@@ -78,43 +79,45 @@ CLOSED_FORM_IDLE_ANGLE = 3e-11
 """A moment that would turn the stiffest joint by this angle, rad, is nothing: below it the energy by which the closed
 form accepts its steps no longer shows them (sqrt(2e-16 u), 1.4e-11 rad in a wire bent by 1e-6 rad a joint)."""
 FIRST_CHECK = 32
-"""Sweeps of the closed form before it is first asked whether it is at rest; later after every quarter more."""
+"""The closed form is asked whether it is at rest before its first sweep, then after a quarter more sweeps than this,
+and again after every quarter more."""
 SWEEPS_PER_ITERATION = 500
 """Sweeps of the closed form that max_iterations allows for each of its iterations: it needs O(k²) of them."""
 RISE_RADII = 0.5
-"""How deep, in wire radii, one step may push the axis of a tip that goes straight on into the wall: a tip that
-only touches may so rise by 1.5 radii, and no wall thicker than a radius can be mounted in one step."""
+"""How deep into the wall, in wire radii, one step may push the axis of a tip that goes straight on: a tip that only
+touches can thus rise by 1.5 radii, and one step cannot climb over a wall that is thicker than a radius."""
 BUDGET_STEPS = 20
-"""Relaxations that one depth may spend, at max_iterations each, beyond four for every step of step_mm."""
+"""Relaxations that one depth may spend, at max_iterations each, on top of four for every step of step_mm."""
 WORK = 8_000_000
-"""Joints and look-up points that all iterations or sweeps of one depth may pass, whatever max_iterations: 80,000
+"""Joints and look-up points that all iterations or sweeps of one depth may go through, whatever max_iterations: 80,000
 sweeps of 50 joints with one look-up each (the closed form needs up to 75,000 for a step in a bend), or 2,000 of
-Newton's iterations at 2000 joints. A hopeless depth so ends after two or three seconds."""
+Newton's iterations at 2000 joints. Thus a hopeless depth ends after two or three seconds."""
 WORK_PER_ITERATION = 2_500
 """The same, for each of max_iterations on top: raising max_iterations must help."""
 LONGEST_WAY = 1e8
 """Joints that the steps to one depth may lay out, all together: a wire that touches nothing takes half a minute, and
 400 mm of 0.25 mm segments in steps of 0.01 mm are 6e7."""
 LONG_WAY = 2e5
-"""The same from which a thread, which costs 0.1 ms, makes the way one that Ctrl-C ends: a tenth of a second."""
+"""The same, from which on a way runs in a thread of its own (0.1 ms) so that Ctrl-C can end it: a tenth of a second."""
 LOOK_AHEAD_MM = 2.0
 """How far past its step a tip looks for another vessel behind the wall: further than any step can carry it."""
 UNMOVED = 1e-4
-"""Change of a joint in a step, over the largest one, below which the joints up to it are left alone for a while."""
+"""Change of a joint in a step, over the largest change of any, below which it has not moved: the joints from the base
+to the first that moved are left alone for a while."""
 WORTHWHILE = 0.25
 """Share of the joints that must be left alone for that to save more than looking at all of them again costs."""
 FORETOLD = 100.0
-"""A step that fell by D + T where the model said D leaves a decrement of about 2 to 10 T²/D (from the third and
-fourth order of the energy): below a tenth of the tolerance the next sweep would only confirm it."""
+"""A step that lowers the energy by D + T where the model predicts D leaves a decrement of about 2 to 10 T²/D (from the
+third and fourth order of the energy): where that is below a tenth of the tolerance, a sweep would only confirm it."""
 WORTH_FORESEEING = 0.9
-"""Energy of a foreseen start beyond what the hand's push adds in the step, over the same of the slid one. Of 0.35, 0.5,
-0.7 and 0.9 this takes the fewest sweeps in winding vessels, at steps of a segment and of a quarter."""
+"""A foreseen start is taken where its energy above that predicted from the hand's push is below this share of the slid
+start's. Of 0.35, 0.5, 0.7 and 0.9 this takes the fewest sweeps in winding vessels, in steps of 1 and ¼ segment."""
 SURELY_FORESEEN = 0.1
-"""The same, over what the slid start had when it was last asked, at which it is not asked again: a fifth of that."""
+"""The same share of what the slid start had when it was last computed, below which it is not computed again."""
 STILL_RISES = 0.7
-"""What is taken of that after each step for which it was not asked: it then is in one step of about six."""
+"""Factor on that last value after each step that did not compute it: about one step of six then computes it."""
 MOST_FORESEEN = 1.5
-"""Longest step, over the one before, that starts with that step's change: further ahead it is a guess."""
+"""Longest step, over the one before, that starts with that one's change: further ahead the change is a guess."""
 OVERSHOOT = 0.02
 """How much longer than allowed a step may be rather than leave a remainder: the limits are round numbers."""
 CREASE_BLOCK = 4
@@ -123,34 +126,34 @@ CREASE = 0.3
 """Fall of the distance's slope from one voxel to the next that counts as a crease: at a ridge between parallel walls it
 falls by 2, of which at least 0.58 is seen along an axis at one voxel; round an obstacle of r voxels it falls by 1/r."""
 CREASE_REACH_MM = 0.8
-"""Longest way over which the slope may fall so: a Gaussian of 0.4 mm spreads it over that; the next vessel's own axis,
-where the slope rises again, is not much further from the ridge of a thin septum."""
+"""Longest way over which the slope may fall by that: a Gaussian of 0.4 mm spreads the fall over it; the next vessel's
+own axis, where the slope rises again, is not much further from the ridge of a thin septum."""
 CREASE_SLOPE = 0.7
 """Slope, by differences over the same way, beyond which there is no crease: on the ridge it is 0 between parallel
 vessels and the sine of half their angle in a fork; round the inner wall of a bend it is 1."""
 FOOT_STEPS = 64
 """Steps of half a voxel down the distance until a place in the wall is given up as belonging to no lumen."""
 FOOT_MM = 1e-9
-"""Distance from the level of a lumen's feet that is rounding: without it every third place was given up."""
+"""Difference from the distance at which feet end, mm, that is rounding: without it every third place was given up."""
 RIDGE_VOXELS = 0.05
 """Rise of the distance above both ends of a way, in voxels, that is a ridge: the chord of a foot's move along a wall
 that curves with two voxels of radius rises by a fifteenth of that."""
 DETOUR_MM = 1.5
-"""How far around two feet lumen may join them: a wire may cut a carina's edge by as much."""
+"""How far off the straight way between two feet lumen may still join them: a wire may cut off so much of a carina."""
 FLOOD_CELLS = 48
-"""Cells along the way of a flood at most, however fine the grid is."""
+"""Most cells along the way of a flood fill, however fine the grid is."""
 REFINE = 0.2
-"""Length of the steps tried next, over a rough one's: 1, 0.2 and 0.05 mm."""
+"""Length of the steps tried after a rough one, over its length: 1, 0.2 and 0.05 mm."""
 EASY = 6
-"""Iterations of a step that leads on along the same minimum: two to five."""
+"""Iterations that a step along the same minimum does not reach: it takes two to five."""
 SWIFT = 3
-"""Iterations up to which a step that gained energy is left alone: so it is where a jump of rest curvature passes the
-entry, at which the trapezium rule is wrong; of 16 hops that showed by a gain alone 12 took more."""
+"""Iterations up to which a gain of energy raises no doubt about a step: the trapezium rule is wrong where a jump of
+rest curvature passes the entry. Of 16 hops that showed by a gain alone, 12 took more iterations."""
 TOIL = 20
-"""Iterations of a step that a wire takes without hopping, mostly: by them alone 12 of 139 hops at sharp edges showed,
-and what a soft wire loses in a hop may be nothing. A stiff one must miss some work besides: it buckles in a sheath."""
+"""Most iterations that a step without a hop usually takes: 12 of 139 hops at sharp edges showed by them alone, and a
+soft wire may lose no energy in a hop. A stiff wire must also miss some work: it may merely buckle in a sheath."""
 SIGHT_SHARE = 0.5
-"""Least share of TOIL for a step that is kept short by what the tip sees: one of 0.25 mm hopped by 14 iterations."""
+"""Least share of TOIL for a step that is short only for what the tip sees: one of 0.25 mm hopped in 14 iterations."""
 WORK_SHARE = 0.01
 """Share of the hand's work in a hard step that may be missing from the wire's energy: the trapezium rule over 1 mm is
 right to that in most smooth steps, and where the wire found another minimum 0.016 and more were missing."""
@@ -159,26 +162,26 @@ ENERGY_SHARE = 5e-4
 LOSS_SHARE = 0.05
 """The same of what friction takes: its loads are known at the ends of a step only."""
 CHANGE_SHARE = 0.08
-"""The same of the change of the hand's force in a step of step_mm, times its way: that rule leaves 0.5 of it where a
-contact closes at once. Of 2,000 hard steps that short ones confirmed it lets 1,600 pass, of those that hopped none."""
+"""The same of the change of the hand's force times its way, in a step of step_mm: the trapezium rule is off by 0.5 of
+that where a contact closes at once. This passes 1,600 of 2,000 hard steps that short ones confirmed, and no hop."""
 GIVES = 0.1
-"""Share of that change which a hard step may miss or gain that ends with a smaller push: of 64 hops that went unseen in
-8,000 scenes 13 had more, and 950 steps that led on."""
+"""Share of that change that a hard step may miss or gain where it ends with a smaller push: in 8,000 scenes 13 of 64
+hops that went unseen had more, and 950 steps without a hop."""
 FURTHER = 1.05
-"""Way of a joint, over the hand's, from which a stiff wire did more than follow its base: all of these hops."""
+"""Way of a joint, over the hand's, above which a stiff wire did more than follow its base: all of these hops did."""
 STRANGE = 2.0
-"""How many times what may be missing, and all of that change, no step may miss or gain, however easy it was: 92 of 139
-hops at sharp edges did, many in two or three iterations, and 43 of 4,400 steps elsewhere."""
+"""No step, however easy, may miss or gain more than this many times what may be missing, plus all of that change: 92 of
+139 hops at sharp edges did, many in two or three iterations, and 43 of 4,400 steps elsewhere."""
 GAINED = 2.0
-"""What a stiff wire may gain over what it may lose: half of the hops at sharp edges, where the tip is lifted over a
-step that would have stopped it, gained more."""
+"""What a stiff wire may gain, as a multiple of what it may lose: half of the hops at sharp edges, where the tip is
+lifted over a step that would have stopped it, gained more."""
 SOFT_SHARE = 0.2
-"""Share of what a stiff wire may miss that is too much for a soft one, and for a stiff one beyond TOIL, whichever sign
-it has."""
+"""Share of what a stiff wire may miss that is too much, of either sign, for a soft one, and for a stiff one that took
+more than TOIL."""
 FREE_SHARE = 0.03
 """The same for a wire that is free to turn, or nearly so: it hops by losing next to nothing."""
 CRITICAL = 0.001
-"""Pivot below which the wire is about to give way, in whichever direction rounding says."""
+"""Pivot below which the wire is about to give way, in a direction that rounding decides."""
 FREE = 0.05
 """Pivot below which a wire is free to turn about the axis of a round vessel, or nearly so."""
 LOOSE = 0.006
@@ -191,26 +194,26 @@ SOFT = 0.5
 SOFT_TOLERANCE = 1e-4
 """Tolerance of a soft wire, over the one asked for: at 1e-9 of the energy such wires lay up to 0.04 mm off."""
 STIFF = 0.2
-"""Pivot above which a wire that was about to give way comes back to calm: in a round vessel it stays free to turn about
-the axis, and lies on the side that rounding chose."""
+"""Pivot above which a wire that was about to give way becomes certain again: in a round vessel it stays free to turn
+about the axis, and lies on the side that rounding chose."""
 SNAP_WAYS = 2.0
-"""A joint that moves by less than this over the way of the hand in a step is pushed, and does not snap."""
+"""A joint that moves in a step by less than this many times the hand's way is merely pushed, and does not snap."""
 SAME_WAY = 0.9
-"""Cosine between the ways of the hand, along and around a wire, above which friction goes on much as before."""
+"""Cosine of the angle between two moves of the hand (along, around the wire) above which friction hardly changes."""
 ELSEWHERE_MM = 0.1
 """A doubtful step in which no joint moved by more has not led the wire elsewhere: twice the finest step."""
 SOFTEST = 1e-9
-"""Push, a Levenberg term below 0, with which the search for a wire's softest way begins; one in a sphere
-yields to 3e-8."""
+"""Size of the negative Levenberg term with which the search for a wire's softest mode begins; a wire in a sphere gives
+way at 3e-8."""
 SLIGHT = 1e-4
-"""Turn, rad, by which that way is found: its square is nothing."""
+"""Turn, rad, from which that mode's displacements are computed: its square is negligible."""
 APART_MM = 0.01
-"""Distance of the joints from which two sides are two: what counts as elsewhere."""
+"""Largest distance between the joints of two wires above which they lie on two sides: what counts as elsewhere."""
 AS_LOW = 1e-3
-"""Difference of two energies, over either, that says nothing about which of two sides a wire takes: its stiffness is
-known to 1 % at best. In 6,000 insertions the sides that long and short steps took differed by up to 4e-4."""
+"""Relative difference of two energies that does not tell which of two sides a wire takes: its stiffness is known to 1 %
+at best. In 6,000 insertions the sides that long and short steps took differed by up to 4e-4."""
 UNDECIDED_MM = 5.0
-"""Way on which a wire is uncertain that took one of two sides: on 2.5 mm 4 more of 218,400 depths are off unflagged,
-and to the end, where both lie apart for so long, the flag would cover 5.15 % of them instead of 4.86 %."""
+"""Way, mm, on which a wire that took one of two sides is called uncertain. With 2.5 mm, 4 more of 218,400 depths are
+off without the flag; for as long as both sides lie apart, the flag would cover 5.15 % of them instead of 4.86 %."""
 CALM_MM = 2.5
-"""Way after a snap on which a wire may still lie otherwise than after shorter steps."""
+"""Way, mm, after a snap on which a wire may still lie elsewhere than after shorter steps."""

@@ -12,8 +12,8 @@ from solver.grid import read_only
 from solver.wire import GuideWire
 
 PIECES = 32
-"""Of a stretch in which stiffness changes and the rest shape is curved: the pair's rest curvature is no straight line
-there. Between EI of 1 and 1000 the sum is right to 1e-3."""
+"""Pieces of a stretch in which the stiffness changes and the rest shape is curved: there the pair's rest curvature is
+not linear. From an EI of 1 to one of 1000 the sum over the pieces is right to 1e-3."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def sleeve_of(wire: GuideWire, catheter: Catheter | None) -> Sleeve:
 
 
 def _both(own: Profile) -> tuple[Array, Array, Array]:
-    """Abscissae, stiffness and rest curvature of a wire on common abscissae, close where both matter."""
+    """Common abscissae, mm from the tip, with a wire's stiffness and rest curvature there; dense where both matter."""
     edges = np.unique(np.concatenate([[0.0], own.stiffness_at, own.rest_at]))
     rows = []
     for a, b in pairwise(edges):

@@ -1,7 +1,7 @@
-"""Creases: where between two lumens the distance stops to rise and falls again; nowhere else can a wire change lumens.
+"""Creases: where the distance between two lumens stops rising and falls again; only there can a wire change lumens.
 
 In an exact distance the slope falls at once. A Gaussian, or resampling to finer voxels, spreads that fall over as many
-voxels as the smoothing is wide: so it is looked for over ever longer ways.
+voxels as the smoothing is wide: so it is looked for over longer and longer distances.
 """
 
 from collections.abc import Iterator
@@ -34,9 +34,9 @@ def creases(values: Array, spacing_mm: Array) -> Marks:
 
 
 def _slabs(values: Array, halo: int) -> Iterator[tuple[int, Array]]:
-    """Slabs of a grid, with so many layers more on both sides, and the first layer of each.
+    """Slabs of a grid along its first axis, with ``halo`` more layers on both sides; each with its first layer's index.
 
-    What is made of one stays in the processor's own memory: a third of the time that it takes for a whole grid.
+    The arrays made of one slab stay in the processor's cache: a third of the time that a whole grid takes.
     """
     layers = max(SLAB // max(1, values[0].size), 4 * halo)
     for first in range(0, max(1, len(values) - 2 * halo), layers):
@@ -44,9 +44,9 @@ def _slabs(values: Array, halo: int) -> Iterator[tuple[int, Array]]:
 
 
 def _rounded(values: Array, spacing_mm: Array, voxels: int) -> NDArray[np.int64]:
-    """Voxels (n, 3) on which the slope falls within ``voxels`` of the finest axis to each side.
+    """Voxels (n, 3) at which the slope falls by ``tol.CREASE``, taken over ``voxels`` of the finest axis to each side.
 
-    Looked for at every other one of these ways' ends. Where the distance still rises one way there is no crease: round
+    Only places half that distance apart are tried. Where the distance still rises one way there is no crease: round
     the inner wall of a tight bend it falls to both sides along the vessel, but rises away from it.
     """
     way = voxels * float(spacing_mm.min())
@@ -60,7 +60,7 @@ def _rounded(values: Array, spacing_mm: Array, voxels: int) -> NDArray[np.int64]
 
 
 def _fallen(coarse: Array, spacing_mm: Array, stride: Voxel, reach: Voxel) -> NDArray[np.int64]:
-    """The same on every so manieth voxel of a slab, for ways of so many of these."""
+    """The same in a slab of every ``stride``-th voxel, as its indices (n, 3), over ``reach`` of these to each side."""
     inner = [slice(n, size - n) for n, size in zip(reach, coarse.shape, strict=True)]
     middle = coarse[tuple(inner)]
     if 0 in middle.shape:
@@ -80,7 +80,7 @@ def _fallen(coarse: Array, spacing_mm: Array, stride: Voxel, reach: Voxel) -> ND
 
 
 def _mark(marks: Marks, values: Array, where: NDArray[np.int64], near: int) -> None:
-    """Mark the blocks within ``near`` voxels of some of them (n, 3)."""
+    """Mark the blocks that lie within ``near`` voxels of the voxels ``where`` (n, 3)."""
     for corner in product((-near, near), repeat=3):
         block = np.clip(where + corner, 0, np.array(values.shape) - 1) // tol.CREASE_BLOCK
         marks[tuple(block.T)] = 1

@@ -1,4 +1,4 @@
-"""A crew: eight lanes that work for a pool of insertions from a queue; other threads' crews take from it too."""
+"""A crew: eight lanes that work for a pool of insertions from a queue; crews in other threads take from it as well."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -48,9 +48,9 @@ def _next(queue: deque[Job]) -> Job | None:
 
 
 class Crew:
-    """Room for eight wires in lanes, and for what a pool of them finds. Whoever makes it holds the insertions.
+    """Memory for eight wires in lanes, and for the results of a pool of wires. The caller holds the insertions' locks.
 
-    share : how many of the jobs this crew is to do, about.
+    share : about how many of the jobs this crew is to do.
     """
 
     def __init__(self, jobs: Sequence[Job], share: int) -> None:
@@ -62,7 +62,7 @@ class Crew:
         self.plan = _plan(self.most, max(map(len, nodes)), max(map(sum, nodes)))
         axes = {"k": max(size, 1), "n": max(size, 1) + 1, "p": int(self.first[-1])}
         block = Block(*(room(*(axes.get(axis) or int(axis) for axis in shape.split())) for shape in SHAPES))
-        # one more, which the last of a list is followed by
+        # one more: the lists are written one place beyond their last entry
         self.block = block._replace(asked=np.zeros((3, WIDTH * axes["p"] + 1 + WIDTH), np.int64))
         kinds = LANE, records.DESCENT, records.COUNTERS
         self.notes = tuple(np.zeros(POOL + 1, kind).view(np.recarray) for kind in kinds)
@@ -101,7 +101,7 @@ def first_points(work: Workspace, size: int) -> NDArray[np.int64]:
 
 
 def _plan(wires: int, most: int, rows: int) -> Plan:
-    """Room for what some wires find at up to so many depths, with so many joints in all."""
+    """Room for the results of ``wires`` wires, each at up to ``most`` depths with up to ``rows`` joints in all."""
     goal, row, count = np.zeros((wires, most, 2)), np.zeros((wires, most), np.int64), np.zeros(wires, np.int64)
     x, r, force = np.zeros((wires, rows, 3)), np.zeros((wires, rows, 3, 3)), np.zeros((wires, rows, 3))
     kinds = (records.PLACE, records.REPORT, records.ENERGIES, records.COUNTERS)
@@ -117,7 +117,7 @@ def _solutions(plan: Plan, w: int, radius_mm: float) -> list[Solution]:
     noted = zip(*(getattr(plan, name)[w, : plan.count[w]].tolist() for name in names), strict=True)
     found = []
     for n, (*notes, (outcome, iterations, k), row) in enumerate(noted):
-        # copies: the next wire comes to lie there
+        # copies: the next wire's results overwrite these
         arrays = [a[w, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
         depth, roll, *_ = notes[0]
         ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, radius_mm

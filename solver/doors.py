@@ -1,7 +1,7 @@
-"""Doors: what comes in from outside is looked at once, where it comes in, and refused by name.
+"""Doors: every argument from outside is checked once, where it comes in, and refused by name.
 
-numpy makes numbers of much that is none: of "12", of a mask, of a masked array whose mask it drops, of [5.0] for three
-depths. A wrong number of that kind is a wrong wire that is called converged, so only numbers are taken for numbers.
+numpy turns much into numbers that is none: "12", a mask, a masked array (dropping its mask), [5.0] for three depths.
+Such a number gives a wrong wire that is called converged, so only numbers are accepted as numbers.
 """
 
 import math
@@ -48,7 +48,7 @@ def number(what: str, name: str, value: object, allowed: Range) -> float:
 
 
 def _float(value: object) -> float:
-    """What is a number as a float, NaN for what is none."""
+    """A number as a float; NaN for anything that is not a number."""
     scalar = isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"
     if isinstance(value, (bool, np.ma.MaskedArray)) or not (scalar or isinstance(value, Real)):
         return math.nan

@@ -29,7 +29,7 @@ DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
 FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
 SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
 SEPTUM_SAMPLES = 17
-"""Places on a way through a septum, which is at most two voxels' diagonals long."""
+"""Places on a straight way across a septum, which is at most four voxel diagonals long."""
 ONE_AT_A_TIME = "finish one call before the next, or go on with insertion.clone()"
 
 
@@ -40,15 +40,15 @@ class Insertion:
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
     "translate" (the seed's section 4.1).     step_mm, roll_step_deg : longest step.
-    finest_mm : length of the steps down to which a step is taken again that the hand's work does not account for;
-    step_mm or more: never.
+    finest_mm : a step whose change of energy does not match the hand's work is repeated in shorter ones, down to this
+    length; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
     tip_load_N : (3,) dead force on the tip.     down : (3,) LPS, where the wire's weight pulls.
     catheter : over the wire, see ``to_depths``.
-    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists by GJ, and the tip is
-    behind the hand.     shaft_friction_N : what it takes to slide or turn that shaft, force at its surface.
-    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion is
-    where it is: ``clone`` makes branches, ``pickle`` checkpoints, and it goes one way at a time (see ``to_depths``).
+    shaft_mm : length of wire between the hand and the entry, the same at every depth: it twists (stiffness GJ), so the
+    tip lags behind the hand.     shaft_friction_N : force at its surface that it takes to slide or turn that shaft.
+    Raises ValueError for arguments that cannot be used; whatever happens on the way is a Status. An insertion has one
+    state and moves one way at a time (see ``to_depths``): ``clone`` makes branches, ``pickle`` checkpoints.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Insertion:
 
     @property
     def roll_deg(self) -> float:
-        """Where the base is turned to."""
+        """Roll of the base, degrees."""
         return float(self._work.place["roll"][0])
 
     @property
@@ -120,19 +120,19 @@ class Insertion:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
         depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base.     catheter_mm : the
-        catheter's tip beyond the entry, no deeper than the wire's; each one for all or one per depth. From depth to
-        depth wire, roll and catheter go on in proportion; push_force_N is the wire's hand's, with the catheter held.
-        Each call says both anew: left out, the base is turned and the catheter pulled back to 0.
+        catheter's tip beyond the entry, no deeper than the wire's; both are one for all or one per depth. Between two
+        depths wire, roll and catheter advance in proportion; push_force_N acts on the wire, with the catheter held.
+        Each call sets both anew: left out, the base is turned back to 0 and the catheter pulled back to 0.
         A depth that cannot be reached yields the last good state with its own depth and a status.
-        The arguments are looked at at once. The first depth of a call ends the calls before it: what is left of them,
-        and a call while another thread is at work, is a RuntimeError.
+        The arguments are checked at once. The first depth of a call ends the calls before it: going on with one of
+        those raises RuntimeError, and so does a call while another thread moves this wire.
         """
         return self._each(*self._goals(depths_mm, roll_deg, catheter_mm))
 
     def _goals(
         self, depths_mm: Iterable[float], roll_deg: float | Sequence[float], catheter_mm: float | Sequence[float] = 0.0
     ) -> tuple[list[float], list[float], list[float]]:
-        """Depths, and a roll and a place of the catheter's tip for each, or a refusal of what cannot be one."""
+        """Depths, mm, and for each a roll, degrees, and the catheter's tip, mm; ValueError where one is refused."""
         if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
         depths = _list("depths_mm", depths_mm, DEPTH_MM)
@@ -149,7 +149,7 @@ class Insertion:
         return depths, rolls, tips
 
     def _look_ahead(self, depths: list[float], rolls: list[float], tips: list[float]) -> None:
-        """Refuse ways that would take for ever; from now on those that are long can be interrupted."""
+        """Refuse ways that would take too long; from now on Ctrl-C can interrupt a long way."""
         here = Goal(self.depth_mm, self.roll_deg if self._started else rolls[0], self.catheter_mm)
         for goal in map(Goal, depths, rolls, tips):
             if self._reaches(goal.depth):
@@ -182,7 +182,7 @@ class Insertion:
         self._lock.release()
 
     def _begin(self, depths: list[float], rolls: list[float]) -> object:
-        """Make room for all of a way at once, and end the ways before it; return what tells it from others."""
+        """Make room for all depths of a call and end the calls before it; return an object that stands for this one."""
         self._work.reserve(max((d for d in depths if d < self._too_long), default=0.0))
         if not self._started and rolls:
             # a wire that is not yet in the lumen has no history: it starts at its first roll
@@ -239,7 +239,7 @@ def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[floa
 
 
 def _each_of(name: str, values: float | Sequence[float], allowed: Range, count: int) -> list[float]:
-    """One number for each of so many depths, from one for all or from a list of them."""
+    """A list of ``count`` numbers, one per depth, from one number for all or from a list of them."""
     if not (isinstance(values, (list, tuple, np.ndarray)) and np.ndim(values) > 0):
         return [number("insertion", name, values, allowed)] * count
     each = _list(name, values, allowed)
@@ -249,7 +249,7 @@ def _each_of(name: str, values: float | Sequence[float], allowed: Range, count: 
 
 
 def _list(name: str, values: Iterable[float], allowed: Range) -> list[float]:
-    """Numbers one by one: numpy would take a truth value among them for one."""
+    """A list of numbers, each checked by itself: numpy would turn a truth value among them into 1.0."""
     if isinstance(values, np.ndarray):
         return [float(v) for v in numbers("insertion", name, values, (None,), allowed)]
     return [number("insertion", name, value, allowed) for value in values]
@@ -265,10 +265,11 @@ def _refused(wall: VesselWall, entry: Array) -> Status | None:
 
 
 def _in_septum(wall: VesselWall, entry: Array, outside: float, reach: float) -> bool:
-    """Whether a point that lies ``outside`` mm in the wall has lumens on its sides that are not one and the same.
+    """Whether the lumen around a point that lies ``outside`` mm deep in the wall is in two or more separate parts.
 
-    One and the same are those between which the straight ways do not rise to where the point lies, from one to the
-    next: so it is around a hole of a voxel, at the parting of two vessels, and beside the inner wall of a bend.
+    Of 26 places ``reach`` mm away, those in the lumen; two are joined where the distance on the straight way between
+    them stays below half of ``outside``. Around a hole of one voxel, where two vessels part, and beside the inner wall
+    of a bend all are joined, directly or through others.
     """
     ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)]) - 1.0
     ends = entry + reach * ways / np.linalg.norm(ways, axis=1, keepdims=True)

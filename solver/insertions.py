@@ -31,12 +31,12 @@ MOST_THREADS = 4096
 class Insertions:
     """Insertions that go their ways at the same time, each with its own wire, wall, clamp, depths and rolls.
 
-    insertions : they may have gone some way already, and may go on by themselves afterwards. Wires whose walls are made
-    from one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes; each comes to lie as by
-    itself, to rounding (1e-9 mm, away from snaps); straight wires, which by themselves are swept without their roll, in
-    1 % of depths to what the tolerance of a relaxation leaves (1e-5 mm). With friction, a finite torsional stiffness, a
-    sampled hull, a shaft, a weight, no wall or the closed form each goes by itself.
-    threads : how many of them to use (default: one a core); Python's lock is not held.
+    insertions : they may have gone some way already, and may go on alone afterwards. Wires whose walls are made from
+    one another by ``VesselWall.like`` go in lock-step, POOL of them in WIDTH lanes. Each ends where it would alone, to
+    rounding (1e-9 mm, away from snaps); a straight wire, which alone is swept without its roll, in 1 % of depths to the
+    tolerance of a relaxation (1e-5 mm). Insertions with friction, a finite torsional stiffness, a sampled hull, a
+    shaft with friction, a weight, no wall or the closed form go alone.
+    threads : how many to use (default: one per core); they run without Python's global lock.
     Raises ValueError where one insertion is given twice, or with a catheter.
     """
 
@@ -82,9 +82,9 @@ class Insertions:
 
 
 def _outlast(running: list[Future[None]], waiting: Iterable[deque[Job]]) -> None:
-    """Wait for threads to end, however often Ctrl-C is pressed: a wire given back before moves on under its next user.
+    """Wait for threads to end, however often Ctrl-C is pressed: they would still move a wire that is released earlier.
 
-    After the first time they take no more jobs; those that they are at go on to their ends.
+    After the first Ctrl-C they take no more jobs, but finish those begun; then KeyboardInterrupt is raised.
     """
     pressed = None
     while not all(task.done() for task in running):
@@ -101,7 +101,7 @@ def _outlast(running: list[Future[None]], waiting: Iterable[deque[Job]]) -> None
 
 
 def _tasks(kind: deque[Job], threads: int) -> list[Callable[[], None]]:
-    """What to do in threads for jobs of one kind."""
+    """The calls, each for a thread of its own, that do all jobs of one kind."""
     if len(kind) == 1:
         return [partial(go_alone, kind[0])]
     crews = min(threads, -(-len(kind) // WIDTH))

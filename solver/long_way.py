@@ -1,6 +1,6 @@
 """Long ways: what would take hours is refused where it is asked for, what takes seconds can be interrupted.
 
-A kernel hears no Ctrl-C, and a free wire that rests step after step uses up no iterations.
+Ctrl-C does not reach a compiled kernel, and no limit on iterations ends the way of a free wire, which needs none.
 """
 
 import math
@@ -23,7 +23,7 @@ class Goal(NamedTuple):
 
 
 def nearby(step_mm: float, turn_deg: float, segment_mm: float) -> tuple[float, float]:
-    """Depth, mm, and roll, degrees: no way between places within them is long, and a short step is not asked twice."""
+    """Depth, mm, and roll, degrees, within which no way is long (``tol.LONG_WAY``): such a way needs no check."""
     depth = math.sqrt(0.25 * tol.LONG_WAY * min(step_mm, segment_mm) * segment_mm)
     return depth, 0.25 * tol.LONG_WAY * turn_deg / (1.0 + depth / segment_mm)
 
@@ -57,7 +57,7 @@ def advance(work: Workspace, here: Goal, there: Goal) -> tuple[Status, int]:
             return task.result()
         except KeyboardInterrupt:
             while not task.done():
-                # the budget is used up: the kernel looks after each step, and may be adding to it just now
+                # call the budget used up until it ends: the kernel checks it after each step, and may just add to it
                 work.counters["passed"] = work.limits.work
                 wait([task], timeout=0.05)
             raise

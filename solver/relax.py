@@ -53,7 +53,7 @@ def base_frame(direction: Array, material_axis: ArrayLike | None, roll_deg: floa
 
 
 def weight_of(what: str, wire: GuideWire, down: ArrayLike | None) -> Array:
-    """What a mm of the wire weighs, (3,) N/mm; ValueError where it weighs something and nobody said where down is."""
+    """Weight of the wire as a vector (3,), N/mm; ValueError where it has a weight but ``down`` is not given."""
     if down is not None:
         return unit(what, "down", down) * wire.weight_N_per_mm
     if wire.weight_N_per_mm > 0.0:
@@ -90,7 +90,7 @@ class Settings:
 
     @property
     def limits(self) -> Limits:
-        """The same for the kernels."""
+        """These settings as the kernels take them."""
         method, count = METHODS.index(self.method), int(self.max_iterations)
         sweeps = tol.SWEEPS_PER_ITERATION if method == CLOSED_FORM else 1
         return Limits(method, float(self.tolerance), count * sweeps, tol.WORK + tol.WORK_PER_ITERATION * count)
@@ -113,7 +113,7 @@ def relax(
     max_iterations: int = 200,
     quadrature: str = "tip",
 ) -> Solution:
-    """Relax one wire from a start shape, with optional dead loads and no wall if there is none.
+    """Relax one wire from a start shape, under optional dead loads, in a wall or (``wall=None``) in free space.
 
     depth_mm : length beyond the entry.     start_mm : (m, 3) polyline from the entry that the wire is laid along
     before it relaxes (straight along entry_direction by default); friction acts against leaving it.
@@ -139,7 +139,7 @@ def relax(
 
 
 def _polyline(points: ArrayLike, entry: Array, within_mm: float) -> Array:
-    """A start shape as an array (m, 3) mm, without points that repeat the one before; ValueError where it is none."""
+    """A start shape as an array (m, 3) mm, without repeated points; ValueError where it is no curve from the entry."""
     curve = numbers("relax", "start_mm", points, (None, 3), ANYWHERE_MM)
     apart = np.linalg.norm(np.diff(curve, axis=0), axis=1) > tol.MATCH_DEPTH_MM
     curve = np.asarray(curve[np.append(True, apart)[: len(curve)]])

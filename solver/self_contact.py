@@ -10,7 +10,7 @@ from solver.grid import Array
 
 
 def self_overlap_mm(joints_mm: ArrayLike, radius_mm: float) -> float:
-    """How deep a wire of a radius lies in itself, mm; 0 where it does not.
+    """How deep a wire of this radius overlaps itself, mm; 0 where it does not.
 
     joints_mm : (k + 1, 3), entry to tip. Two places count where the way between them along the wire is longer than
     pi radii: a smooth wire that bends no tighter than its own radius comes within two radii of itself nowhere else.

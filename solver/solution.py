@@ -44,10 +44,10 @@ class Status(Enum):
 
 
 class Snap(NamedTuple):
-    """An event: between two depths, mm, the wire gave way. moved_mm : the largest way of a joint.
+    """An event: the wire gave way between two depths, mm. moved_mm : largest displacement of a joint.
 
-    other_mm : how far off, mm, it would lie on the other of two sides, at an energy that is the same to 0.1 %; 0 where
-    no other was found. Which one it took says nothing: all that follows holds for that side, until both meet again.
+    other_mm : distance, mm, to a second rest shape on the other side, whose energy is the same to 0.1 %; 0 where none
+    was found. Which of the two the wire took is arbitrary: what follows holds for that side, until both meet again.
     """
 
     from_mm: float
@@ -65,20 +65,20 @@ class Solution:
     frames : (k + 1, 3, 3), columns are material axes 1, 2 and the direction of the segment before the joint.
     energy_N_mm : total, loads included (the wire's weight as seen from the entry); bending_energy_N_mm,
     wall_energy_N_mm : its parts.
-    friction_energy_N_mm : what friction took on the way here from the depth before, over all steps; no part of it.
+    friction_energy_N_mm : lost to friction on the way from the depth before, over all steps; not in energy_N_mm.
     contact_force_N : (k + 1, 3), the wall's force on the wire at each joint.
     reaction_force_N : (3,), the introducer's force on the wire; reaction_torque_N_mm : its torque about the axis.
-    push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : hull beyond the lumen.
+    push_force_N : the hand's axial force, dU/d(depth).     max_penetration_mm : deepest overlap of hull and wall.
     counts : in the order of ``_kernels.records.COUNTERS``, see ``work``.
     start_energy_N_mm : total energy that the last relaxation began with.
-    least_pivot : distance to instability: the least, over the joints, of the stiffness that is left where all beyond
-    are free to follow, over the joint's own. 1 for a free wire, 0 where it snaps; below 0.5 it is soft, below 0.05 it
+    least_pivot : distance to instability: the least pivot of a joint, which is its stiffness with all joints beyond it
+    free to follow, over its own stiffness. 1 for a free wire, 0 where it snaps; below 0.5 it is soft, below 0.05 it
     nearly gives way, or is free to turn about a round vessel's axis; a wall that holds it makes it more than 1.
-    dissipated_N_mm : the hand's work on the way to this depth less the change of energy, by the trapezium rule over
-    each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) off by half the jump times
-    the step, and negative then. With friction it holds friction_energy_N_mm.     snaps : events on that way.
-    uncertain : the wire snapped, was about to, took one of two sides that are as good, or lay elsewhere after long
-    steps than after short ones, here or a few mm before (as long as it stays soft): shorter steps may lead elsewhere.
+    dissipated_N_mm : the hand's work on the way to this depth minus the change of energy. The work is integrated by the
+    trapezium rule over each step: where the push jumps (a jump of rest curvature or stiffness passes the entry) it is
+    off by half the jump times the step, perhaps below 0. It includes friction_energy_N_mm.     snaps : on that way.
+    uncertain : shorter steps may lead elsewhere: here or a few mm before (longer while it stays soft) the wire snapped,
+    was about to, took one of two equally good sides, or went elsewhere in long steps than in short ones.
     radius_mm : the wire's.
     """
 
@@ -111,8 +111,8 @@ class Solution:
     ) -> Self:
         """A solution from joints, frames and forces, and what the kernels noted.
 
-        notes : ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of ``records.SNAP``, the
-        first of which count.     ended : status, iterations, depth, mm, roll, degrees, and the wire's radius, mm.
+        notes : ``records.PLACE``, ``REPORT``, ``ENERGIES`` and ``COUNTERS``.     snaps : (n,) of ``records.SNAP``; the
+        first ``PLACE.snaps`` are valid.     ended : status, iterations, depth, mm, roll, degrees, wire's radius, mm.
         """
         place, (start, penetration, push, force, torque, *_, pivot), (bending, wall, *_), counts = notes
         _, _, energy, *_, dissipated, calm, rubbed, _, _, _, _, stored, snapped = place
@@ -169,11 +169,11 @@ class Solution:
 
     @cached_property
     def self_overlap_mm(self) -> float:
-        """How deep the wire lies in itself, mm: its parts do not feel each other. Computed when it is asked for."""
+        """How deep the wire overlaps itself, mm: the energy has no self-contact. Computed when it is first read."""
         return self_overlap_mm(self.joints_mm, self.radius_mm)
 
     def __repr__(self) -> str:
-        """What one wants to know first."""
+        """Status, depth, tip and push."""
         name, tip = self.status.identifier, ", ".join(f"{x:.2f}" for x in self.joints_mm[-1])
         doubt = ", uncertain" if self.uncertain else ""
         return f"Solution({name} at {self.depth_mm:g} mm{doubt}, tip [{tip}] mm, push {self.push_force_N:.3g} N)"

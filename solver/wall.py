@@ -22,10 +22,10 @@ MAKE_A_DISTANCE = (
 
 
 def _is_mask(values: Array, least: float, largest: float) -> bool:
-    """Whether values are those of a mask, whatever its two numbers are, or of the signs of a distance: one, two, three.
+    """Whether values (nx, ny, nz) are a mask, of any two numbers, or the signs of a distance: three values at most.
 
-    A lumen thinner than a voxel may have no negative value, and one that fills a few voxels but one: a distance has
-    more values than that where there are four voxels along each axis, or is one value everywhere.
+    Their signs prove nothing: a lumen thinner than a voxel may have no negative value, one of a few voxels only one.
+    A distance on four or more voxels along each axis has more than three values, or the same value everywhere.
     """
     if least == largest:
         return least in (0.0, 1.0)
@@ -36,7 +36,7 @@ def _is_mask(values: Array, least: float, largest: float) -> bool:
 
 
 def _checked(grid: Grid) -> Array:
-    """The distances as float64, or a refusal of what no distance can be."""
+    """The distances as a new float64 array; ValueError where they cannot be signed distances in mm."""
     if grid.values.dtype.kind != "f":
         found, allowed = Found(f"values of type {grid.values.dtype}"), "floating-point signed distances in mm"
         refuse("wall", "distance", found, allowed, MAKE_A_DISTANCE)
@@ -131,7 +131,7 @@ class VesselWall:
         return int(count)
 
     def hull_points(self, radius_mm: float) -> tuple[Array, float]:
-        """Offsets (h, 2) across a wire of this radius where the distance is looked up, and what is added to it."""
+        """Offsets (h, 2), mm, across a wire of this radius at which the distance is looked up, and mm to add to it."""
         radius_mm = number("wall", "radius_mm", radius_mm, Range(0.0, 1e3, "0.18 is a 0.014 inch wire"))
         if self.samples == 0:
             return np.zeros((1, 2)), radius_mm

@@ -30,7 +30,7 @@ WIRE = GuideWire(0.5, 0.1, 1.0, rest_curvature_per_mm=0.2)
 
 @contextmanager
 def no_collection() -> Iterator[None]:
-    """Without the garbage collector: the compiler makes millions of objects, and looking through them is an eighth."""
+    """Switch the garbage collector off: scanning the compiler's millions of objects takes an eighth of the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -43,7 +43,7 @@ def no_collection() -> Iterator[None]:
 def warm_up(*, beside: bool = False) -> None:
     """Compile every kernel (about half a minute, once per installation; later calls read the cache).
 
-    beside : all but Newton's method and the way to a depth is compiled by a process of its own, at the same time.
+    beside : a second process compiles everything but Newton's method and ``advance`` at the same time.
     """
     instance("solver", "beside", beside, bool)
     with no_collection():
@@ -53,12 +53,12 @@ def warm_up(*, beside: bool = False) -> None:
         with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_beside()"]):
             # while the other process makes what ``advance`` needs besides
             _compile(newton_method.iterate)
-            # a wall has no types of its own
+            # without a wall the kernels' arguments have the same types as with one
             relax(WIRE, None, depth_mm=1.0)
 
 
 def compile_beside() -> None:
-    """Compile what is kept on disk and can wait there for ``advance``, then what only a wall needs."""
+    """Compile the kernels that ``advance`` can take from disk, then those that only a wall needs."""
     with no_collection():
         # the long ones first: what is not there in time is compiled twice
         _compile(through_wall, push_force, settle, closed_form.iterate, lay_along, set_out)
@@ -67,7 +67,7 @@ def compile_beside() -> None:
 
 
 def _compile(*kernels: Any) -> None:
-    """Compile kernels for arguments of the kinds that their parameters' names say."""
+    """Compile kernels for the argument types that go with their parameters' names."""
     work = Workspace(WIRE, None, "tip", Settings().limits)
     work.clamp(np.zeros(3), np.eye(3))
     known = {
@@ -94,7 +94,7 @@ def _compile(*kernels: Any) -> None:
 
 
 def _wall() -> VesselWall:
-    """Make a wall and ask it."""
+    """Make a wall and look a distance up in it, which compiles its kernels."""
     wall = VesselWall(Grid(np.full((4, 4, 4), -1.0)), 1.0)
     wall.look_up([[0.0, 0.0, 0.0]])
     return wall

@@ -48,7 +48,7 @@ class GuideWire:
     bending_stiffness_N_mm2, rest_curvature_per_mm : a number, rows [distance from tip, value] (linear between,
     constant beyond, two equal distances make a jump), or a callable of an array of distances.
     torsional_stiffness_N_mm2 : inf is ideal torque control (the seed's assumption).
-    weight_N_per_mm : in blood, less what it displaces (7e-6 for 0.36 mm of steel); 0 is left out of everything.
+    weight_N_per_mm : weight in blood, buoyancy subtracted (7e-6 for 0.36 mm of steel); 0 leaves gravity out.
     Positive rest curvature bends the wire towards material axis 1.
     """
 
@@ -77,7 +77,7 @@ class GuideWire:
         object.__setattr__(self, "profile", profile)
         for name, (at, values) in (("bending_stiffness_N_mm2", bend), ("rest_curvature_per_mm", rest)):
             if np.ndim(getattr(self, name)) > 0:
-                # not the caller's array, which may yet change
+                # a copy: the caller may still change the array that was given
                 object.__setattr__(self, name, read_only(np.column_stack([at, values])))
 
     def __reduce__(self) -> tuple[type["GuideWire"], tuple[Quantity, ...]]:
@@ -95,11 +95,11 @@ class GuideWire:
 
     @property
     def twists(self) -> bool:
-        """The torsional stiffness is finite (and the rest shape curved: otherwise no torque arises)."""
+        """Whether the torsional stiffness is finite."""
         return math.isfinite(self.torsional_stiffness_N_mm2)
 
     def segments_at(self, depth_mm: float) -> tuple[int, float]:
-        """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
+        """Number of segments at a depth, and length of the first, mm: ½ to 1½ segments, less if the depth is."""
         most = Range(0.0, tol.MOST_JOINTS * self.segment_mm, "use longer segments")
         count, first = segments_at(number("wire", "depth_mm", depth_mm, most), float(self.segment_mm))
         return int(count), float(first)

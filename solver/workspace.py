@@ -53,11 +53,11 @@ NO_FIELD = data.Field(
 """A stand-in where there is no wall; it is never looked up."""
 
 SNAPS_KEPT = 16
-"""Of one depth."""
+"""Snaps that are kept of one depth."""
 
 
 class Workspace:
-    """Room for a chain of up to ``capacity`` segments, and the chain of the moment, of k segments, in slot CURRENT.
+    """Memory for a chain of up to ``capacity`` segments; slot CURRENT holds the present chain, of k segments.
 
     problem, table, limits, place, report, force : see ``_kernels.handle.Contents``.
     """
@@ -202,16 +202,16 @@ class Workspace:
         self.handle = handle_of(Contents(self.problem, self.table, *settings, self.place, self.report, self.force))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a checkpoint holds: the wall has the field already, and numba's handle is of this process."""
+        """What a checkpoint holds: not the field, which the wall has, nor the handle, valid in this process only."""
         state = vars(self) | {"problem": self.problem._replace(field=NO_FIELD), "version": _VERSION}
         return {name: value for name, value in state.items() if name not in ("handle", "counts", "field")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take a checkpoint up, where the solver is the one that made it: its arrays mean the same then."""
+        """Restore a checkpoint; ValueError where another version of the solver made it, with other arrays perhaps."""
         if state.pop("version") != _VERSION:
             raise ValueError("insertion: checkpoint: made by another version of the solver; insert the wire anew")
         vars(self).update(state)
-        # the same arrays, and as read-only as they were: to numba that is a type
+        # the wire's and the wall's own arrays, which are read-only: numba's types tell that apart
         self.field = self.wall.field if self.wall is not None else NO_FIELD
         self.problem = self.problem._replace(field=self.field)
         made = sleeve_of(self.wire, self.catheter)

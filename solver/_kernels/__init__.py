@@ -1,6 +1,6 @@
 """Every compiled function of the solver. In: named tuples of arrays and scalars. Out: numbers, or filled arrays.
 
-flags            the six decorators                     data             what the kernels hand to each other
+flags            the eight decorators                   data             what the kernels hand to each other
 algebra          3x3 matrices as tuples of scalars      rotation         exponential map and its derivatives
 field            the interpolated signed distance       wall_law         energy, force, curvature of the wall
 chain            a wire cut into segments               friction         Coulomb friction as a potential
@@ -13,7 +13,8 @@ start            the wire laid along a curve            insertion        the ste
 handle           what these work on, behind one pointer shaft            the wire between hand and entry
 septum           whether the wire left its lumen        snaps            energy that a step released
 saddle           the way off a saddle                   trial            a share of the step, and the energy there
-records          what the kernels note
+records          what the kernels note                  forks            whether there is a rest shape on another side
+sleeve           the catheter over the wire
 
 lanes            several wires side by side, in the processor's vectors, by the same formulas
 bare             arrays without reference counts

@@ -1,6 +1,6 @@
 """Arrays without their reference counts: each change of one is an atomic instruction, 5 ns, and there are forty arrays.
 
-Who calls the kernels keeps the arrays alive.
+Whoever calls the kernels must keep the arrays alive.
 """
 
 from typing import Any
@@ -31,5 +31,5 @@ def _stripped(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 @extend.intrinsic
 def bare(_: Any, kept: Any) -> Any:
-    """The same array, or tuple of whatever, but no reference to the arrays in it."""
+    """The same array, or tuple of anything, without reference counts for the arrays in it."""
     return typing.signature(kept, kept), lambda context, builder, __, args: _stripped(context, builder, kept, args[0])

@@ -108,7 +108,7 @@ def node_gradient(problem: Problem, slot: int, n: int, frame: Nine) -> tuple[Thr
     """Gradient of everything that acts on a node and its segment: (δp, δr), in the frame of the node."""
     chain, state = problem.chain, problem.state
     load, f, g = load3(chain.load, n), ZERO3, ZERO3
-    # the tip alone bears one, as a rule
+    # as a rule only the tip is loaded
     if load != ZERO3:
         f = scaled(-1.0, apply_transposed(frame, load))
     for p in range(chain.first[n], chain.first[n + 1]):
@@ -232,7 +232,7 @@ def note_direction(q: Six, j: int, least: float, report: Any) -> None:
 
 @inlined
 def note_pivot(lowest: float, first_free: int, damping: float, report: Any) -> None:
-    """Keep the least pivot of a sweep; one that left joints near the base out knows only of the others."""
+    """Keep the least pivot of an undamped sweep; one that left out joints near the base can only lower it."""
     if damping == 0.0:
         report.pivot = lowest if first_free == 0 else min(lowest, report.pivot)
 

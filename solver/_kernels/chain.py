@@ -15,7 +15,7 @@ GAUSS = 1 / math.sqrt(3.0)
 
 @kernel
 def integral(at: Any, value: Any, s: float, reciprocal: bool) -> float:
-    """Integral from 0 to s of a piecewise linear function, or of one over it (exact on every piece)."""
+    """Integral from 0 to s of a piecewise linear function, or of its reciprocal (exact on every piece)."""
     total, start = 0.0, 0.0
     n = at.size
     for i in range(n + 1):
@@ -70,7 +70,7 @@ def tabulate(profile: Profile, segment_mm: float, cells: Any) -> None:
 
 @entry_point
 def segments_at(depth_mm: float, segment_mm: float) -> tuple[int, float]:
-    """Number of segments at a depth and length of the first one, which is ½ to 1½ segments long."""
+    """Number of segments at a depth, and length of the first, mm: ½ to 1½ segments, less if the depth is."""
     if depth_mm <= 0.0:
         return 0, 0.0
     whole = max(math.floor(depth_mm / segment_mm - 0.5 + 1e-12), 0)
@@ -103,8 +103,8 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
 def weigh(chain: Chain, weight: Any, k: int) -> None:
     """Add the wire's own weight, (3,) N/mm, to the loads: half of each segment's to either end, exact for a rigid one.
 
-    Node 0, which stays where it is, gets the opposite of all the others': so the energy counts from the entry, and
-    what comes in there brings none.
+    Node 0, which stays where it is, gets minus the sum of all others: so the energy is counted from the entry, and wire
+    that comes in there adds none.
     """
     if weight[0] == 0.0 and weight[1] == 0.0 and weight[2] == 0.0:
         return

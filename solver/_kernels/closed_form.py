@@ -128,7 +128,7 @@ def propose(problem: Problem, slot: int, k: int, share: float) -> None:
 
 @kernel
 def settled(problem: Problem, slot: int, k: int, tolerance: float, report: Any) -> bool:
-    """Whether a state is a minimum: no way down left in Newton's decrement, and no moment to speak of."""
+    """Whether a state is a minimum: Newton's decrement and the residual moments are negligible."""
     minimal = sweep(problem, slot, 0, k, 0.0, report)
     problem.scratch.counters[0].sweeps += 1
     costate(problem, slot, k, report)

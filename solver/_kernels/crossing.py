@@ -29,7 +29,7 @@ def crossed(problem: Problem, slot: int, k: int) -> bool:
 
 @kernel
 def free_fraction(field: Field, a: Three, b: Three, way: float) -> float:
-    """Fraction of the way from a to b that is free of a wall to pass through; 1 if all of it is."""
+    """Fraction of the straight way from a to b, ``way`` mm long, up to a wall that it passes through; 1 if none."""
     here, last = distance_at(field, a, 0.0, b), distance_at(field, a, 1.0, b)
     limit = max(here, last, 0.0) + tol.HOP_VOXELS * field.spacing
     steps = math.ceil(2 * way / field.spacing)
@@ -52,9 +52,9 @@ def distance_at(field: Field, a: Three, t: float, b: Three) -> float:
 
 @kernel
 def free_way(field: Field, tip: Three, along: Three, step: float, rise: float) -> float:
-    """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall (or beyond it).
+    """How far the tip may go straight on, mm: until its axis is ``rise`` mm deeper in the wall, or passes through it.
 
-    Never less than a quarter of that, so that a jammed tip still presses on.
+    Never less than a quarter of ``rise`` (or the whole step), so that a jammed tip still presses on.
     """
     end = mix(1.0, tip, step, along)
     free = way_below(field, tip, end, step, rise)
@@ -96,7 +96,7 @@ def ridge_ahead(field: Field, a: Three, b: Three, step: float) -> bool:
 
 @inlined
 def proven(field: Field, here: float, apart: float) -> int:
-    """How many places further on, mm apart, cannot be outside the lumen either: the field's slope is bounded."""
+    """How many of the next places, ``apart`` mm apart, must be inside the lumen as well: the slope is bounded."""
     # written so that NaN proves nothing
     if not (here < 0.0 and field.slope > 0.0):
         return 0

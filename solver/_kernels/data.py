@@ -11,10 +11,10 @@ from solver.skips import Skips
 OUTCOMES = ("CONVERGED", "MAX_ITERATIONS", "STALLED", "NON_FINITE", "FRICTION", "FOLDED", "LEFT_GRID", "THROUGH_WALL")
 CONVERGED, MAX_ITERATIONS, STALLED, NON_FINITE, FRICTION, FOLDED, LEFT_GRID, THROUGH_WALL = range(8)
 UNFINISHED, ROUGH = -1, -2
-"""It goes on. And of a step: it is to be taken again in shorter ones."""
+"""A relaxation goes on; a step is to be taken again in shorter ones."""
 CURRENT, TRIAL, LAST_GOOD, SPARE = range(4)
 """Slots of a ``State``. While a relaxation runs, the first two change places with every step that it takes;
-the last is for a second look at what it led to."""
+the last keeps the relaxed wire while ``forks`` looks for another one."""
 
 
 class Field(NamedTuple):
@@ -155,9 +155,9 @@ class Friction(NamedTuple):
     """Coulomb friction of one step as a potential, load and direction taken from the last relaxation.
 
     coefficient : 0 is no friction at all.     radius : of a smooth hull, mm, else 0.
-    Before the step: held : (p, 3), what each point holds on to, moved to the axis, mm.     frame : (k + 1, 3, 3).
-    In the step: arm : (p, 3), where it rubs, mm from the point, in the frame of its node.     start : (p, 3), what it
-    holds on to.     normal : (p, 3).     load : (p,) N.
+    Before the step: held : (p, 3), where each point's spring is fixed to the wall, moved to the wire's axis, mm.
+    frame : (k + 1, 3, 3) of the same material.     In the step: arm : (p, 3), from the point to where it rubs, mm, in
+    the frame of its node.     start : (p, 3), where its spring is fixed, mm.     normal : (p, 3).     load : (p,) N.
     After the step, counted from the tip's last point: stretch : (p, 3) of the spring, mm.     pressed : (p,) load, N.
     """
 
@@ -176,10 +176,10 @@ class Friction(NamedTuple):
 class Shaft(NamedTuple):
     """The wire between the hand and the entry, straight and guided; its length is in ``WireTable``.
 
-    drag : what it takes to slide or turn it, N, half of it at the entry, half in the hand.     radius : mm.
-    frame : (1, 3, 3) of the wire at the entry before the step.     step : (2,), mm that the hand pushes it in the step
-    and turns its surface.     stretch : (2, 2) of the springs that hold it after the step, mm: at the entry and in the
-    hand, along and around it.
+    drag : friction force that resists sliding and turning, N, half of it at the entry, half in the hand.
+    radius : mm.     frame : (1, 3, 3) of the wire at the entry before the step.     step : (2,), mm that the hand moves
+    it in the step, along it and around its surface.     stretch : (2, 2) of the springs that hold it after the step,
+    mm: at the entry and in the hand, along and around it.
     """
 
     drag: float
@@ -193,7 +193,7 @@ class Problem(NamedTuple):
     """A wire in a wall.
 
     stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     twisting : the torsional stiffness is finite.
-    straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: a direction is all of a frame.
+    straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: the roll of frames is left out.
     """
 
     field: Field

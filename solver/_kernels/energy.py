@@ -19,9 +19,9 @@ FLOOR = tol.ENERGY_FLOOR_ANGLE**2
 
 @kernel
 def total_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
-    """Total energy of a state, N mm; its parts go to the state. The wall is not asked where there is none.
+    """Total energy of a state, N mm; its parts go to the state.
 
-    Up to node ``first_free`` (0 for none) the two states agree, and what the wall said to the other one holds.
+    Up to node ``first_free`` (0 for none) both states agree, and the other one's look-ups of the wall are taken over.
     """
     state, parts = problem.state, problem.state.energies[slot]
     parts.bending = bending_energy(problem.chain, state.u[slot], k)
@@ -82,9 +82,9 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
                 clear += 1
                 continue
             at = indices(m, o, q)
-            # beyond the grid the slope has no bound: no point is called clearer than it is inside
+            # beyond the grid the slope has no bound: no point counts as clearer of the wall than of the grid's border
             border = -field.spacing * depth_in_grid(c, at)
-            touched = clearance < 0.0  # it is taken to touch still: its value alone is not asked first
+            touched = clearance < 0.0  # it probably still does: its jet is looked up without asking its value first
             store3(anchor, p, q)
             cell = locate(c, at)
             if skips.cheap and border <= 0.0 and not touched:
@@ -106,7 +106,7 @@ def wall_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
 
 @inlined
 def placed(q: Three, r: Any, n: int, o: Three) -> Three:
-    """Where a point with offset o in the frame of node n, which is at q, is, mm."""
+    """Position, mm, of a point with offset o, mm, in the frame of node n, which lies at q."""
     return (
         q[0] + (r[n, 0, 0] * o[0] + r[n, 0, 1] * o[1] + r[n, 0, 2] * o[2]),
         q[1] + (r[n, 1, 0] * o[0] + r[n, 1, 1] * o[1] + r[n, 1, 2] * o[2]),
@@ -116,7 +116,7 @@ def placed(q: Three, r: Any, n: int, o: Three) -> Three:
 
 @merged
 def still_clear(anchor: Any, p: int, q: Three, slope: float, clearance: float) -> bool:
-    """Whether a point moved less since its last look-up than it was clear of the wall then: so it cannot touch."""
+    """Whether a point moved less since its last look-up than its clearance from the wall then: so it cannot touch."""
     way = minus(q, load3(anchor, p))
     return bool(clearance >= 0.0 and slope * slope * dot(way, way) <= clearance * clearance)
 
@@ -155,7 +155,7 @@ def scale_of(problem: Problem, slot: int, k: int) -> float:
 def noise_of(problem: Problem, slot: int, scale: float) -> float:
     """Energy below which a difference is rounding, N mm. scale : see ``scale_of``.
 
-    A weight's energy counts from the entry: it is the difference of two that count from the origin.
+    The energy of a weight is counted from the entry: it is a difference of two energies counted from the origin.
     """
     at_entry = dot(load3(problem.chain.load, 0), load3(problem.state.x[slot], 0))
     return float(tol.ROUND_OFF * (scale + abs(problem.state.energies[slot].load) + abs(at_entry)))

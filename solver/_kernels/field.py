@@ -128,7 +128,7 @@ def bends(t: float) -> Four:
 
 @inlined
 def plane(c: Any, i: int, j: int, k: int, q: Four) -> Any:
-    """Four rows of four coefficients, weighted."""
+    """Weighted sum of four rows of four coefficients."""
     return (
         four(c, i, j, k) * q[0]
         + four(c, i, j + 1, k) * q[1]
@@ -165,7 +165,7 @@ def layer(c: Any, cell: Cell, a: int, q: tuple[Four, Four, Four]) -> Any:
 
 @inlined
 def across(w: Four, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Four layers, weighted."""
+    """Weighted sum of four layers."""
     return a * w[0] + b * w[1] + c * w[2] + d * w[3]
 
 

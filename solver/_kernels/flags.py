@@ -51,13 +51,13 @@ def _internal(compiler: Callable[..., Any] = numba.njit, **how: Any) -> Callable
 
 # Called from Python; kept on disk.
 entry_point = on_disk(**FAST)
-# The same for what takes long: other threads of Python run meanwhile. The latter counts no arrays: it makes none.
+# The same for long calls: other threads of Python run meanwhile. The second counts no references: it makes no arrays.
 released = on_disk(nogil=True, **FAST)
 uncounted = on_disk(nogil=True, _nrt=False, **FAST)
-# Called by other kernels. Arrays are borrowed, not counted: who calls the entry point keeps them. A count is a call in
-# the middle of a recursion, around which all that is in registers goes through memory.
+# Called by other kernels. Arrays are borrowed, not counted: the caller of the entry point keeps them alive. A count is
+# a call in the middle of a recursion, around which everything in registers goes through memory.
 kernel = _internal()
-# The same for what makes arrays, which takes the counting runtime.
+# The same for kernels that make arrays, which needs numba's runtime of reference counts.
 owner = _internal(_nrt=True)
 # The same, kept on disk as well: another process can compile it meanwhile.
 cached = _internal(on_disk)

@@ -1,4 +1,4 @@
-"""Forces of a wire at rest, derivatives of the total energy; and whether the moments left are as good as none."""
+"""Forces of a wire at rest, as derivatives of the total energy; and whether the residual moments are negligible."""
 
 import math
 from typing import Any
@@ -149,7 +149,7 @@ def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
 
 @merged
 def forget_forces(report: Any) -> None:
-    """Report that there is no gradient, as without a force or a bend."""
+    """Set the report's gradient to 0: that of a wire without a force or a bend."""
     for a in range(3):
         report.force[a] = report.torque[a] = report.turned[0, a] = report.turned[1, a] = 0.0
 
@@ -166,13 +166,13 @@ def largest_moment(chain: Chain, u: Any, k: int) -> float:
 
 @kernel
 def at_rest(problem: Problem, slot: int, k: int, report: Any) -> bool:
-    """Whether the moments that ``costate`` found left are nothing beside the moments in the wire."""
+    """Whether the residual moment that ``costate`` reports is negligible beside the largest moment in the wire."""
     return bool(report.moment <= tol.MOMENT * largest_moment(problem.chain, problem.state.u[slot], k))
 
 
 @kernel
 def rounding_moment(problem: Problem, slot: int, k: int) -> float:
-    """Moment that the last place of wall forces and loads makes with the whole wire as its lever, N mm."""
+    """Rounding error of a moment, N mm: that of all wall forces and loads, with the whole wire as the lever."""
     chain, penetration = problem.chain, problem.state.penetration[slot]
     force, lever = 0.0, 0.0
     for n in range(1, k + 1):

@@ -1,7 +1,7 @@
-"""Where a wire could have turned to the other side as well: a decision that is made by less than anyone can tell.
+"""Where a wire could have turned to the other side as well, so that the side it took means nothing.
 
-A wire pushed beyond what it bears straight, or on to the carina of a fork, leaves its way for one of two sides. Where
-they are equal rounding decides, and where they are nearly so the length of the steps.
+A wire that buckles, or is pushed on to the carina of a fork, turns to one of two sides. Where these are equal, rounding
+decides; where they are nearly equal, the length of the steps does.
 """
 
 import math
@@ -23,10 +23,10 @@ from solver._kernels.septum import through_wall
 
 @merged
 def other_side(handle: Any, k: int) -> float:
-    """How far from the wire at rest another one lies that is as low, on the other side, mm; 0 where there is none.
+    """Largest distance, mm, of a joint from a second rest shape of equal energy, on the other side; 0 if there is none.
 
     What the step changed is mirrored, and relaxed from there: that leads back, unless there are two sides. State,
-    report and friction are left as they were found, and what a step needs that is taken back.
+    report and friction are left as they were, and so is LAST_GOOD, for a step that is taken back.
     """
     problem, state, report = handle.problem, handle.problem.state, handle.report[0]
     energy, apart = energy_of(problem, CURRENT), 0.0
@@ -49,13 +49,13 @@ def other_side(handle: Any, k: int) -> float:
 
 @merged
 def mirrored(problem: Problem, k: int, report: Any) -> bool:
-    """Keep the wire in SPARE, and mirror what the step changed; False, and nothing done, where that is little.
+    """Copy the wire to SPARE and mirror in CURRENT what the step changed; return False instead where that is little.
 
-    A wire that the step began to bend is mirrored as a whole; one that was bent before where it yields most easily.
+    A wire that was straight before the step is mirrored as a whole, one that was bent or is soft in its softest mode.
     """
     state, start = problem.state, problem.scratch.start
     bent, back = bending_energy(problem.chain, start, k) > tol.AS_LOW * state.energies[CURRENT].bending, 0.0
-    # a soft one that began to bend has a ring of sides, as in a sphere, and is judged by what long and short steps say
+    # a soft one that began to bend may turn to a whole ring of sides, as in a sphere: long and short steps judge that
     bent = bent or report.pivot < tol.SOFT
     if bent:
         back = along_softest_way(problem, k, report)
@@ -73,9 +73,9 @@ def mirrored(problem: Problem, k: int, report: Any) -> bool:
 
 @merged
 def along_softest_way(problem: Problem, k: int, report: Any) -> float:
-    """How many times the way from CURRENT to TRIAL, the softest, mirrors what the step changed along it; 0 if little.
+    """Factor on the softest mode that mirrors what the step changed along it; 0 where that is little.
 
-    The start of the step comes to lie in SPARE.
+    Lays the wire displaced by that mode out in TRIAL, and the start of the step in SPARE.
     """
     chain, state = problem.chain, problem.state
     if not softest_way(problem, k, report):
@@ -101,10 +101,10 @@ def along_softest_way(problem: Problem, k: int, report: Any) -> float:
 
 @kernel
 def softest_way(problem: Problem, k: int, report: Any) -> bool:
-    """Describe in the report the way in which the wire yields most easily; False where it yields to no push.
+    """Put the wire's softest mode into the report; False where none is found.
 
-    That is to the bath of ``newton.sweep`` with its sign turned round, hard enough for the wire to give way, but only
-    just: the direction found then is the one that is least stiff for how far the joints move.
+    A negative Levenberg term (``newton.sweep``) grows until the wire only just gives way: the direction that is found
+    then is the least stiff one for how far the joints move.
     """
     firm, push = 0.0, tol.SOFTEST
     while push < tol.WORST_DAMPING and sweep(problem, CURRENT, 0, k, -push, report):

@@ -1,4 +1,4 @@
-"""Coulomb friction, as a potential that one step of the wire has, and what is remembered of it from step to step.
+"""Coulomb friction as a potential within one step of the wire, and what of it is kept from step to step.
 
 A point in contact holds on to a point of the wall by a spring that slips at μ N: the return mapping of
 elastoplasticity (Simo and Laursen, Comput. Struct. 42 (1992) 97). Where the hull is smooth the contact is on the hull,
@@ -50,7 +50,7 @@ def way_of(problem: Problem, slot: int, n: int, p: int) -> Three:
 
 @kernel
 def friction_energy(problem: Problem, slot: int, k: int) -> float:
-    """Energy of all points, N mm."""
+    """Friction's potential of all points, N mm."""
     friction, chain = problem.friction, problem.chain
     total = 0.0
     for n in range(1, k + 1):
@@ -117,7 +117,10 @@ def take_loads(problem: Problem, slot: int, k: int) -> float:
 
 @inlined
 def hold(problem: Problem, frame: Nine, p: int, normal: Three) -> float:
-    """Note where a point touches; return by which angle that turned around the wire, rad; more on a thick wire."""
+    """Store normal and place of a contact; return the angle, rad, by which the place moved around the wire.
+
+    On a wire thicker than TURN_RADIUS_MM the angle is scaled up by the ratio of the radii; a sampled hull gives 0.
+    """
     friction = problem.friction
     store3(friction.normal, p, normal)
     if friction.radius == 0.0:
@@ -139,9 +142,10 @@ def store_start(problem: Problem, n: int) -> None:
 
 @kernel
 def anchor_friction(problem: Problem, was: int, k: int, ahead: float, shaft_mm: float) -> None:
-    """Measure the ways slid from where the same material was before a step: in LAST_GOOD, of ``was`` segments.
+    """Note where each point's material was before a step, to measure sliding from: in LAST_GOOD, of ``was`` segments.
 
-    Joints are fixed to the wire and counted from the tip. What was ``ahead`` mm back or more is in the introducer.
+    Joints are fixed to the wire and counted from the tip. What is now within ``ahead`` mm of the entry was in the
+    introducer.
     """
     chain, friction = problem.chain, problem.friction
     x, r = problem.state.x[LAST_GOOD], problem.state.r[LAST_GOOD]
@@ -181,7 +185,7 @@ def friction_loss(problem: Problem, k: int) -> float:
 
 @inlined
 def way_in(problem: Problem, n: int, p: int, load: float) -> Three:
-    """How far a point has come from what it held on to, mm: along the wall, or any way where it has left that."""
+    """How far a point is from what it held on to, mm: along the wall, or in any direction where it has left it."""
     if load > 0.0:
         return way_of(problem, CURRENT, n, p)
     state = problem.state
@@ -191,7 +195,7 @@ def way_in(problem: Problem, n: int, p: int, load: float) -> Three:
 
 @kernel
 def settle_friction(problem: Problem, k: int) -> None:
-    """Remember the springs after a step, by material."""
+    """Store the stretch and the load of each spring after a step, counted from the tip: they stay with the material."""
     friction, chain = problem.friction, problem.chain
     end = chain.first[k + 1] - 1
     for n in range(1, k + 1):
@@ -207,7 +211,7 @@ def settle_friction(problem: Problem, k: int) -> None:
 
 @inlined
 def arc_of(problem: Problem, n: int, p: int, way: Three) -> Three:
-    """A way slid with the arc that the hull rolled in place of its sine, 1.1 % less in a step of 15 degrees."""
+    """A way slid, with the arc that the hull rolled: ``way`` holds its sine, 1.1 % less in a step of 15 degrees."""
     friction, frame = problem.friction, load9(problem.state.r[CURRENT], n)
     along = (frame[2], frame[5], frame[8])
     sine = dot(relative(load9(friction.frame, n), frame), along)

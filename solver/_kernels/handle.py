@@ -17,8 +17,9 @@ build: Any = cgutils
 class Contents(NamedTuple):
     """What is behind a handle.
 
-    problem, table, introducer, limits : see ``data``.     place, report : (1,), (2,) records of ``records.PLACE`` and
-    ``records.REPORT``; the second report is that of the last good state.     force : (k + 1, 3) contact forces, N.
+    problem, table, introducer, limits : see ``data``.     place, report : (1,), (3,) records of ``records.PLACE`` and
+    ``records.REPORT``; report 1 is that of the last good state, 2 a copy that ``forks`` keeps.
+    force : (k + 1, 3) contact forces, N.
     """
 
     problem: Any
@@ -41,9 +42,9 @@ class ProblemType(types.StructRef):
 
 
 def reader(name: str) -> Any:
-    """What makes the instructions that read a field, without counting who holds the arrays in it: they are bare.
+    """A code generator for reading a field, without reference counts: the arrays in it are bare.
 
-    Numba's own count each: for forty arrays that is more code than the solver has, and takes as long to compile.
+    Numba's own counts each array: for forty that is more code than the solver has, and takes as long to compile.
     """
 
     def read(context: Any, builder: Any, kind: Any, handle: Any) -> Any:
@@ -55,7 +56,7 @@ def reader(name: str) -> Any:
         data = builder.bitcast(builder.load(builder.gep(record, [build.int32_t(3)])), stored)
         value = getattr(build.create_struct_proxy(contents)(context, builder, ref=data), name)
         if context.enable_nrt and isinstance(kind.field_dict[name], ProblemType):
-            # who counts will take this one back
+            # the code around this counts references, and will release this one
             context.nrt.incref(builder, kind.field_dict[name], value)
         return value
 
@@ -82,7 +83,7 @@ structref.define_proxy(ProblemHandle, ProblemType, list(Problem._fields))  # typ
 
 @entry_point
 def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, report: Any, force: Any) -> Any:
-    """The handle of the contents, which must be kept beside it."""
+    """The handle of the contents; it does not keep them alive, which the caller must."""
     p = bare(problem)
     inner = ProblemHandle(  # type: ignore[no-untyped-call]
         p.field, p.stiffness, p.friction, p.shaft, p.chain, p.state, p.scratch, p.skips, p.twisting, p.straight

@@ -85,9 +85,9 @@ def prepare(handle: Any, to_depth: float, to_roll: float) -> float:
 
 @merged
 def turns_back(handle: Any, ahead: float, turn: float) -> bool:
-    """Whether the hand now slides the wire another way than before, so that friction on it changes within micrometres.
+    """Whether the hand moves the wire in another direction than before: friction on it then changes within micrometres.
 
-    The trapezium rule over a step in which that happens knows nothing of the hand's work.
+    Over a step in which that happens the trapezium rule does not give the hand's work. ahead, turn : mm, degrees.
     """
     at, problem = handle.place[0], handle.problem
     if (problem.friction.coefficient == 0.0 and problem.shaft.drag == 0.0) or handle.introducer.finest == 1.0:
@@ -106,7 +106,7 @@ def arrived(at: Any, depth: float, roll: float) -> bool:
 
 @merged
 def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[bool, int]:
-    """Whether to take another step after one that ended so, and what to call the outcome if not."""
+    """Whether to take another step after one with this outcome, and the outcome if not; adapts the step's length."""
     at = handle.place[0]
     if iterations > limit or handle.problem.scratch.counters[0].passed >= handle.limits.work:
         return False, data.MAX_ITERATIONS
@@ -117,7 +117,7 @@ def judge(handle: Any, outcome: int, iterations: int, limit: float) -> tuple[boo
     elif outcome == data.ROUGH:
         at.shrink = max(tol.REFINE * at.shrink, handle.introducer.finest)
     elif helps and at.resigned == 0.0 and not math.isnan(at.seen_depth) and outcome != data.THROUGH_WALL:
-        # it is for what long steps lead to that short ones are taken: without them that is all there is
+        # short steps only check what a long one leads to: where they fail, the long one is all there is
         at.resigned, at.shrink = 1.0, 1.0
     elif helps:
         at.shrink *= 0.5
@@ -188,7 +188,7 @@ def settle(
 
 @merged
 def where(problem: Problem, margin: float, k: int, laid: int) -> int:
-    """Judge the place of a wire at rest: out of the grid, through a wall, or CONVERGED where it may lie."""
+    """Judge where a wire at rest lies: LEFT_GRID, THROUGH_WALL, or CONVERGED where it may lie there."""
     field, x = problem.field, problem.state.x[data.CURRENT]
     if laid == 0 and furthest_outside(field, x, k) > margin:
         return data.LEFT_GRID
@@ -234,7 +234,7 @@ def allowed(
 
 @inlined
 def likeness(problem: Problem, at: Any, depth: float, roll: float) -> float:
-    """How long this step is over the last one, or 0 where it is of another kind: rolled, back, or much longer."""
+    """Length of this step over that of the last one, or 0 where it is of another kind: rolled, back, or much longer."""
     if not problem.skips.foresight or at.last_step == 0.0 or at.last_turn != 0.0 or roll != at.roll:
         return 0.0
     share = (depth - at.inserted) / at.last_step

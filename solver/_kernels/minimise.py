@@ -90,7 +90,7 @@ def relax_with_friction(
 
 @cached
 def look_again(problem: Problem, slot: int, k: int) -> None:
-    """Look the wall up and take the energy with the loads that friction has now."""
+    """Compute the energy of a state again, with the contact loads that friction has now."""
     total_energy(problem, slot, 0, k)
 
 

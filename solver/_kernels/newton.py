@@ -111,7 +111,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
     """One backward Riccati recursion from the tip to joint ``first_free``: fills the gains and report.decrement.
 
     damping : Levenberg's term, a share of each joint's stiffness that holds its node in place; the coupling between
-    joints stays, as in a viscous bath, and the wall's negative curvature is left out. Below 0 the bath pushes it aside.
+    joints stays, as in a viscous bath, and the wall's negative curvature is left out. Below 0 it pushes nodes away.
     Returns False and stops at the first block that is not positive (semi-)definite, which the report then describes.
     """
     if problem.straight:

@@ -1,6 +1,7 @@
-"""Newton's method: its ways from one state to a lower one, and one iteration made of them.
+"""Newton's method: the ways in which it gets from one state to a lower one, and one iteration that is made of them.
 
-The step comes from ``newton``, and the total energy decides whether it is taken, in part, or after a few whole ones.
+The step comes from ``newton``; the total energy decides whether it is taken whole, in part, or as one of a few whole
+steps that lead uphill first.
 
 Where it does not help, Levenberg's term holds the wire back; where the Hessian is not positive and no force is left,
 the wire is led out of its saddle. now is the record ``records.DESCENT``: the current state and its
@@ -25,7 +26,10 @@ from solver._kernels.trial import step
 
 @kernel
 def search(problem: Problem, k: int, now: Any, fraction: float, noise: float, report: Any) -> float:
-    """Try Newton's whole step, or shorten it until the energy falls enough; return the new energy, or inf."""
+    """Line search along Newton's step: fraction 1 tries the whole step alone, a smaller one is shortened as needed.
+
+    A step is good where the energy falls enough and no wall lies between. Returns the new energy, or inf.
+    """
     decrement = report.decrement
     for _ in range(1 if fraction == 1.0 else tol.SEARCHES - 1):
         trial = step(problem, now.slot, now.first_free, k, fraction)
@@ -89,7 +93,7 @@ def rest_shape(problem: Problem, slot: int, k: int) -> bool:
 def last_step(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
     """Take the step that squares the error, and leave the exact gradient of the result in the report.
 
-    Not the energy's last place decides, 1e-8 mm of the result would hang on it.
+    The energy may rise by ``noise``: if its last digit decided, 1e-8 mm of the result would hang on that.
     """
     trial = step(problem, now.slot, now.first_free, k, 1.0)
     if trial <= now.energy + noise and admissible(problem, now.slot, k):
@@ -99,7 +103,7 @@ def last_step(problem: Problem, k: int, now: Any, noise: float, report: Any) -> 
 
 @merged
 def polish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
-    """Newton's steps where the energy is flat to its last place: the fall that is left to foretell decides."""
+    """Take Newton steps where the energy is flat to its last digit, for as long as the predicted fall decreases."""
     definite = sweep(problem, now.slot, 0, k, 0.0, report)
     for _ in range(tol.POLISHES):
         left = report.decrement
@@ -118,7 +122,7 @@ def polish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> Non
 
 @merged
 def damped_polish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> None:
-    """Take the damped step where the energy is flat to its last place, if that lowers the moments that are left."""
+    """Take the damped step where the energy is flat to its last digit, if it lowers the largest residual moment."""
     costate(problem, now.slot, k, report)
     moment = report.moment
     trial = step(problem, now.slot, 0, k, 1.0)
@@ -148,7 +152,7 @@ def frozen_joints(problem: Problem, slot: int, k: int) -> int:
 
 REST = 0.5 * tol.REST_ANGLE**2
 UNDECIDED = UNFINISHED - 1
-"""The last step does not help, as where a contact opens and closes again: search as usual."""
+"""Result of ``finish`` where the last step did not help, as where a contact opens and closes again: search as usual."""
 
 
 @merged
@@ -209,7 +213,7 @@ def iterate(problem: Problem, k: int, now: Any, tolerance: float, report: Any) -
 
 @merged
 def release(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int:
-    """Nothing is left to gain with the wire held back: look at it free, then held less, before it is judged."""
+    """Nothing is left to gain with Levenberg's term: take a last step with it, drop it, make the next one smaller."""
     damped_polish(problem, k, now, noise, report)
     now.damping, now.patience, now.released = 0.0, 0, now.released + 1
     now.last_damping *= tol.SOFTER
@@ -227,7 +231,7 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
         problem.scratch.counters[0].starts_at_rest += now.iterations == 0
         return CONVERGED
     if now.first_free > 0:
-        # the whole gradient says what its part did not
+        # the gradient of all joints shows moments that that of the free joints did not
         now.first_free = 0
         return UNFINISHED
     if report.decrement <= noise:
@@ -239,7 +243,7 @@ def finish(problem: Problem, k: int, now: Any, noise: float, report: Any) -> int
 
 @inlined
 def whole(now: Any, report: Any) -> bool:
-    """Whether the last sweep says enough of the whole wire: of all joints, or of a wire that is not soft."""
+    """Whether the last sweep can judge the whole wire: it went through all joints, or the wire is not soft."""
     return bool(now.first_free == 0 or report.pivot > tol.SOFT)
 
 

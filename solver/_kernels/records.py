@@ -55,9 +55,9 @@ REPORT = record(
 start : energy at the beginning, N mm.     penetration : deepest of all points, mm.     push : the hand's force, N.
 force, torque : gradient of the energy with respect to the entry point, N, and to turning the base frame, N mm.
 turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
-decrement : fall of the energy that Newton's step foretells, N mm.     joint, bend, twist, curvature : of the first
-joint whose block of the Hessian is not positive, its direction of negative curvature and that curvature, N mm.
-pivot : least of the joints' stiffnesses with all beyond them free to follow, over their own; 0 where the wire snaps.
+decrement : fall of the energy that Newton's step predicts, N mm.     joint : the first whose block of the Hessian is
+not positive.     bend, twist, curvature : its direction of negative curvature, and that curvature, N mm.
+pivot : least over the joints of the stiffness with all beyond free to follow, over its own; 0 where the wire snaps.
 """
 DESCENT = record(
     *((name, np.int64) for name in ("slot", "iterations", "first_free", "patience", "released", "next_check")),
@@ -69,7 +69,7 @@ DESCENT = record(
 slot : of the current state; the trial is in 1 - slot.     energy : of the current state, N mm.
 Newton's method. first_free : joints before it are left alone.     damping : Levenberg's term.     last_damping : the
 one that last led down.     patience : steps to take before it is lowered.     released : how often it was dropped.
-forked : 1 where it came by an unstable state, see ``forks``.
+forked : 1 where it passed an unstable state, see ``forks``.
 Closed form. share : of its own step.     next_check : iteration at which it is judged.     checked_energy : then.
 """
 PLACE = record(
@@ -79,17 +79,17 @@ PLACE = record(
     *((name, float) for name in ("catheter", "goal", "next", "pull", "stored")),
     ("snaps", np.int64),
 )
-"""Where an insertion is: mm beyond the entry, degrees, N mm; share of the longest step that it takes, and its last
-step, mm and degrees.
-rise : energy of a start that is not foreseen above what the hand's push leads to, N mm, when last asked; it fades.
+"""Where an insertion is. inserted, roll, energy : mm beyond the entry, degrees, N mm.     shrink : share of the longest
+step that it takes.     last_step, last_turn : its last step, mm and degrees.
+rise : energy of the last start that was not foreseen, above that predicted from the hand's push, N mm; it fades.
 resigned : 1 where short steps to where a rough one led failed: then long ones are taken, whatever they do.
 
-push, torque : the hand's there, N and N mm.     dissipated, rubbed : of its work on the way to this depth, in all and
-by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : their number on that way.
+push, torque : the hand's there, N and N mm.     dissipated, rubbed : lost of its work on the way to this depth, in all
+and by friction, N mm.     calm : way since the wire snapped or was about to, mm.     snaps : number on the way.
 seen_depth, seen_roll, seen_catheter : where a rough step led that is being taken again; nan where there is none.
-seen_calm : what calm was before it.     seen_pivot : the least with which it counts that both ways agree.
-catheter, goal, next : its tip, where it is to go, and where this step takes it, mm beyond the entry.     pull : the
+seen_calm : what calm was before it.     seen_pivot : pivot above which it counts that long and short steps agree.
+catheter, goal, next : where the catheter's tip is, is to go, and goes in this step, mm beyond the entry.     pull : the
 force of its hand, N.     stored : energy that it keeps in the wire, N mm, a part of ``energy``.
 """
 SNAP = record(*((name, float) for name in ("from_mm", "to_mm", "released_N_mm", "moved_mm", "other_mm")))
-"""An event: depths before and after, energy released, the largest way of a joint, and see ``forks.other_side``."""
+"""An event: depths before and after, energy released, largest way of a joint, and result of ``forks.other_side``."""

@@ -106,7 +106,7 @@ def limited(u: Three, s: Three) -> Three:
 
 @inlined
 def shortened(v: Three, longest: float) -> Three:
-    """V, or where it is longer than that, as long as ``longest``."""
+    """V, scaled down to the length ``longest`` where it is longer."""
     size = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     beyond = size > longest * longest
     if anywhere(beyond):

@@ -35,7 +35,7 @@ def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) 
     j, slot, gain = int(report.joint), now.slot, problem.scratch.gain
     hold_all_but(gain, j, k)
     size, least = tol.SWING, 0.1 * abs(report.curvature)
-    # joints further on may answer with a thousand times as much: nothing but rounding ends the search
+    # joints further on may turn a thousand times as far: nothing but rounding ends the search
     while least * size * size > noise:
         for side in (1.0, -1.0):
             turn_joint(gain, side * size, report)
@@ -48,7 +48,7 @@ def leave_saddle(problem: Problem, k: int, now: Any, noise: float, report: Any) 
 
 @kernel
 def hold_all_but(gain: Any, j: int, k: int) -> None:
-    """Take all joints' own steps out of the gains: those beyond joint j answer to how it turns, and nothing else."""
+    """Set the own steps of joint j and all beyond it in the gains to 0: those beyond then only respond to j's turn."""
     for a in range(3):
         for b in range(7):
             gain[j, a, b] = 0.0
@@ -58,7 +58,7 @@ def hold_all_but(gain: Any, j: int, k: int) -> None:
 
 @inlined
 def turn_joint(gain: Any, size: float, report: Any) -> None:
-    """Make a turn by ``size``, rad, in the report's direction the step of the report's joint."""
+    """Set the step of the report's joint to a turn by ``size``, rad, in the report's direction."""
     j = report.joint
     for a in range(2):
         gain[j, a, 0] = size * report.bend[a]
@@ -67,10 +67,10 @@ def turn_joint(gain: Any, size: float, report: Any) -> None:
 
 @merged
 def steepest_way(problem: Problem, slot: int, k: int, report: Any) -> None:
-    """Describe in the report the way down that is left when the wire is held back until hardly any is.
+    """Put into the report the direction of negative curvature that is left at the largest Levenberg term with one.
 
-    Joints further on that are neutral answer to the way that was found first with a million times as much, far beyond
-    what they can turn; held back, none is neutral.
+    To the direction that was found without that term, neutral joints further on respond with a million times as much,
+    far beyond what they can turn; with it, no joint is neutral.
     """
     damping, last = tol.LEAST_DAMPING, 0.0
     while damping < tol.WORST_DAMPING and not sweep(problem, slot, 0, k, damping, report):

@@ -46,14 +46,14 @@ def through_wall(field: Field, x: Any, k: int, margin: float) -> bool:
                 if known and not (inside and room >= 0.0) and parted(field, last, here, level):
                     return True
                 last, known, inside = here, True, room >= 0.0
-            # as far as the distance's slope lets it, it does so
+            # skip the places that must be inside as well, since the distance's slope is bounded
             i += 1 + int(max(room, 0.0) * steps / (field.slope * way))
     return False
 
 
 @kernel
 def passes_crease(field: Field, x: Any, k: int) -> bool:
-    """Whether a wire comes by a crease anywhere; asked about so few joints that most wires cost next to nothing."""
+    """Whether a wire comes near a crease anywhere; so few joints are tested that most wires cost next to nothing."""
     d = minus(load3(x, k), load3(x, k - 1))
     # all segments but the first, which has up to half a segment more, are as long as the last one
     stride = int(0.75 * tol.CREASE_BLOCK * field.spacing / math.sqrt(dot(d, d)))
@@ -67,7 +67,7 @@ def passes_crease(field: Field, x: Any, k: int) -> bool:
 
 @kernel
 def near_crease(field: Field, a: Three, b: Three, way: float) -> bool:
-    """Whether a segment from a to b comes by a crease."""
+    """Whether a segment from a to b, ``way`` mm long, comes near a crease."""
     steps = 1 + int(way / (0.5 * tol.CREASE_BLOCK * field.spacing))
     found = False
     for i in range(1, steps + 1):
@@ -120,7 +120,7 @@ def foot(field: Field, q: Three, v: float, level: float) -> Foot:
 @kernel
 def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
     """Whether a ridge lies between two feet, and no way through lumen around it nearby."""
-    # where the lumen is narrower than the wire all of it counts, not what the wire has room in
+    # where the lumen is narrower than the wire, all of the lumen counts, not only where the wire has room
     top = tol.RIDGE_VOXELS * field.spacing + (level if max(a[3], b[3]) <= level else max(a[3], b[3], 0.0))
     p, q = a[:3], b[:3]
     d = minus(q, p)
@@ -133,7 +133,7 @@ def parted(field: Field, a: Foot, b: Foot, level: float) -> bool:
 
 @owner
 def joined(field: Field, p: Three, q: Three, top: float) -> bool:
-    """Whether a way on which the distance is below ``top`` leads from one place to another nearby: a flood from p."""
+    """Whether a way on which the distance stays below ``top`` leads from p to q nearby: a flood fill from p."""
     d = minus(q, p)
     way = math.sqrt(dot(d, d))
     limit = way + 2 * tol.DETOUR_MM
@@ -166,6 +166,6 @@ def joined(field: Field, p: Three, q: Three, top: float) -> bool:
 
 @kernel
 def deeper(field: Field, a: Foot) -> Three:
-    """A place up to a voxel further in the lumen than a foot: there a flood cannot slip over a ridge."""
+    """A place up to a voxel deeper in the lumen than a foot: a flood fill from there cannot slip over a ridge."""
     b = foot(field, a[:3], distance(field, a[:3]), a[3] - field.spacing)
     return b[:3] if b[3] < math.inf else a[:3]

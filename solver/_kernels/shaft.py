@@ -1,8 +1,8 @@
 """The shaft outside the body: straight and guided between hand and entry, it twists, and friction holds it.
 
-Its twist is that of the first joint, which is as much longer (``chain.lay_out``). Friction D is alike all along it:
-half of it at the entry and half in the hand twist a shaft of length L that turns by D r L/2GJ, as all of it would. A
-spring that slips, as at the wall, holds it against sliding and turning together: pushed, it turns freely.
+Its twist is part of the first joint's, whose cell is longer by the shaft (``chain.lay_out``). Friction D is uniform
+along it: half of D at the entry and half in the hand twist a turning shaft of length L by the same D r L/2GJ. As at the
+wall, a spring that slips resists sliding and turning together: while the shaft is pushed it turns freely.
 """
 
 import math
@@ -17,7 +17,7 @@ ENTRY, HAND = 0, 1
 
 @kernel
 def anchor_shaft(problem: Problem, was: int, ahead: float, turn: float) -> None:
-    """Note what the hand does in a step, mm and rad, and the wire at the entry before it, of ``was`` segments."""
+    """Store the hand's move in a step, mm and rad, and the frame at the entry before it (wire of ``was`` segments)."""
     shaft = problem.shaft
     shaft.step[0], shaft.step[1] = ahead, shaft.radius * turn
     store9(shaft.frame, 0, load9(problem.state.r[LAST_GOOD], 1) if was > 0 else load9(problem.state.r[CURRENT], 0))
@@ -48,8 +48,9 @@ def ways(problem: Problem, turn: float) -> tuple[float, float]:
 def shaft_energy(problem: Problem, slot: int) -> float:
     """Energy of the spring at the entry, N mm; its derivatives by turning the first segment go to the state.
 
-    held[slot] : its gradient and the six numbers of its Hessian, in the frame of that segment. They wait there because
-    asking for the shaft in the loop over the joints, by its arrays' reference counts, takes four times all the rest.
+    held[slot] : its gradient and the six numbers of its Gauss-Newton Hessian, in the frame of that segment. They are
+    kept there because reading the shaft in the loop over the joints, for its arrays' reference counts, takes four times
+    as long as all the rest.
     """
     shaft, held = problem.shaft, problem.state.held[slot]
     turn, slope = turned(problem, load9(problem.state.r[slot], 1))
@@ -67,16 +68,19 @@ def shaft_energy(problem: Problem, slot: int) -> float:
 
 
 def shaft_forces(shaft: Shaft) -> tuple[float, float]:
-    """The hand's force against friction of the shaft, N, and its torque there but for the half that comes by twist."""
+    """The hand's force against friction of the shaft, N, and its torque, N mm, against the half of it in the hand.
+
+    The torque against the half at the entry is transmitted by twist, and counted already.
+    """
     held = 0.5 * shaft.drag / tol.SLIP_MM * shaft.stretch
     return float(held[ENTRY, 0] + held[HAND, 0]), float(held[HAND, 1] * shaft.radius)
 
 
 @kernel
 def loss_by_turning(problem: Problem, k: int) -> float:
-    """Work that friction at the entry takes from the wire turning there in this step, N mm: by the torque of the hand.
+    """Work that friction at the entry takes from the wire turning there in this step, N mm, done by the hand's torque.
 
-    What pushing costs is not in the hand's force of this step, see ``shaft_forces``.
+    The work of pushing the shaft is left out, as that force is not in the hand's push here, see ``shaft_forces``.
     """
     turn = turned(problem, load9(problem.state.r[CURRENT], min(k, 1)))[0]
     along, around = ways(problem, turn)
@@ -96,7 +100,7 @@ def settle_shaft(problem: Problem, k: int) -> float:
 
 @inlined
 def slipped(shaft: Shaft, place: int, along: float, around: float) -> float:
-    """Let a spring slip that is stretched too far, mm, and keep the rest; return the work that this takes, N mm."""
+    """Let a spring slip where it is stretched by more than SLIP_MM, and store the rest; return the work lost, N mm."""
     size = math.sqrt(along * along + around * around)
     kept = tol.SLIP_MM / size if size > tol.SLIP_MM else 1.0
     shaft.stretch[place, 0], shaft.stretch[place, 1] = kept * along, kept * around

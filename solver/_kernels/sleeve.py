@@ -1,7 +1,7 @@
 """The catheter over the wire: the stiffness of the pair up to its tip, and the force on its tip.
 
-Its tip is counted from the entry and the material from the wire's tip: pushing either moves the jump along the wire.
-Where a cell has the jump inside, its compliance is the sum of both parts, as in series.
+Its tip is counted from the entry, the material from the wire's tip: pushing either moves the jump of stiffness along
+the wire. Where a cell has the jump inside, its compliance is the sum of both parts', as for springs in series.
 """
 
 from solver._kernels.algebra import ZERO3, Three, add3, apply, dot, load3, load9
@@ -61,7 +61,7 @@ def stored_energy(table: WireTable, depth: float) -> float:
 def tip_force(problem: Problem, table: WireTable, k: int) -> float:
     """The hand's force on a catheter, dU/d(its tip) at the minimum, N, of a wire of k > 0 segments.
 
-    The jump wanders in one cell, whose compliance and rest bend change.
+    Moving its tip moves the jump of stiffness within one cell, whose compliance and rest bend change.
     """
     chain, sleeve = problem.chain, table.sleeve
     depth = depth_of(chain, k)

@@ -1,4 +1,4 @@
-"""Where the wire gives way: the hand's work in a step is held against the energy of wire and wall.
+"""Where the wire gives way: the hand's work in a step is compared with the change of energy of wire and wall.
 
 A wire that follows one minimum takes up all of that work. Where some is missing the wire has found another minimum: it
 snapped, or the step was so long that it hopped over a barrier that shorter steps would not have passed.
@@ -24,9 +24,9 @@ class Books(NamedTuple):
     """A step's work and energy.
 
     push, torque, pull : the hand's at its end, see ``records.PLACE``.     way : longest way of a hand, mm.
-    share : of the longest step.     lost : work less the change of energy, N mm.     missing : what of that friction
-    did not take.     large : what the trapezium rule may leave of work and energy.     change : of the hand's forces,
-    times their ways.     gives : whether the wire is pushed with less than before.
+    share : length over that of the longest step.     lost : work minus the change of energy, N mm.     missing : lost
+    less what friction took, N mm.     large : missing work that the error of the trapezium rule may explain, N mm.
+    change : change of the hand's forces times their ways, N mm.     gives : whether the push becomes smaller.
     """
 
     push: float
@@ -43,7 +43,7 @@ class Books(NamedTuple):
 
 @merged
 def account(handle: Any, k: int, reached: tuple[float, float, float], used: int, other: float) -> int:
-    """Hold the hand's work in a step against the wire's energy; ROUGH where a shorter step may lead elsewhere.
+    """Compare the hand's work in a step with the wire's energy; ROUGH where shorter steps may lead elsewhere.
 
     reached : depth, mm, roll, degrees, and energy, N mm.     used : iterations, of the relaxation that took most.
     other : how far off another side lies, mm.
@@ -53,13 +53,13 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
     moved = way_of_joints(problem, at, k, handle.table.segment) if used > tol.SWIFT else 0.0
     leapt = moved > tol.SNAP_WAYS * books.way
     doubtful = handle.limits.method == NEWTON and doubt(books, used, at.shrink, report.pivot, moved)
-    # shorter steps do not make a wire any more certain that is free to turn, and in doubt already
+    # shorter steps do not make a wire more certain if it is free to turn, and in doubt already
     told = report.pivot < tol.FREE and (at.seen_calm if pending else at.calm) < tol.CALM_MM
     if doubtful and not told and at.resigned == 0.0 and books.share > (1.0 + 2.0 * tol.OVERSHOOT) * introducer.finest:
         if not pending:
             remember(problem, at, k, reached)
         return ROUGH
-    # a wire that went no further than its base was pushed did not snap: the trapezium rule left that of its work
+    # a wire that moved no further than its base did not snap: the missing work is an error of the trapezium rule
     snapped = doubtful and leapt and books.missing > books.large + tol.CHANGE_SHARE * books.share * books.change
     # a wire that was firm before did not snap, but hopped over a barrier, which still shorter steps may not pass
     if snapped and min(handle.report[1].pivot, report.pivot) > tol.SOFT:
@@ -77,8 +77,8 @@ def account(handle: Any, k: int, reached: tuple[float, float, float], used: int,
 def may_fork(handle: Any, k: int, depth: float, used: int) -> bool:
     """Whether the other side of a step to a depth is worth a look.
 
-    Not where the way down was never unstable, where no joint moved by more than the hand, and where a soft wire is in
-    doubt already.
+    Not where the relaxation met no unstable state or was short, where no joint moved by more than the hand, and where
+    a soft wire is in doubt already.
     """
     problem, at = handle.problem, handle.place[0]
     if problem.scratch.descent[0].forked == 0 or used <= tol.SWIFT:
@@ -136,9 +136,9 @@ def doubt(books: Books, used: int, shrink: float, pivot: float, moved: float) ->
 
 @merged
 def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, float]) -> None:
-    """Keep the wire that a rough step led to, for that of shorter steps to be held against it."""
+    """Keep the wire that a rough step led to, to compare the one of shorter steps with it."""
     at.seen_depth, at.seen_roll, at.seen_catheter, at.seen_calm = reached[0], reached[1], at.next, at.calm
-    # to which side a straight wire turns that touched nothing may be decided by rounding: both ways agree by chance
+    # rounding may decide to which side a straight wire turns that touched nothing: both ways may agree by chance
     at.seen_pivot = tol.LOOSE if at.energy > 0.0 else tol.FREE
     for n in range(k + 1):
         store3(problem.scratch.seen, n, load3(problem.state.x[CURRENT], n))
@@ -146,10 +146,10 @@ def remember(problem: Problem, at: Any, k: int, reached: tuple[float, float, flo
 
 @merged
 def trust(handle: Any, k: int, reached: tuple[float, float, float], doubtful: bool) -> None:
-    """Keep count of the way since the wire gave way, or could have: until then it may lie otherwise elsewhere.
+    """Count the way since the wire gave way, or could have: for CALM_MM it may lie elsewhere than after shorter steps.
 
-    A rough step is forgotten where shorter ones lead to the same wire without a snap, unless it is about to give way:
-    to which side such a wire turns may have been decided before, by less than anyone can tell.
+    A rough step is forgotten where shorter ones lead to the same wire without a snap, unless the wire is about to give
+    way: rounding may have decided before to which side such a wire turns.
     """
     problem, at, report = handle.problem, handle.place[0], handle.report[0]
     ahead = abs(reached[0] - at.inserted)
@@ -175,10 +175,10 @@ def way_of_joints(problem: Problem, at: Any, k: int, segment: float) -> float:
 
 @merged
 def note_snap(problem: Problem, at: Any, ways: tuple[float, float], reached: tuple[float, float]) -> None:
-    """Write down that a wire snapped, or turned to one of two sides.
+    """Write down that a wire snapped, or turned to one of two sides; where there are too many, over the last one.
 
     ways : the largest of a joint, and how far off the other side is, 0 for none, mm.     reached : the depth, mm, and
-    the energy released, N mm. Where there are too many the last place is taken again.
+    the energy released, N mm.
     """
     snaps = problem.scratch.snaps
     snap = snaps[min(at.snaps, snaps.size - 1)]

@@ -97,7 +97,7 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
 
 @cached
 def extrapolate_start(problem: Problem, at: Any, k: int, share: float) -> int:
-    """``chosen`` by looking up one point after the other."""
+    """``chosen``, with the wall looked up at one point after the other."""
     return chosen(problem, at, k, share, energy_of_start, problem)
 
 
@@ -111,9 +111,9 @@ def energy_of_start(problem: Problem, _: Problem, slot: int, k: int) -> float:
 def chosen(problem: Problem, at: Any, k: int, share: float, energy: Any, desk: Any) -> int:
     """Return the slot to start from: CURRENT, or TRIAL with a share of the last change where that is clearly lower.
 
-    Both lie in the same lumen (no wall between them), and their energies decide; that of the answer is known then.
-    at : the record ``records.PLACE``. Held against each other is what they lie above the energy that the hand's push
-    leads to; where the change leaves a small part of what the slid start had when it was last asked, it is not asked.
+    TRIAL must lie in the same lumen (no wall between them). Compared are both energies above the one that the hand's
+    push leads to; where TRIAL's is a small part of what CURRENT's was when last computed (``at.rise``), CURRENT's is
+    not computed. The energy of the slot that is returned is known then.     at : the record ``records.PLACE``.
     energy : of a slot, from (problem, desk, slot, k).
     """
     goal = at.energy - at.stored + at.push * share * at.last_step
@@ -140,7 +140,7 @@ def chosen(problem: Problem, at: Any, k: int, share: float, energy: Any, desk: A
 
 @inlined
 def change_again(problem: Problem, k: int, share: float) -> None:
-    """Keep the controls that the step starts from, and put a share of the last change on those of TRIAL."""
+    """Store CURRENT's controls as the start of the step; set TRIAL's to them plus a share of the last change."""
     scratch, u, tried = problem.scratch, problem.state.u[CURRENT], problem.state.u[TRIAL]
     for j in range(k):
         for a in range(3):
@@ -217,7 +217,7 @@ def put_load(chain: Chain, introducer: Introducer, k: int) -> None:
 
 @merged
 def begin(introducer: Introducer, curve: Any) -> int:
-    """Straight on from the entry, as two points."""
+    """Fill a curve with two points straight on from the entry; return their number."""
     for a in range(3):
         curve[0, a] = introducer.entry[a]
         curve[1, a] = introducer.entry[a] + introducer.frame[a, 2]
@@ -226,7 +226,10 @@ def begin(introducer: Introducer, curve: Any) -> int:
 
 @kernel
 def moved(introducer: Introducer, table: WireTable, x: Any, was: int, first: float, ahead: float) -> int:
-    """Section 4.1 of the seed: the last good wire moved by ``ahead`` along the entry direction, from the entry on."""
+    """Section 4.1 of the seed: fill x[TRIAL] with the last good wire moved by ``ahead`` mm along the entry direction.
+
+    The curve begins at the entry. Returns the number of its points.
+    """
     curve, count = x[TRIAL], begin(introducer, x[TRIAL]) - 1
     for n in range(was + 1):
         arc = first + (n - 1) * table.segment if n > 0 else 0.0

@@ -1,8 +1,8 @@
-"""Wires side by side: what the lock-step kernels work on, and the way there and back for one of them.
+"""Wires side by side: the arrays that the lock-step kernels work on, and how one wire is copied into a lane and back.
 
-The tips stand in line: node k of each wire is node ``size`` of the block, and so the look-up points, whose number
-depends on how far behind the tip a node is, stand in line as well. A shorter wire begins with joints of length 0 that
-do not bend. The last axis of every array is the lane.
+The tips are aligned: node k of each wire is node ``size`` of the block. So the look-up points, whose number depends on
+how far behind the tip a node is, are aligned as well. A shorter wire begins with joints of length 0 that do not bend.
+The last axis of every array is the lane.
 """
 
 import math
@@ -53,8 +53,8 @@ class Block(NamedTuple):
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
     load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of
-    points to be looked up, each WIDTH times the point, plus its lane: those that will touch, those that may, and the
-    eight that are.     found : (11,), see ``field.look_up``.     number : see ``NUMBERS``.
+    points to be looked up, each WIDTH times the point, plus its lane: row 0 those that will touch, 1 those that may, 2
+    the eight that are looked up now.     found : (11,), see ``field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
@@ -81,7 +81,7 @@ SHAPES = (
     *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
     *("3", "3", "3", "2 3", "", "11", str(len(NUMBERS))),
 )
-"""Of the arrays of a block: k joints, n nodes, p points; what is asked is no numbers in lanes."""
+"""Shapes of a block's arrays, without the lanes: k joints, n nodes, p points; ``asked`` is not an array of lanes."""
 LANE = record(
     *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),
@@ -98,7 +98,8 @@ to.     k : segments.     tries : step lengths that failed.     allowed : iterat
 outcome : how its relaxation ended.
 """
 SEAT = record(("wire", np.int64), ("filled", np.int64))
-"""Which wire a lane works for, POOL is none; and the block's joint from which on it is in place, see ``fill_up``."""
+"""wire : the one that a lane works for, POOL for none.     filled : first joint of the block that is valid in this
+lane, see ``fill_up``."""
 
 
 @kernel
@@ -154,7 +155,7 @@ def fill_up(b: Block, first: Any, lane: int, start: int, stop: int) -> None:
 
 @kernel
 def take_out(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
-    """Take the current state of a lane over as that of its wire."""
+    """Copy the current state of a lane back to its wire, of k segments."""
     chain, state, shift = problem.chain, problem.state, b.length.shape[0] - k
     u, x, r, jet = state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], state.jet[CURRENT]
     for n in range(k + 1):

@@ -27,9 +27,10 @@ from solver._kernels.lanes.block import (
 from solver._kernels.newton_method import whole
 
 IDLE, READY, STOPPED, SWEEP, SEARCH, LAST, TAKEN, FORETOLD, JUDGE, ALONE, RESTED, DONE, NEW, WAITING = range(14)
-"""Phases of a wire: nothing left to do; sets out on its next step; no step leads further; waits for gains; tries a step
-of its search, or the last one; has taken one, and may be at rest by it; may be at a saddle; goes on alone; its
-relaxation has ended, in the lane or in the wire; it is to begin; has a start, but no lane yet."""
+"""Phases of a wire. IDLE: nothing is left to do; READY: sets out on its next step; STOPPED: no step leads further;
+SWEEP: waits for gains; SEARCH: tries a step of its line search; LAST: tries the last step; TAKEN: has taken a step;
+FORETOLD: has taken one and may be at rest by it; JUDGE: may be at a saddle; ALONE: goes on alone; RESTED, DONE: its
+relaxation has ended, in the lane or in the wire; NEW: is to begin; WAITING: has a start, but no lane yet."""
 
 
 @inlined
@@ -121,7 +122,7 @@ def finish_taking(me: Any, now: Any, number: Any, lane: int) -> None:
 
 @kernel
 def hold_back(me: Any, now: Any, counters: Any) -> None:
-    """``newton_method.hold_back``, but for its end."""
+    """``newton_method.hold_back``; where no useful step is left the wire goes on alone."""
     damping = 0.5 * now.last_damping if now.damping == 0.0 else 6 * now.damping
     if now.first_free > 0:
         now.first_free = 0

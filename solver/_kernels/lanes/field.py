@@ -20,7 +20,7 @@ Layer = tuple[Four, Four, Four]
 
 @extend.intrinsic
 def rows(_: Any, c: Any, at: Any, shift: Any) -> Any:
-    """Four float32 in a row for each lane, from the place ``at + shift`` of all on: four numbers in lanes."""
+    """Four consecutive float32 of the flat array c for each lane, from ``at + shift`` on, as four numbers in lanes."""
 
     def lower(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
         array = arrays.make_array(kinds.args[0])(context, builder, args[0])
@@ -47,7 +47,7 @@ def rows(_: Any, c: Any, at: Any, shift: Any) -> Any:
 
 @inlined
 def cell_of(f: float, last: float) -> float:
-    """``field.clipped``, as a float; 0 where there is no number."""
+    """``field.clipped``, as a float; 0 for NaN."""
     return math.floor(lesser(greater(f, 0.0), last))  # type: ignore[no-any-return]
 
 
@@ -61,7 +61,7 @@ def depth_in_grid(c: Any, f: Three) -> float:
 
 @inlined
 def fours(w: Four, a: Four, b: Four, c: Four, d: Four) -> Four:
-    """``field.across`` of four."""
+    """``field.across`` of each of four numbers."""
     return (
         across(w, a[0], b[0], c[0], d[0]),
         across(w, a[1], b[1], c[1], d[1]),
@@ -72,7 +72,7 @@ def fours(w: Four, a: Four, b: Four, c: Four, d: Four) -> Four:
 
 @inlined
 def layer(c: Any, at: float, shift: int, q: tuple[Four, Four, Four]) -> Layer:
-    """``field.layer`` of the plane ``shift`` coefficients on."""
+    """``field.layer`` of the plane that begins ``shift`` coefficients after ``at``."""
     n = c.shape[2]
     a, b, e, f = rows(c, at, shift), rows(c, at, shift + n), rows(c, at, shift + 2 * n), rows(c, at, shift + 3 * n)
     return fours(q[0], a, b, e, f), fours(q[1], a, b, e, f), fours(q[2], a, b, e, f)
@@ -80,13 +80,13 @@ def layer(c: Any, at: float, shift: int, q: tuple[Four, Four, Four]) -> Layer:
 
 @inlined
 def weighted(x: Four, w: Four) -> float:
-    """``lanes.weighted``."""
+    """``vectors.weighted`` of four numbers in lanes."""
     return (x[0] * w[0] + x[2] * w[2]) + (x[1] * w[1] + x[3] * w[3])
 
 
 @inlined
 def spline(c: Any, at: float, place: Three) -> tuple[Four, Six]:
-    """``field.spline`` of the cells whose first coefficients are the at-th of all."""
+    """``field.spline`` of a cell in each lane; at : flat index of its first coefficient."""
     u, v, w = place
     p, dp, ddp, q = cubic(u), slopes(u), bends(u), (cubic(v), slopes(v), bends(v))
     r, dr, plane = cubic(w), slopes(w), c.shape[1] * c.shape[2]
@@ -101,7 +101,7 @@ def spline(c: Any, at: float, place: Three) -> tuple[Four, Six]:
 
 @inlined
 def value(c: Any, at: float, place: Three) -> float:
-    """``field.value`` of the same."""
+    """``field.value`` of the same cells."""
     u, v, w = place
     q, n, plane = cubic(v), c.shape[2], c.shape[1] * c.shape[2]
     a, b, e, f = row(c, at, 0, n, q), row(c, at, plane, n, q), row(c, at, 2 * plane, n, q), row(c, at, 3 * plane, n, q)
@@ -116,7 +116,7 @@ def row(c: Any, at: float, shift: int, n: int, q: Four) -> Four:
 
 @inlined
 def locate(field: Field, q: Three) -> tuple[float, Three, float]:
-    """First coefficient of the cells that hold places q, mm, the places in them, and how far in the grid, mm."""
+    """Flat index of the first coefficient of the cell around q, mm; place in it; mm outside the grid, < 0 inside."""
     c = field.coefficients
     f = indices(field.to_index, field.origin, q)
     i, j = cell_of(f[0], float(c.shape[0] - 4)), cell_of(f[1], float(c.shape[1] - 4))
@@ -127,13 +127,13 @@ def locate(field: Field, q: Three) -> tuple[float, Three, float]:
 
 @inlined
 def known(phi: float, border: float) -> float:
-    """What a distance says of a place's clearance, as in ``energy.wall_energy``."""
+    """What is kept of a place's distance phi, as in ``energy.wall_energy``: ``border`` at least, 1 outside the grid."""
     return select(border <= 0.0, greater(phi, border), 1.0)  # type: ignore[no-any-return]
 
 
 @kernel
 def look_up(field: Field, found: Any) -> None:
-    """Look up the places in found (11,) of lanes, 0 to 2, mm: the jets there, then what is known of the distance."""
+    """Look up the places in rows 0 to 2, mm, of found (11,) in lanes: jets go to rows 0 to 9, ``known`` to row 10."""
     at, place, border = locate(field, (found[0], found[1], found[2]))
     first, second = per_mm(field.to_index, spline(field.coefficients, at, place))
     found[0], found[1], found[2], found[3] = first
@@ -143,7 +143,7 @@ def look_up(field: Field, found: Any) -> None:
 
 @kernel
 def look_first(field: Field, found: Any) -> None:
-    """The same of the distance alone, at a third of the cost."""
+    """Look up the distance alone, which goes to row 0, and ``known`` to row 10: a third of the cost."""
     at, place, border = locate(field, (found[0], found[1], found[2]))
     found[0] = value(field.coefficients, at, place)
     found[10] = known(found[0], border)

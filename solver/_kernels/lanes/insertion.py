@@ -1,6 +1,6 @@
 """Insertions in lock-step: each lane goes its own way from depth to depth, and all that relax do so together.
 
-Setting out on a step, and what follows its relaxation, a wire does by itself: ``insertion`` says how.
+Before and after the relaxation of a step, each wire does by itself what ``insertion`` says.
 """
 
 import math
@@ -182,7 +182,7 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
 
 @kernel
 def write_down(team: Team, plan: Plan, w: int) -> None:
-    """Write down a wire at a depth."""
+    """Write a wire at its depth, with what was counted on the way, into the plan."""
     me, wire = team.lanes[w], team.wires[w]
     state, counters, goal = wire.problem.state, wire.problem.scratch.counters[0], me.goal
     wire.place[0].shrink = max(wire.place[0].shrink, 8 * tol.SMALLEST_STEP)

@@ -65,7 +65,7 @@ def turn_of(b: Block, j: int, u: Three) -> Nine:
 
 @inlined
 def direction(frame: Nine) -> Three:
-    """Of the segment that ends at a node."""
+    """Direction of the segment that ends at a node with this frame."""
     return frame[2], frame[5], frame[8]
 
 
@@ -91,7 +91,7 @@ def wall_hessian(b: Block, p: int, n: Three) -> Six:
     f = wall_law.force(stiffness, weight, d)
     bend = (f * touch[CURRENT, p, 5], f * touch[CURRENT, p, 6], f * touch[CURRENT, p, 7],
             f * touch[CURRENT, p, 8], f * touch[CURRENT, p, 9], f * touch[CURRENT, p, 10])  # fmt: skip
-    # asked of lanes that touch here: what is left out takes as long as all the rest
+    # only lanes that touch here are asked: leaving the negative part out takes as long as all the rest
     project = (b.number[DAMPING] > 0.0) & (d > 0.0)
     if anywhere(project):
         rest = without_negative(bend, n)
@@ -187,7 +187,7 @@ def store_gains(gain: Any, j: int, gains: Gains) -> None:
 
 @kernel
 def sweep(b: Block, first: Any, base: int) -> None:
-    """``newton.sweep`` of every lane, from the tip to joint ``base``: the gains, and what they foretell."""
+    """``newton.sweep`` of every lane, from the tip to joint ``base``: fills gains, DECREMENT, DEFINITE and PIVOT."""
     k, u, r, damping, start = b.length.shape[0], b.u[CURRENT], b.r[CURRENT], b.number[DAMPING], b.number[START]
     zero, touch = spread(0.0), b.touch
     value, decrement, definite, lowest = at_tip(b), zero, zero == 0.0, spread(math.inf)

@@ -56,11 +56,11 @@ from solver._kernels.lanes.vectors import WIDTH
 from solver._kernels.newton import costate as costate_alone
 
 POOL = 32
-"""Wires that eight lanes work for: a lane whose wire is at rest takes another one, for all to be at about the same
-depth, and only the last few steps of so many wires find lanes idle."""
+"""Wires that eight lanes work for: a lane whose wire is at rest takes another one, so that all stay at about the same
+depth, and lanes are idle only in the last few steps."""
 WORTH_ANOTHER = 3
-"""Lanes whose steps failed that are worth another trial at once: it costs a third of a round, and a lane that waits
-loses an eighth of one."""
+"""Lanes with a failed step from which on another trial is made at once: a trial costs a third of a round, and a lane
+that waits for the next round loses an eighth of one."""
 
 
 class Team(NamedTuple):
@@ -81,7 +81,7 @@ class Team(NamedTuple):
     field: Field
 
 
-# Merged into the loop that they are the body of: to take a block out of a tuple costs as much as a short kernel.
+# Merged into the loop whose body it is: to take a block out of a tuple costs as much as a short kernel.
 @merged
 def do_round(team: Team, block: Block, raw: Block, number: Any) -> None:
     """Take every lane that is not idle one step further. number : that of the raw block."""
@@ -117,7 +117,7 @@ def do_round(team: Team, block: Block, raw: Block, number: Any) -> None:
 
 @kernel
 def get_ready(team: Team, raw: Block, number: Any) -> int:
-    """Say what the gains of each lane need; return the first joint of the longest wire."""
+    """Set each lane's damping and first free joint for the sweep; return the first joint of the longest wire."""
     size = team.first.size - 2
     base = size
     for lane in range(WIDTH):

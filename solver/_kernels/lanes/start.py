@@ -1,6 +1,6 @@
-"""Where a step of a wire that goes in lanes starts: as ``start.chosen`` says, with eight look-ups at a time.
+"""Where a step of a wire in lanes starts: ``start.chosen``, with eight look-ups at a time.
 
-Its points are looked up beside each other, as those of eight wires are in a trial.
+Eight points of one wire are looked up side by side, as those of eight wires are in a trial.
 """
 
 from typing import Any, NamedTuple

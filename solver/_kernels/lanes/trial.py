@@ -35,7 +35,7 @@ from solver._kernels.rollout import limited, relative
 
 @kernel
 def rollout(b: Block, base: int, spacing: float) -> None:
-    """``rollout.rollout`` of every lane from joint ``base`` on, and what of the energy comes with it.
+    """``rollout.rollout`` of every lane from joint ``base`` on; also fills BENDING, LOAD and JUMP.
 
     spacing : of the field, mm; see ``crossing.crossed``.
     """
@@ -87,12 +87,13 @@ def select9(condition: Any, one: Any, other: Any) -> Any:
 
 @kernel
 def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> None:
-    """``energy.wall_energy`` of the trial in every active lane, or enough of it to be too much. raw : the numbers of b.
+    """``energy.wall_energy`` of the trial in every active lane; only a part where that is too much already.
 
-    Points that touched are looked up first: a trial that fails does so by them, mostly, and needs no others.
+    Points that touched are looked up first: mostly a trial fails by them, and needs no others.     raw : the numbers
+    of b.
     """
     number, site, touch, total = b.number, b.site, b.touch[TRIAL], spread(0.0)
-    # what is lost to rounding, with room: which side of a limit a sum is on must not hang on its order
+    # ample room for rounding: the order of summation must not decide on which side of the limit a sum is
     number[ROOM] = number[ROOM] - (number[BENDING] + number[LOAD]) + 1e-9 * number[BENDING]
     sure, unsure = ask(b, field.slope, first, base)
     touch_at(b, raw, field, sure)
