@@ -37,8 +37,8 @@ def paint_vessel(values: Volume, grid: ScanGrid) -> tuple[Volume, Tube]:
 
 
 def _greys(values: Volume) -> tuple[float, float]:
-    """The grey in the scan's middle, where there is no air, and what a vessel is brighter by: the brightest, or far
-    above noise.
+    """The grey of tissue, from the scan's middle, where there is no air; and the painted vessel's contrast to it: that
+    of the brightest voxels, or LEAST_CONTRAST noises if that is more.
     """
     tissue = float(np.median(values[tuple(slice(n // 4, -(n // 4)) for n in values.shape)]))
     noise = 1.48 * float(np.median(np.abs(np.diff(values, axis=0)))) / np.sqrt(2.0)

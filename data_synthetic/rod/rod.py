@@ -27,7 +27,7 @@ def add_blocks(bands: Array, low: Index, high: Index, block: Array) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Sliders:
-    """limit (n + 1,) = mu N in newton, normal (n + 1, 3), anchor (n + 1, 3): what a node at x is held by."""
+    """What friction holds the nodes by: limit (n + 1,), mu N in newton; the wall's normal and an anchor (n + 1, 3)."""
 
     limit: Array
     normal: Array
