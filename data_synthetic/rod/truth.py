@@ -85,7 +85,7 @@ def converged_truth(
     """
     step, left = step_mm or TRUTH_STEP_MM, 0 if step_mm else MOST_HALVINGS
     while True:
-        # the shortest wire still gets a dozen nodes
+        # the shortest wire still gets eight steps
         fine = at_step(insertion, min(step, min(depths_mm) / 8.0))
         truth = cached_replay(fine, depths_mm, rolls_deg)
         quality = truth_quality(fine, truth)

@@ -28,7 +28,7 @@ class Blurred(NamedTuple):
 
 @kernel
 def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
-    """Nodes' weights for the value, first and second derivative at x, into the rows of ``w``; first and stop node."""
+    """Nodes' weights for value, first and second derivative at x, into rows of ``w``; returns first and stop node."""
     s = max(sigma, 0.6 * h)
     first, stop = nodes_near(x, x, REACH * s, h, n)
     stop = min(stop, first + w.shape[1])

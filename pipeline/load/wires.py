@@ -127,7 +127,7 @@ def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
 
 
 def _stated(path: Path, kind: str) -> tuple[str, str]:
-    """What a file says of itself, or its format for it; empty where it says nothing."""
+    """Space and unit that a file states, or that its format implies; empty where neither says."""
     with path.open("rb") as file:
         head = file.read(HEAD).decode("latin-1")
     default = ("", "")

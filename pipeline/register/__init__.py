@@ -54,7 +54,7 @@ class Anchor:
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """The motion of one frame against the reference; ``applied`` False where it is too small to matter.
+    """The motion of one frame against the reference; ``applied`` False where it is too small or not ``trusted``.
 
     moved_voxels : largest displacement of a wall point.  left_voxels : what a fit of the wall alone still asks for.
     misfit_voxels : residual of that fit, as the uncertainty of one point.  centre_shift_mm : (3,) of the
@@ -110,7 +110,7 @@ def _largest(motion: Motion, s: StaticPoints) -> float:
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
-    """The motion by least squares; where it is too large for that alone, they start from what SimpleITK finds."""
+    """The motion by least squares, which starts from SimpleITK's result where the motion is too large for it alone."""
     near = fit_motion(frame, to.structures)
     if near.misfit_voxels < BAD_MISFIT_VOXELS and _largest(near.motion, to.wall) < NEAR_VOXELS:
         return near.motion

@@ -26,9 +26,9 @@ breaks tubes of two voxels radius into pieces that look like neighbours; at 0.6 
 FAR = 3.0
 """Distance along a core, in sums of both radii, from which two stretches of one vessel do not count as neighbours."""
 ONWARD = 1.0
-"""How far (local radii) both vessels must go on beyond the contact, both ways: a branch does not, it ends there."""
+"""How far (local radii) both vessels must go on beyond the contact, both ways: a branch ends there, and does not."""
 WINDOW = 2.5
-"""Within how many local radii that is looked for."""
+"""Half width, in local radii, of the box around the contact in which that is looked for."""
 LEAST_FACES = 4
 """Voxel faces shared by two vessels below which they do not count as touching."""
 MOST_FACES = 2000

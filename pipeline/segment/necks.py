@@ -42,7 +42,7 @@ def _points(flat: Index, grid: Grid) -> Array:
 
 
 def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
-    """Distance (n,) from points (n, 3) to a tree, infinite beyond REACH, and to which of its points."""
+    """Distance (n,) from points (n, 3) to the nearest point of a tree, infinite beyond REACH, and its position."""
     away, at = tree.query(points, distance_upper_bound=REACH)
     return np.asarray(away, float), np.asarray(at, np.int64)
 

@@ -28,7 +28,7 @@ def _inside(distance: Grid) -> NDArray[np.bool_]:
 
 
 def beside(scan: Grid, distance: Grid, seeds_mm: Array, wire_radius_mm: float, blur_mm: float) -> Array | None:
-    """A seed (1, 3) LPS mm beside a region that is as thin as the wire; None where it is thicker or no seed is near.
+    """A seed (1, 3) LPS mm beside a region as thin as the wire; None if it is thicker, or no place is near enough.
 
     distance : signed, of the region, on a box of the scan.  blur_mm : the scanner's.
     """

@@ -198,7 +198,7 @@ class SignedDistance:
 
 
 def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
-    """The distance from the surface at the half level."""
+    """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface."""
     spacing: Array = np.asarray(site.volume.spacing_mm)
     inside, owner = sparse_zeros(site.state.shape, np.uint8), np.zeros(site.state.shape, np.int32)
     box = Owned(owner, inside, spacing)

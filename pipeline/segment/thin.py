@@ -25,7 +25,7 @@ from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 
 FAINTEST = 0.09
-"""Least share of the contrast at which branches are followed: other tissue may be brighter than that."""
+"""Least share of the contrast at which branches are followed: at a lower one, other tissue would be followed, too."""
 SIGMAS = 5.0
 """The same in standard deviations of the smoothed noise: 30 of a hundred million voxels are above by chance."""
 SKIRT = 3

@@ -75,7 +75,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     top, below = (ndimage.gaussian_filter(a.reshape(shape), SMOOTH, mode="constant") for a in (sums, weight))
     known = below > 1e-3 * float(weight.max())
     share = np.where(known, top / np.maximum(below, 1e-9), 1.0)
-    # how far blocks are off their neighbours is the noise of their levels, however it is correlated
+    # the scatter of blocks about the mean of their neighbours is the noise of their levels, correlated or not
     least = level + SURE * spread(level - share.reshape(-1)[name[good]])
     away, at = ndimage.distance_transform_edt(~known, return_indices=True)
     carried = share[tuple(at)]

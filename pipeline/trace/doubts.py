@@ -1,4 +1,4 @@
-"""What is held against a frame or a curve in the end: no wire, too much noise for it, or more wire than was found."""
+"""The last objections to a frame or a curve: no wire, too much noise for it, or more wire than was found."""
 
 from dataclasses import replace
 

@@ -19,14 +19,15 @@ MOST_APART = 3.0
 """Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
-"""Sum of both: a curve that begins further beyond the plane of entry lacks wire there, as 3 mm in correlated noise."""
+"""Their sum: a curve that begins further than that beyond the plane of entry lacks wire (3 mm in correlated noise)."""
 END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 1.75, 3.0, 1.5
 """How far (voxel) from a curve's end the wire's may lie, at three standard deviations: where steps were found, in an
 even wire, and where steps are stated. Of 277 dim ends on tuning seeds 103 were ok with 2.0, one of them 2.6 voxels off
 and one 2.0; with 1.75 it is 74, the worst 1.2 off. An even wire in correlated noise is refused for other reasons, too.
 A stated step shows the end to half a voxel: what is further off than the third contradicts it."""
 HAIRPIN_DEG, HAIRPIN_VOXELS = 140.0, 7.0
-"""A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were traced as one."""
+"""A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were traced as one, there and
+back."""
 J_MM = 6.0
 """A curve that goes on for no longer than this after such a turn is the hook of a J tip, of 1 mm radius and less."""
 TIP_BESIDE = 3.5

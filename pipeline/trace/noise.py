@@ -13,7 +13,7 @@ CLEAR_VOXELS = 3.5
 """Distance from the wire's axis from which grey less the fitted wire is taken for noise alone: nearer, the fit has
 taken some of it away."""
 BESIDE_VOXELS = 12.0
-"""and up to which: noise and background are those of the wire's own surroundings."""
+"""Distance up to which it is taken for that: noise and background are those of the wire's own surroundings."""
 PLACES = 300
 """Places at which the templates are tried, in DEPTHS groups: a standard deviation to 6 per cent in each."""
 DEPTHS = 4

@@ -26,7 +26,7 @@ FURTHEST_STEP = 100.0
 
 
 def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Array]:
-    """Grey (n,) of the voxels around a line (m, 3), and the grey (n, m) that unit wire up to each point gives them.
+    """Grey (n,) of the voxels around a line (m, 3), and what a wire of height 1 up to each point gives them (n, m).
 
     Voxels that wire before the line lights up, too, are left out.
     """

@@ -14,7 +14,7 @@ ANGLES = 12
 RING_BLURS = 1.4
 """Radius of the ring in blurs of the line: where two strands differ most from one that is as wide."""
 OVER_MM = 3.0
-"""Length over which it is averaged: shorter, a crossing shows."""
+"""Length over which the harmonic is averaged: over less, a crossing stands out."""
 
 
 PAIRED = 0.03

@@ -1,4 +1,4 @@
-"""What a wire stands out from: the frame minus its background, on the lumen's box, at the lumen's voxels alone.
+"""The frame minus its background, from which the wire stands out: on the lumen's box, at the lumen's voxels alone.
 
 Where no reference scan shows the background, the grey under the wire is taken from beside it (:func:`levelled`).
 """

@@ -16,10 +16,10 @@ from pipeline.trace.subtraction import Subtraction
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
 STIFFNESS = 2.0
-"""Standard deviation (voxel) that the prior gives third differences of control points: it spans gaps, not bends."""
+"""Prior's standard deviation (voxel) of third differences of control points: it carries gaps and leaves bends free."""
 FULL_KNOT = 8.0
-"""Knot distance (voxel) from which that holds; below, it falls with the cube of the distance. A short wire has two
-intervals whatever its length, and third differences of one and the same bend fall like that: else its ends curl up."""
+"""Knot distance (voxel) from which that holds; below, it falls with the cube of the distance, as third differences of
+one and the same bend do: else a short wire, which has two intervals whatever its length, curls up in the noise."""
 TIGHTEST = 10.0
 """Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
 TINT_KNOTS = 4
@@ -201,7 +201,7 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
 
 
 def _hold(normal: Array, right: Array, columns: list[int]) -> None:
-    """Leave some unknowns as they are."""
+    """Hold some unknowns: change the equations, in place, so that their step is 0."""
     for column in columns:
         normal[column], normal[:, column], right[column] = 0.0, 0.0, 0.0
         normal[column, column] = 1.0

@@ -22,7 +22,7 @@ from pipeline.trace.tube import Tube
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
 LEAST_WITH_PRIOR = 1.5
-"""and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
+"""The same with a previous curve, which does not help below that: the frame no longer shows where the wire ends."""
 NARROWEST = 0.7
 """Least width of a faint line over the scanner's blur: only noise is narrower."""
 LEAST_SEEN = 2.0
