@@ -10,7 +10,7 @@ from data_synthetic.geometry import Array, Index
 Vector = tuple[float, float, float]
 
 BLOCK = 16
-"""Samples under one bounding ball: 16 halves the cost of 8 at a thousand samples and gains nothing beyond."""
+"""Samples under one bounding ball: 16 cost half as much as 8 at a thousand samples, and more gain nothing."""
 FAR = 1e30
 """Stands for no tube yet; finite, so that differences stay finite."""
 TINY_LENGTH_MM = 1e-12
@@ -75,7 +75,7 @@ def ball_distance(
 
 @on_disk()
 def foot(p: Vector, sample: int, t: int, tubes: TubeTables) -> float:
-    """Where f of tube t is least near ``sample``: the one zero of f' there (f is convex), by the secant rule."""
+    """Where f of tube t is least near ``sample``: the one zero of f' there (f is convex), by modified regula falsi."""
     first, last, step = tubes.starts[t], tubes.starts[t + 1], tubes.steps[t]
     lo: float = max(sample - first - 1, 0) * 1.0
     hi: float = min(sample - first + 1, last - 1 - first) - 1e-12

@@ -37,7 +37,7 @@ def read_tree(path: str | Path) -> Tree:
         curves = [_read_curve(p) for p in (path, *sorted(set(path.parent.glob("*.mrk.json")) - {path}))]
         points, radii = (np.concatenate(parts) for parts in zip(*curves, strict=True))
         ends = np.cumsum([len(own) for own, _ in curves])
-        starts = np.setdiff1d(np.arange(ends[-1]), ends - 1)  # of the edges: a curve's last point begins none
+        starts = np.setdiff1d(np.arange(ends[-1]), ends - 1)  # where edges start: at all but a curve's last point
         return Tree(points, radii, np.column_stack([starts, starts + 1]), slice(0, int(ends[0])))
     raise ValueError(
         f"anatomy: {path}: got {path.suffix!r}; allowed: .swc, .mrk.json (with a Radius measurement); convert it"
@@ -55,7 +55,7 @@ def _read_swc(path: Path) -> Tree:
     points, radii = rows[:, 2:5], rows[:, 5]
     edges = np.array([(k, place[int(p)]) for k, p in enumerate(rows[:, 6]) if int(p) in place], dtype=np.int64)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-    # points that coincide (BraVa repeats branch points) are one, of the larger radius: an edge between them has no way
+    # points that coincide (BraVa repeats branch points) become one of the larger radius, else edges have no length
     unique, inverse = np.unique(points.round(6), axis=0, return_inverse=True)
     inverse = inverse.ravel()
     radius = np.zeros(len(unique))

@@ -62,7 +62,10 @@ def _smooth(points: Array, sigma: float) -> Array:
 
 
 def widest_path(tree: Tree, longest_mm: float = LONGEST_WAY_MM) -> Index:
-    """Indices of the path to be taken: from a wide end, at least half of ``longest_mm``, its narrowest place widest."""
+    """Indices of the best path from the widest end of a part: length (``longest_mm`` at most) + 5 times least radius.
+
+    The eight largest parts are tried; raises ValueError where none has a usable path.
+    """
     n, (a, b) = len(tree.points_mm), tree.edges.T
     length = np.linalg.norm(tree.points_mm[a] - tree.points_mm[b], axis=1)
     graph = coo_array((length, (a, b)), shape=(n, n))

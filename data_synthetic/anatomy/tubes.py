@@ -16,7 +16,7 @@ from data_synthetic.anatomy import _kernels as kernels
 from data_synthetic.geometry import Array, arc_lengths
 
 STEP_MM = 0.25
-"""Arc length between samples of a tube, about: they divide it evenly."""
+"""Approximate arc length between samples of a tube, which they divide evenly."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""A vessel filled with contrast among a scan's bright voxels, a tube and no sheet of bone; and the way through it."""
+"""Finds a vessel filled with contrast among a scan's bright voxels (a tube, no sheet of bone), and the way through."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,22 +27,23 @@ SAMPLES = 300
 SHEET = 0.53
 """Share of the ball of twice the inscribed radius: a straight tube fills 3/8 of it, a sheet 11/16; this is half-way."""
 MOSTLY = 0.5
-"""Share of the places that must be those of a tube: a skull with vessels that hang on it is none."""
+"""Least share of the places that must look like a tube: a skull with vessels attached to it has fewer."""
 THINNEST_VOXELS = 1.2
-"""Inscribed radius from which a place counts as seen: of noise there is none."""
+"""Least inscribed radius of the places that are looked at: noise has none."""
 SURROUNDINGS = 2, 5
 """From and to how many voxels outside a vessel its background is read."""
 BEFORE_MM = 5.0
-"""Of the way that is left out where it begins: there the scan may cut the vessel off."""
+"""Length left out at the beginning of the way: there the scan may cut the vessel off."""
 SHORTEST_WAY_MM, LONGEST_WAY_MM = 22.0, 100.0
-"""Of the vessel: less its ends the shortest takes two frames, 10 and 14 mm deep; from the neck to beyond a siphon."""
+"""Length of the way: without its ends the shortest has room for two frames, 10 and 14 mm deep; the longest leads from
+the neck to beyond a siphon."""
 WIDEST_WAY_MM = 1.2
-"""Radius of the way's tube at most: an aneurysm's own says nothing about the way past it."""
+"""Largest radius of the way's tube: that of an aneurysm says nothing about the way past it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Vessel:
-    """Its voxels, and the grey values inside and around it, of which half-way lies its wall."""
+    """The voxels of a vessel, and the grey inside and around it; its wall lies half-way between the two."""
 
     voxels: Mask
     grey: float
@@ -89,7 +90,7 @@ def components(values: Volume, level: float) -> Iterator[tuple[tuple[float, int,
 
 
 def tube_mm(part: Mask, spacing_mm: Array) -> float:
-    """Length of a part's skeleton along which it is a tube; 0 for a sheet."""
+    """Length (mm) of a part's skeleton, times the squared share of its places that look like a tube; 0 for a sheet."""
     inside = distance_transform_edt(part, sampling=spacing_mm)
     finest = float(np.min(spacing_mm))
     skeleton = np.argwhere(skeletonize(part) > 0)
@@ -112,11 +113,11 @@ def _filled(part: Mask, centre: Index, radii: Array) -> float:
 
 
 def _measured(values: Volume, level: float, voxel: Index) -> Vessel:
-    """The vessel of a voxel at the half level between its own grey and that around it."""
+    """The vessel that holds a voxel, bounded by the half level between its own grey and that around it."""
     vessel = _holding(values > level, voxel)
     greys = _greys(values, vessel)
     wall = _holding(values > 0.5 * sum(greys), voxel)
-    # at the half level a bone may hang on that the first level had kept apart
+    # at the half level the vessel may be connected to a bone that the first level had kept apart
     if wall.any() and np.count_nonzero(wall) < 3 * np.count_nonzero(vessel):
         vessel, greys = wall, _greys(values, wall)
     return Vessel(vessel, *greys)

@@ -64,7 +64,7 @@ def circle_of_willis(rng: np.random.Generator, plan: WillisPlan) -> Anatomy:
     if plan.tortuous_vertebrals:
         points["vertebral"] += SWING_MM
     wide, end = radius["cavernous"], radius["terminus"]
-    # petrous as the terminus widened, cavernous at its own size, tapering to the terminus
+    # petrous from 0.9 of the cavernous size, cavernous at its own, tapering to the terminus
     carotid = np.interp(np.arange(len(points["ICA"])), [0, 8, 10, 14], [0.9 * wide, wide, wide, end])
     middle = np.r_[0.95 * end, np.full(len(points["M1"]) - 1, radius["M1"])]
     radii: dict[str, float | Array] = {**radius, "ICA": carotid, "M1": middle}

@@ -37,7 +37,7 @@ class Wanted:
         found = []
         if scanner == "conebeam" and importlib.util.find_spec("itk") is None:
             found.append(ABSENT)
-        # what a scene asks of its size is said where there is a scene
+        # with a scene, _too_small tells what size it needs
         size = self.size if scene is None else None
         for name, value, least in (("frames", self.frames, 1), ("size", size, 1), ("seed", self.seed, 0)):
             if value is not None and value < least:
@@ -59,7 +59,7 @@ class Wanted:
             return [f"voxel-mm: got {voxel:g}; {allowed}"]
         else:
             least, needs = width_of_way(setup) / voxel, "a scan that holds the wire's way"
-        smallest = math.ceil(least - 1e-9)  # a whole number but for rounding is taken as it is
+        smallest = math.ceil(least - 1e-9)  # not one more where rounding made a whole number larger
         if size >= smallest:
             return []
         allowed = f"allowed for {scene.name}: {smallest} or more for {needs}; give more or leave it out"

@@ -1,4 +1,4 @@
-"""Scenes from a user's own anatomy; and how a wire is led along a way that nobody has drawn for it."""
+"""Scenes from a user's own anatomy, and trials that find the roll and depths by which a wire follows its way."""
 
 from dataclasses import replace
 from itertools import takewhile
@@ -22,7 +22,7 @@ DEEPEST_MM = 0.25
 
 
 def _on_the_way(insertion: TrueInsertion, frame: TrueFrame, way_mm: Array, corridor_mm: float) -> bool:
-    """Near the way, about as far along it as the wire is long (it may bulge, so 0.7), not stuck, no wild snap."""
+    """Whether the tip is near the way, far enough along it (0.7 of the depth: wires bulge), not stuck, not snapped."""
     away = np.linalg.norm(way_mm - frame.points_mm[-1], axis=1)
     foot = int(np.argmin(away))
     short = arc_lengths(way_mm)[foot] < 0.7 * frame.depth_mm - corridor_mm

@@ -11,9 +11,9 @@ from data_synthetic.geometry import Array, ScanGrid, Volume
 from data_synthetic.scanner.coverage import lumen_coverage
 
 VOXELS_ACROSS, NARROWEST_MM, WIDEST_MM = 6.0, 3.0, 8.0
-"""Of the vessel: across the coarsest axis of the scan, and its least and largest diameter."""
+"""Voxels, at the scan's coarsest spacing, across the vessel; its least and largest diameter."""
 SMALLEST_SCALE = 0.6
-"""Of the bend of 54 mm: less than that is no way for the tip of a wire, 8 mm long."""
+"""Least scale of the bend, which is 54 mm long at 1: a shorter one has no room for the tip of a wire, 8 mm long."""
 MARGIN_MM = 3.0
 """Between the vessel and the scan's edge; voxels up to here decide where it is painted."""
 PLACES = np.linspace(0.0, 1.0, 5)
@@ -37,8 +37,8 @@ def paint_vessel(values: Volume, grid: ScanGrid) -> tuple[Volume, Tube]:
 
 
 def _greys(values: Volume) -> tuple[float, float]:
-    """The grey in the scan's middle, where there is no air, and what a vessel is brighter by: the brightest, or far
-    above noise.
+    """The grey of tissue, from the scan's middle, where there is no air; and the painted vessel's contrast to it: that
+    of the brightest voxels, or LEAST_CONTRAST noises if that is more.
     """
     tissue = float(np.median(values[tuple(slice(n // 4, -(n // 4)) for n in values.shape)]))
     noise = 1.48 * float(np.median(np.abs(np.diff(values, axis=0)))) / np.sqrt(2.0)

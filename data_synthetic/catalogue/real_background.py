@@ -77,8 +77,8 @@ def read_scan(path: Path, voxel_mm: float | None) -> tuple[Volume, ScanGrid]:
 
 
 def _ground(values: Volume, grid: ScanGrid) -> tuple[Volume, Tube, Wall | None]:
-    """The scan with its vessel at 1 and what is around it at 0, the way through it, and its wall; no wall where the
-    vessel had to be painted, whose way is the wall, too. ValueError where there is no room for one.
+    """The scan with its vessel at 1 and what is around it at 0, the way through it, and its wall, or None where the
+    vessel had to be painted: the way's tube is its wall, too. ValueError where there is no room for one.
     """
     try:
         vessel = find_vessel(values, grid)

@@ -101,7 +101,7 @@ def insertion_into(plan: Plan, number: int) -> Study:
 
 
 def rolled_anew(setup: Setup, rng: np.random.Generator) -> Setup:
-    """The same way in with the wire taken in hand anew: another roll, depths a little off."""
+    """The same insertion repeated, the wire gripped anew: another roll, depths a little off."""
     turn, moved = rng.uniform(-ANEW_DEG, ANEW_DEG), rng.uniform(-ANEW_MM, ANEW_MM)
     depths = tuple(depth + moved for depth in setup.depths_mm)
     return replace(setup, depths_mm=depths, rolls_deg=tuple(roll + turn for roll in setup.rolls_deg))

@@ -215,7 +215,8 @@ def set_edge(tangents: Array, directors: Array, j: int, t: Vector, a: Vector) ->
 def carry(points: Array, angles: Array, tangents: Array, directors: Array, along: bool) -> None:
     """Tangents and directors (n + 1, 3) of moved nodes, in place; edge 0, the introducer, stays.
 
-    Each edge's are its own, turned by angles (n,), or, ``along`` the wire, without twist those of the edge before it.
+    Each edge carries its own old ones and turns them by ``angles`` (n,); with ``along``, it carries those of the edge
+    before it (without twist where the angles are 0).
     """
     q = np.zeros(8)
     for v in range(len(angles)):

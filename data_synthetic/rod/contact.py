@@ -18,7 +18,7 @@ CURVATURE_STEP_MM = 1e-4
 
 
 def wall_energy(rod: Rod, wall: Wall, points: Array) -> float:
-    """Half k d squared per mm of wire, N mm."""
+    """Energy of the wall, N mm: half k d squared per mm of wire that lies d mm too deep in it."""
     edges = _near(rod, wall, points)
     depth = np.maximum(wall.distance_and_gradient(_samples(points, edges))[0] + rod.radius_mm, 0.0)
     weight = np.repeat(rod.lengths[edges], len(PLACES)) * np.tile(WEIGHTS, len(edges))

@@ -50,8 +50,8 @@ class TrueFrame:
     """The wire at one depth. points_mm (n + 1, 3) from the entry to the tip, contact_N (n + 1, 3).
 
     anchor_mm (n + 1, 3) : the points of the wall that friction holds the nodes by (the nodes themselves without it).
-    residual_N : largest unbalanced nodal force.     jump_mm : largest sideways move of the tip in one advance since the
-    last frame, which tells a quiet insertion from one that snapped.
+    residual_N : largest unbalanced nodal force.     jump_mm : how much further than the push the tip moved in one
+    advance, at most, since the last frame: this tells a quiet insertion from one that snapped.
     """
 
     depth_mm: float

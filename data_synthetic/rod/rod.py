@@ -27,7 +27,7 @@ def add_blocks(bands: Array, low: Index, high: Index, block: Array) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Sliders:
-    """limit (n + 1,) = mu N in newton, normal (n + 1, 3), anchor (n + 1, 3): what a node at x is held by."""
+    """What friction holds the nodes by: limit (n + 1,), mu N in newton; the wall's normal and an anchor (n + 1, 3)."""
 
     limit: Array
     normal: Array
@@ -71,7 +71,7 @@ class TrueWire:
     """A guide wire. Profiles are (distance from the tip mm, value) knots, linear between, constant beyond.
 
     bending : EI in N mm2.     rest_curvature : 1/mm towards material axis 1.     torsional : GJ in N mm2; the
-    rod needs a finite one, and inf is stood in for by ``RIGID_TORSION``.     axial : EA in N.
+    rod needs a finite one, and ``RIGID_TORSION_N_MM2`` stands in for inf.     axial : EA in N.
     """
 
     radius_mm: float = 0.18

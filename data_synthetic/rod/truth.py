@@ -66,7 +66,7 @@ def _read(path: Path) -> tuple[TrueFrame, ...]:
 LONGEST_ADVANCE_MM = 0.4
 """Insertion between two equilibria: a tip cannot pass a wall of 1 mm unseen, and smaller steps change nothing."""
 TRUTH_STEP_MM, MOST_HALVINGS, CONVERGED_MM = 0.2, 2, 0.01
-"""The true wire's first node spacing, how often it is halved at most, and the move of a frame at which it is not."""
+"""The true wire's first node spacing, how often it is halved at most, and the move up to which it is close enough."""
 TRIED = 7
 """Frames of a study on which halving is tried."""
 
@@ -85,7 +85,7 @@ def converged_truth(
     """
     step, left = step_mm or TRUTH_STEP_MM, 0 if step_mm else MOST_HALVINGS
     while True:
-        # the shortest wire still gets a dozen nodes
+        # the shortest wire still gets eight steps
         fine = at_step(insertion, min(step, min(depths_mm) / 8.0))
         truth = cached_replay(fine, depths_mm, rolls_deg)
         quality = truth_quality(fine, truth)

@@ -31,7 +31,7 @@ BLUR_PIXELS = 0.5
 WIRE_BLUR_VOXELS = 0.35
 """sd, in half voxels, with which the wire is laid on its own fine grid, against aliasing."""
 VESSEL_MM = 5.0
-"""The vessel behind the body by which grey values are calibrated."""
+"""Thickness of the vessel in a body of water by which grey values are calibrated."""
 FULL, FULL_ARC = Greys(), Arc()
 """The grey values that a full dose of 40 mg iodine per ml at full exposure stands for, and the run that gives them."""
 

@@ -88,7 +88,7 @@ def write_study(study: Study, folder: str | Path, format: str = "mha", progress:
 
 
 def write_one_of(study: Study, folder: Path, number: int, format: str = "mha") -> str:
-    """Write an insertion of several as a study in a folder of its own; its part of the manifest of all of them."""
+    """Write one of several insertions as a study in a folder of its own; returns its part of the manifest of all."""
     write_study(study, folder / str(number), format)
     return manifest_text(study, format, f"{number}/", wires=number == 1)
 

@@ -19,14 +19,14 @@ def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
 
 
 def contiguous(grid: Grid) -> Grid:
-    """The grid itself if its values are C-contiguous, otherwise with a copy (of a crop, say) that is."""
+    """The grid itself if its values are C-contiguous, otherwise one with a contiguous copy of them (of a crop, say)."""
     return grid if grid.values.flags.c_contiguous else grid.with_values(read_only(np.ascontiguousarray(grid.values)))
 
 
 def in_memory_order(grid: Grid) -> tuple[Grid, tuple[int, int, int]]:
-    """The grid with C-contiguous values, its axes reversed if that is how they lie in memory (Fortran), and its axes.
+    """The grid with C-contiguous values, and the order of its axes: reversed if the values lie in Fortran order.
 
-    Both orders are their own inverse, so ``reorder(result, axes)`` gives the first order back.
+    Both orders are their own inverse, so ``reorder(result, axes)`` gives the original order back.
     """
     reverse = grid.values.flags.f_contiguous and not grid.values.flags.c_contiguous
     axes = (2, 1, 0) if reverse else (0, 1, 2)
@@ -63,10 +63,10 @@ def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
 
 
 def indices_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Where a contiguous mask is set, (n, 3): ``np.argwhere``, in a fifth of its time where little is set."""
+    """Indices (n, 3) where a contiguous mask is set, as ``np.argwhere``, in a fifth of its time where little is set."""
     return np.stack(np.unravel_index(np.flatnonzero(mask), mask.shape), axis=1)
 
 
 def spread(values: NDArray[Any]) -> float:
-    """Standard deviation (of normal noise) from the median absolute deviation: what stands out of it has no say."""
+    """Standard deviation of normal noise, from the median absolute deviation, which outliers hardly change."""
     return MAD * float(np.median(np.abs(values - np.median(values))))

@@ -1,4 +1,4 @@
-"""A blurred lattice at single voxels, its derivatives at single points, and its crests: nothing is filtered unasked.
+"""Values, derivatives and crests (ridge lines) of a Gaussian-blurred lattice, at the points asked for and no others.
 
 Coordinates of points are index * spacing (mm along the grid's axes); derivatives are per mm.
 """
@@ -13,9 +13,9 @@ from pipeline.arrays.lattice import clamped, entry_point, kernel, nodes_near, un
 REACH = 3.0
 """Half width of the Gaussian's window in sigmas."""
 WIDEST = 64
-"""Nodes along an axis that a window may have."""
+"""Most nodes that the window may have along an axis."""
 STRIDE = 0.7
-"""Longest step to a crest in voxels: a window of that blur sees no further."""
+"""Longest Newton step to a crest in voxels: as long as the blur, beyond which derivatives at a point say nothing."""
 
 
 class Blurred(NamedTuple):
@@ -28,7 +28,7 @@ class Blurred(NamedTuple):
 
 @kernel
 def _weights(x: float, h: float, sigma: float, n: int, w: NDArray[Any]) -> tuple[int, int]:
-    """Rows of ``w``: Gaussian, its first and its second derivative at the nodes within reach of x; and their range."""
+    """Nodes' weights for value, first and second derivative at x, into rows of ``w``; returns first and stop node."""
     s = max(sigma, 0.6 * h)
     first, stop = nodes_near(x, x, REACH * s, h, n)
     stop = min(stop, first + w.shape[1])
@@ -152,7 +152,7 @@ class Probe(NamedTuple):
 
 @kernel
 def new_probe() -> Probe:
-    """A probe that is nowhere yet."""
+    """A probe at the origin that has no tangent yet."""
     return Probe(np.zeros(3), np.zeros(3), np.empty(10), np.empty(3), np.empty((3, 3, WIDEST)))
 
 

@@ -1,7 +1,7 @@
 """What kernels of the imaging stages share: how they are compiled, indices of a lattice, lists that grow, sparse boxes.
 
-No fast-math: a result does not depend on how the work is split into functions. Before a loop, arrays are taken out of
-a named tuple: counting references to its fields once a round makes the loop five times as long.
+No fast-math: a result does not depend on how the work is split into functions. Kernels take arrays out of a named tuple
+before a loop: inside the loop, counting references to its fields in every round makes it five times as slow.
 """
 
 import contextlib
@@ -36,13 +36,13 @@ def unravelled(flat: int, shape: tuple[int, int, int]) -> tuple[int, int, int]:
 
 @kernel
 def nodes_near(low: float, high: float, reach: float, h: float, n: int) -> tuple[int, int]:
-    """First and one past the last of ``n`` nodes, ``h`` mm apart, within ``reach`` mm of what lies from low to high."""
+    """First and stop index of the nodes (of ``n``, ``h`` mm apart) within ``reach`` mm of the interval low to high."""
     return max(0, int(np.ceil((low - reach) / h))), min(n, int(np.floor((high + reach) / h)) + 1)
 
 
 @kernel
 def grown(array: NDArray[Any]) -> NDArray[Any]:
-    """A copy with twice the room along its first axis; what is in the second half means nothing."""
+    """A copy twice as long along its first axis; the second half is uninitialised."""
     return np.concatenate((array, np.empty_like(array)))
 
 
@@ -58,7 +58,7 @@ def steps_around(shape: tuple[int, int, int], reach: int) -> NDArray[Any]:
 
 
 def sparse_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Zeros in pages of 4 KiB of their own, given back as soon as the array is dropped.
+    """Zeros in 4 KiB pages of the array's own, given back to the system as soon as the array is dropped.
 
     ``np.zeros`` asks the kernel for pages of 2 MiB: a vessel that touches one voxel in fifty then holds the whole box
     (20 MiB for 600 scattered voxels of a box of 28 MiB, against 2 here), and clearing them takes time as well.

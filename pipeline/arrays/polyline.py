@@ -10,7 +10,7 @@ from pipeline.model import Array, arc_length
 
 
 def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
-    """Points (n, 3) of a polyline (m, 3) at arc lengths (n,) in mm from its start; beyond its ends, straight on."""
+    """Points (n, 3) of a polyline (m, 3) at arc lengths (n,) in mm from its start; beyond its end, straight on."""
     curve = np.asarray(curve_mm, dtype=np.float64)
     wanted = np.asarray(arc_mm, dtype=np.float64)
     arc = arc_length(curve)

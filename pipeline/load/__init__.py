@@ -1,5 +1,5 @@
-"""load: scans in. ``read_header`` reads geometry alone, ``read_headers`` that of all scans of a case, which is held
-against each other before any voxel is read, ``Crop.load`` the voxels of a box alone.
+"""load: scans in. ``read_header`` reads the geometry of one scan, ``read_headers`` those of all scans of a case, and
+compares them before any voxel is read; ``Crop.load`` reads the voxels of a box alone.
 
 A format is a module with four functions: ``recognises`` a path, ``parts`` (other files that belong to it),
 ``read_header`` of a source, ``read`` voxels of a box.
@@ -146,7 +146,7 @@ class Scans:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the files lacked, each said once."""
+        """What was assumed where the files lack something, each listed once."""
         return tuple(dict.fromkeys(text for header in self.all for text in header.assumed))
 
 

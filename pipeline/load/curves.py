@@ -32,7 +32,7 @@ SYSTEMS = {"LPS": 1.0, "1": 1.0, "RAS": RAS_TO_LPS, "0": RAS_TO_LPS}
 
 
 def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
-    """Control points (n, 3) of a markup, LPS mm. Where a file does not say it is LPS, as for 3D Slicer; 0 is RAS."""
+    """Control points (n, 3) of a markup, LPS mm; a file that states no system is LPS, as in 3D Slicer, 0 is RAS."""
     system = str(markup.get("coordinateSystem", "LPS")).upper()
     if system not in SYSTEMS:
         raise refused(path, f"coordinateSystem {system!r}", "LPS or RAS", "save the curve again")

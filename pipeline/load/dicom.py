@@ -1,4 +1,4 @@
-"""DICOM series in a folder or a multi-frame file: sorted by position, refused by name where a stack is no regular grid.
+"""DICOM series in a folder or a multi-frame file: sorted by position, refused, and why, where it is no regular grid.
 
 ITK's reader shears a tilted stack and silently respaces one that lacks a slice (ITK issues 441 and 1607), so the
 positions are judged here: tilt by what it amounts to over the whole stack, gaps by a regular grid through all slices.
@@ -24,9 +24,9 @@ from pipeline.load.voxels import read_box, scaled
 GAP_TOLERANCE, OFF_GRID = 0.01, 0.05
 """Of the slice spacing: how far a gap may be off, or each slice from a regular grid (positions of few digits)."""
 TILT_PIXELS = 0.5
-"""In-plane drift, in pixels, over the whole stack."""
+"""Largest in-plane drift, in pixels, over the whole stack."""
 SAME_PIXELS = 0.25
-"""What a difference of orientation or pixel spacing may amount to at the image's edge."""
+"""Most that a difference of orientation or pixel spacing may amount to at the image's edge, in pixels."""
 MOST_FILES = 20_000
 
 

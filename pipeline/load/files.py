@@ -19,7 +19,7 @@ OWN = {
 
 
 def head_of(path: Path, most_gib: float = LoadConfig.most_gib, *, whole: bool = True) -> Head:
-    """What a file's header says, held against the files' lengths; LoadError where it cannot be a scan."""
+    """What a file's header says, checked against the files' lengths; LoadError where it cannot be a scan."""
     read = next((own for suffix, own in OWN.items() if path.name.lower().endswith(suffix)), None)
     head = read(path) if read else None
     if head is not None:
@@ -51,7 +51,7 @@ def parts(path: Path) -> tuple[Path, ...]:
     if found is None or found[1].strip().upper() == "LOCAL":
         return ()
     name = found.group(1).strip()
-    # a list stands below; a pattern as slice_%03d.raw takes numbers
+    # the names of a list follow on the next lines; a pattern such as slice_%03d.raw takes numbers
     names = text[found.end() :].split() if name.upper().split()[:1] == ["LIST"] else [name]
     pattern = re.sub(r"%\d*d.*", "*", name)
     matches = path.parent.glob(pattern) if "*" in pattern and not Path(pattern).is_absolute() else ()

@@ -49,7 +49,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Mask(Source):
-    """An own lumen.     label : of several in a label map, by number or by name.     level : of a probability, 0..1."""
+    """A lumen as voxels.  label : which of a label map, by number or by name.  level : the wall's, of a probability."""
 
     label: int | str | None = None
     level: float | None = None
@@ -98,7 +98,7 @@ SPACING_MM, FARTHEST_MM = (1e-3, 100.0), 1e4
 
 
 def judged(header: Header) -> Header:
-    """The header with exactly orthonormal axes; LoadError where its geometry is none."""
+    """The header with exactly orthonormal axes; LoadError where its geometry cannot be used."""
     spacing, origin, direction = (np.asarray(v, float) for v in (header.spacing_mm, header.origin_mm, header.direction))
     low, high = SPACING_MM
     if not np.all((spacing >= low) & (spacing <= high)):
@@ -131,7 +131,7 @@ def describe(header: Header) -> str:
 
 
 def require_same_geometry(reference: Header, other: Header, name: str = "") -> None:
-    """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's; name : what to call it, besides."""
+    """Refuse a scan whose corners lie more than SAME_VOXELS from the reference's. name : of it, for the message."""
     found, shift = "the shapes differ", float("inf")
     if reference.shape == other.shape:
         apart = np.linalg.norm(corners_mm(reference.grid) - corners_mm(other.grid), axis=1)

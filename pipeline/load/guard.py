@@ -24,7 +24,7 @@ GIB = 2**30
 TEXT_BYTES, SURFACE_BYTES = 64 * 2**20, 256 * 2**20
 """Longest text (a curve, markups, a tree) and longest surface file: 5 million triangles."""
 DEFLATED = 1032
-"""Deflate makes a byte of at most this many: a header that asks for more was not written with these data."""
+"""Most bytes that deflate can pack into one: a header that asks for more was not written with these data."""
 LIKELY, LARGE = 250, GIB
 """More than LARGE bytes that were packed to less than 1/LIKELY hold nothing but one value: no scan, a bomb."""
 KINDS = {
@@ -150,7 +150,7 @@ def unpacked(path: Path, packing: str, offset: int) -> IO[bytes]:
 
 
 def skip(file: IO[bytes], count: int, *, packed: bool) -> None:
-    """Go ``count`` bytes on."""
+    """Skip ``count`` bytes; packed : they can only be read, not jumped over."""
     if not packed:
         file.seek(count, os.SEEK_CUR)
         return
@@ -162,7 +162,7 @@ def skip(file: IO[bytes], count: int, *, packed: bool) -> None:
 
 
 def require_room(what: object, need: int, there: int, packing: str, most_gib: float) -> None:
-    """LoadError where ``need`` bytes are more than anybody asked for, or cannot come from ``there`` bytes on disk."""
+    """LoadError where ``need`` bytes are more than ``most_gib``, or cannot come from ``there`` packed bytes on disk."""
     if need > most_gib * GIB:
         why = f"the header asks for {need / GIB:.1f} GiB; allowed: {most_gib:g} GiB a volume (load.most_gib)"
         raise unusable(what, f"{why}. Crop the scan, or raise the setting.")

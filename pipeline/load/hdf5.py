@@ -2,7 +2,7 @@
 
 A dataset's attributes give spacing_mm (needed), origin_mm (default 0), direction (default identity) and axes: "z,y,x"
 (the default: x fastest, as in other formats) or "x,y,z". A 4-D dataset has the volume's number as its first axis.
-The datasets of a group come in natural order, and each one's own geometry is held against the first one's.
+The datasets of a group come in natural order, and each one's geometry is compared with that of the first.
 """
 
 from pathlib import Path

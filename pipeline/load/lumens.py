@@ -55,7 +55,7 @@ def read_markups_branches(path: Path) -> Branches:
 
 
 def _closed(shapes: Shapes, path: Path) -> Shapes:
-    """The surface itself; LoadError where an edge does not have two triangles."""
+    """The surface itself; LoadError where it has no triangles, or an edge that an odd number of them share."""
     edges = np.sort(shapes.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     open_edges = int(np.sum(np.unique(edges, axis=0, return_counts=True)[1] % 2)) if len(edges) else -1
     if open_edges:
@@ -78,7 +78,7 @@ def _centreline(shapes: Shapes, path: Path) -> Branches:
 SHORTEST_MM = 2.0
 """No vessel that a wire is pushed through is shorter: a file of this size is in metres."""
 COARSEST_MM, LATTICE_VOXELS, MOST_FEET, MOST_WORK = 1.5, 60e6, 2e7, 5e9
-"""Coarsest lattice that a lumen may be put on (it holds LATTICE_VOXELS at most), points on its wall, voxels visited."""
+"""Coarsest voxel of the lattice that a lumen is put on; most voxels, points on the wall and visits to voxels."""
 
 
 def _in_bounds(path: Path, found: Branches | Shapes) -> Branches | Shapes:

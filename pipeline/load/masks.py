@@ -53,7 +53,7 @@ def _header(source: Source, head: Head) -> Header:
 
 
 def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, tuple[int, int]]]:
-    """The voxels of the layer that holds a label, and (layer, value) of the file's named ones."""
+    """The voxels of the layer that holds a label, and (layer, value) of the file's labels by their names."""
     path = source.path
     header = mask_header(source)
     head = head_of(path) if path.name.lower().endswith((".nrrd", ".nhdr")) else None
@@ -77,7 +77,7 @@ def _voxels(source: Source, label: int | str | None) -> tuple[Volume, dict[str, 
 
 
 def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str, tuple[int, int]]) -> NDArray[Any]:
-    """1 where the label is; without one where the only label is, or a probability."""
+    """1 where the voxels have the label; if none is given, 1 where the only label is, or the map's probabilities."""
     if value is None and "" in names:
         value = names[""][1]
     if value is not None:

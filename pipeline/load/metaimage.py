@@ -1,4 +1,4 @@
-"""Headers of MetaImage (.mha, .mhd), read here: ITK's own reader dies of some and takes what others lack as given."""
+"""Headers of MetaImage (.mha, .mhd), read here: ITK's own reader crashes on some, and fills in what others lack."""
 
 from pathlib import Path
 

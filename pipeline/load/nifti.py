@@ -1,6 +1,7 @@
-"""Headers of NIfTI-1 and -2 (.nii, .nii.gz, .hdr + .img), read here: its two forms, their units, what they disagree in.
+"""Headers of NIfTI-1 and -2 (.nii, .nii.gz, .hdr + .img), read here: both forms (sform, qform) and their units.
 
-Where both forms are given the sform is used, as nibabel does; ITK takes the qform in some cases.
+Where both forms are given the sform is used, as nibabel does, unless it is sheared and the qform is not; ITK takes the
+qform in some cases.
 """
 
 import re
@@ -17,7 +18,7 @@ from pipeline.load.voxels import Head, Placed, axes_of
 TYPES = {2: "u1", 4: "i2", 8: "i4", 16: "f4", 64: "f8", 256: "i1", 512: "u2", 768: "u4", 1024: "i8", 1280: "u8"}
 UNITS_MM = {0: 1.0, 1: 1e3, 2: 1.0, 3: 1e-3}
 AGREE_VOXELS = 0.1
-"""The two forms may lie this far apart at a corner before it is said."""
+"""The two forms may lie this far apart at a corner before the header's notes say so."""
 RIGHT_ANGLES = 1e-3
 """Cosine between axes up to which a form's matrix is a rotation written with few digits, not a shear."""
 _FIRST = {
@@ -85,7 +86,7 @@ def _packing(path: Path) -> str:
 
 
 def _fields(raw: bytes) -> Any:
-    """The header as a record in its own byte order; None for what is none."""
+    """The header as a record in its own byte order; None where the bytes are no header of NIfTI."""
     for table, size, magics in ((_FIRST, 348, (b"n+1", b"ni1")), (_SECOND, 540, (b"n+2", b"ni2"))):
         for order in "<>":
             if len(raw) < size or int(np.frombuffer(raw[:4], order + "i4")[0]) != size:

@@ -10,7 +10,7 @@ def natural_key(text: str) -> tuple[Any, ...]:
 
 
 def _of_part(part: str) -> tuple[tuple[str, int, str], ...]:
-    """Each number with the text before it: by its size, then by its digits (no name is too long to be a number)."""
+    """Each number with the text before it: compared by its count of digits, then by these, so that any length works."""
     pieces = re.split(r"([0-9]+)", part)
     digits = [piece.lstrip("0") for piece in pieces[1::2]]
     return (*((text, len(n), n) for text, n in zip(pieces[::2], digits, strict=False)), (pieces[-1], -1, ""))

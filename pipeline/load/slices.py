@@ -197,7 +197,7 @@ def _pixels(path: Path, data: Any, frames: int) -> Pixels:
 
 
 def grey(plane: Plane, stored: NDArray[Any]) -> NDArray[Any]:
-    """The bits that count of stored values, white high."""
+    """Stored values reduced to the bits that count, and turned round where white is low."""
     p = plane.pixels
     width = 8 * stored.dtype.itemsize
     if p.bits < width:

@@ -30,7 +30,7 @@ _TYPES = {
 
 
 _IN_COMMENT = re.compile(rb"SPACE\"?\s*[:=]\s*\"?(LPS|RAS)")
-_IN_FIELD = re.compile(rb"Name=\"SPACE\"[^>]*>([\d\s]*)<")  # the text's characters, by their numbers
+_IN_FIELD = re.compile(rb"Name=\"SPACE\"[^>]*>([\d\s]*)<")  # the text as character codes
 
 
 def space_of(head: bytes) -> str:

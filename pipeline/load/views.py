@@ -39,7 +39,7 @@ class CArm(_Strict):
 
     @property
     def matrix(self) -> Array:
-        """(3, 4) to pixels."""
+        """Projection (3, 4) from homogeneous LPS mm to homogeneous pixels."""
         source = np.array(self.source_mm)
         ways = np.column_stack([self.u_mm, self.v_mm, np.array(self.corner_mm) - source])
         inverse = np.linalg.inv(ways)

@@ -1,7 +1,7 @@
 """Voxels behind a parsed header: where they lie, and a box of them read without any library that could be misled.
 
-Of unpacked data the box's rows are read alone, of packed data what comes before the box's end is unpacked; what is held
-is the box and one plane.
+Of unpacked data only the box's rows are read; packed data are unpacked up to the end of the box. Memory holds the box
+and one plane.
 """
 
 import zlib
@@ -70,10 +70,10 @@ def axes_of(path: Path, sizes: list[int]) -> tuple[tuple[int, int, int], int]:
 
 
 def require_data(head: Head, most_gib: float, *, whole: bool = True) -> Head:
-    """The head itself; LoadError where its files cannot hold the voxels that it speaks of.
+    """The head itself; LoadError where its files cannot hold the voxels that it describes.
 
-    whole : also where unpacked data are cut short. Where a header alone is asked for they may be: one damaged frame
-    costs that frame when it is read, not the study.
+    whole : also refuse unpacked data that are cut short. They pass where only a header is asked for: a damaged frame
+    then costs that frame when it is read, not the study.
     """
     count = len(head.parts)
     if count == 0 or head.planes % count:
@@ -131,7 +131,7 @@ def _stored(head: Head, item: int, box: Box, channel: int) -> NDArray[Any]:
 
 
 def _fill(file: IO[bytes], rows: NDArray[Any]) -> None:
-    """Read an array from a file, in as many steps as that gives it."""
+    """Fill an array with a file's next bytes, in as many reads as that takes; EOFError where they end too early."""
     view, done = rows.data.cast("B"), 0
     while done < rows.nbytes:
         step = file.readinto(view[done:])  # type: ignore[attr-defined]
@@ -141,7 +141,7 @@ def _fill(file: IO[bytes], rows: NDArray[Any]) -> None:
 
 
 def _text(head: Head, item: int, box: Box) -> NDArray[Any]:
-    """Numbers that are written out: all are read."""
+    """A box of voxels that are written out as text; the whole file is read."""
     count = int(np.prod(head.shape)) * head.items * head.channels
     with unpacked(head.parts[0][0], "", head.parts[0][1]) as file:
         words = file.read().split()

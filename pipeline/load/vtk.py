@@ -32,7 +32,7 @@ class _Legacy:
         return self.raw[at + len(mark) : end].decode("latin-1").split(), end + 1
 
     def array(self, start: int, count: int, kind: str) -> NDArray[np.float64]:
-        """So many numbers from a place on."""
+        """``count`` numbers from byte ``start`` on; kind : their VTK type, which matters in binary files."""
         if self.binary:
             return np.frombuffer(self.raw, _TYPES[kind], count, start).astype(np.float64)
         words = self.raw[start:].split(None, count)[:count]

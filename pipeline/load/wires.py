@@ -104,14 +104,14 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
         points = OF_KIND[kind](path)
     except (LoadError, ValueError, TypeError, KeyError, IndexError) as error:
         return OtherFile(path.name, problem=str(error))
-    # all readers but that of tables turn what a file states to be RAS
+    # all readers but that of tables convert a file that states RAS by themselves
     turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not _stated(path, kind)[0])
-    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # whose reader does it itself
+    factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
     return _checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0))
 
 
 def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
-    """Space and unit of a file."""
+    """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
     agreed = []
     for what, own, given, key in zip(("space", "unit"), _stated(path, kind), (space, unit), ("LPS", "mm"), strict=True):
         if own and given and own != given:
@@ -127,7 +127,7 @@ def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
 
 
 def _stated(path: Path, kind: str) -> tuple[str, str]:
-    """What a file says of itself, or its format for it; empty where it says nothing."""
+    """Space and unit that a file states, or that its format implies; empty where neither says."""
     with path.open("rb") as file:
         head = file.read(HEAD).decode("latin-1")
     default = ("", "")

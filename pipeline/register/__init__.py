@@ -1,4 +1,4 @@
-"""register: how far the phantom moved between the reference and a frame, so that the frame can be read in its place.
+"""register: how far the phantom moved between the reference and a frame, so that the frame can be put back in place.
 
 A cheap look at the lumen's wall comes first (least squares at a few thousand points); only a frame that moved by more
 than a tenth of a voxel is registered (SimpleITK), and the cheap look then sharpens the result and says what is left.
@@ -29,7 +29,7 @@ STRUCTURE_POINTS = 12000
 LEAST_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
-"""How far from the wall they lie: a blurred wall is as wide."""
+"""How far from the wall the first look's points lie: a blurred wall is as wide."""
 BAD_MISFIT_VOXELS = 0.6
 """Residual of the first look from which it is not believed: a wall elsewhere altogether leaves more than 1."""
 
@@ -48,13 +48,13 @@ class Anchor:
 
     @cached_property
     def structures(self) -> StaticPoints:
-        """Points on all of them, for the fit of a frame that moved."""
+        """Points on walls and bones, for the fit of a frame that moved."""
         return static_points(self.reference, _thinned(self.reference, self.edges, STRUCTURE_POINTS))
 
 
 @dataclass(frozen=True, eq=False)
 class Registration:
-    """The motion of one frame against the reference; ``applied`` False where it is too small to matter.
+    """The motion of one frame against the reference; ``applied`` False where it is too small or not ``trusted``.
 
     moved_voxels : largest displacement of a wall point.  left_voxels : what a fit of the wall alone still asks for.
     misfit_voxels : residual of that fit, as the uncertainty of one point.  centre_shift_mm : (3,) of the
@@ -70,7 +70,7 @@ class Registration:
 
     @property
     def trusted(self) -> bool:
-        """Whether the walls of the frame lie where the reference has them, be it after the motion."""
+        """Whether the walls of the frame lie where the reference has them, once the motion is taken into account."""
         return self.misfit_voxels < BAD_MISFIT_VOXELS
 
     @property
@@ -110,7 +110,7 @@ def _largest(motion: Motion, s: StaticPoints) -> float:
 
 
 def _best(frame: Volume, to: Anchor) -> Motion:
-    """The motion by least squares; found first by SimpleITK where it is more than least squares can be trusted with."""
+    """The motion by least squares, which starts from SimpleITK's result where the motion is too large for it alone."""
     near = fit_motion(frame, to.structures)
     if near.misfit_voxels < BAD_MISFIT_VOXELS and _largest(near.motion, to.wall) < NEAR_VOXELS:
         return near.motion
@@ -122,8 +122,8 @@ def _best(frame: Volume, to: Anchor) -> Motion:
 def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     """Where the phantom lies in ``frame`` (on the reference's lattice).
 
-    A motion below ``skip_voxels`` everywhere on the wall is measured, said and not applied; nor is one that leaves the
-    walls elsewhere (not ``trusted``).
+    A motion below ``skip_voxels`` everywhere on the wall is measured and reported but not applied; nor is one after
+    which the walls still do not fit (not ``trusted``).
     """
     wall = to.wall
     if len(wall.points_mm) < LEAST_POINTS:

@@ -1,4 +1,4 @@
-"""Frames put back into their place: the phantom's motion found, the geometry corrected, and all of it said."""
+"""Puts frames back into their place: finds the phantom's motion, corrects the geometry, and reports both."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ from pipeline.register.rigid import Motion
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """How the frames of a case are registered: to ``anchor``, or to nothing, and ``reason`` says why.
+    """How the frames of a case are registered: to ``anchor``, or, where that is None, not at all, for this ``reason``.
 
     skip_voxels : a phantom that moved by less than this everywhere is taken not to have moved.
     """
@@ -39,10 +39,10 @@ def alignment_of(
 def put_in_place(
     frame: Volume, alignment: Alignment, read_moved: Callable[[Motion], Volume]
 ) -> tuple[Volume, Volume, Registration | None]:
-    """The frame to trace, the frame to look at, and how it lay.
+    """The frame to trace, the frame to show, and its registration.
 
-    The first keeps its grey values and has the geometry that it would have had the phantom not moved; ``read_moved``
-    reads the voxels that the moved lumen asks for. The second is interpolated onto the reference's lattice.
+    The first keeps its grey values and gets the geometry that it would have if the phantom had not moved;
+    ``read_moved`` reads the voxels that the moved lumen needs. The second is interpolated onto the reference's lattice.
     """
     found = None if alignment.anchor is None else register(frame, alignment.anchor, alignment.skip_voxels)
     if found is None or not found.applied:

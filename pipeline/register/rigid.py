@@ -14,13 +14,13 @@ from pipeline.model import Array, Volume
 from solver.grid import read_only
 
 EDGE_MEDIANS = 3.5
-"""Steepness, in medians of it, from which a voxel belongs to a static structure: 5.4 sd of what noise makes."""
+"""Steepness over the scan's median steepness from which a voxel is a static structure: 5.4 sd of what noise makes."""
 EDGE_SHARE = 0.4
-"""and in shares of the steepness at the lumen's wall: a quieter scan shall not take the wall's skirts."""
+"""The same over the steepness at the lumen's wall: without it a quiet scan would take the wall's blurred skirts."""
 METAL_NOISES = 6.0
-"""Excess over the brightest grey that the reference has within reach, in sd of noise, that only metal can be."""
+"""Excess over the brightest grey within REACH_VOXELS in the reference, in sd of noise, from which a voxel is metal."""
 REACH_VOXELS = 4
-"""How far the phantom is thought to move when metal is told from a bright wall that moved in."""
+"""Largest motion of the phantom that is assumed, so that a bright wall that moved is not taken for metal."""
 HALO_VOXELS = 2
 """What blur makes of a metal voxel on either side."""
 SHARE = 0.25
@@ -75,7 +75,7 @@ class Motion:
         return float(np.degrees(Rotation.from_matrix(self.rotation).magnitude()))
 
     def undone(self, frame: Volume) -> Volume:
-        """The frame's voxels where they lie in the phantom as the reference shows it: a new geometry, same values."""
+        """The frame in the reference's coordinates: the same values, with a geometry that takes the motion back."""
         origin = self.rotation.T @ (frame.origin_mm - self.shift_mm)
         return replace(frame, origin_mm=origin, direction=self.rotation.T @ frame.direction)
 

@@ -1,7 +1,7 @@
 """Small motions by least squares: what the grey values at the walls say, without filtering or resampling a scan.
 
 A wall that moves by d changes grey by -gradient . d there. Values and gradients are those of the Gaussian-blurred scan,
-taken at a few thousand points alone, so that noise falls to a fifth and nothing is interpolated.
+taken at a few thousand points alone, so that noise falls to 0.15 and nothing is interpolated.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ BORDER_VOXELS = 3.0
 TUKEY = 4.685
 """Tukey's constant: 95 % as good as least squares where there is no metal, blind to residuals beyond 4.7 sd."""
 ABOVE_NOISE = 3.0
-"""Steepness along a direction, in what noise alone gives it, from which it shows motion: a tube cut off by the scan's
-ends has none along itself, and fits made of noise were 0.4 voxel off."""
+"""Squared steepness along a direction, over what noise alone gives, from which it shows motion: a tube cut off by the
+scan's ends has none along its axis, and fits to noise were 0.4 voxel off."""
 METAL_SCALES = 5.0
 """Brighter than expected by this many scales is metal."""
 METAL_VOXELS = 4.0
@@ -123,7 +123,7 @@ def _reweighted(design: Array, grey: Array, used: NDArray[np.bool_]) -> tuple[Ar
 
 
 def near_metal(points_mm: Array, metal: NDArray[np.bool_], reach_mm: float) -> NDArray[np.bool_]:
-    """Points (n, 3) within reach of one that metal outshines: the skirts of its blur pull, but do not stand out."""
+    """Which points (n, 3) lie within reach of a metal one: the skirts of its blur bias a fit, but do not stand out."""
     if not metal.any():
         return metal
     gap, _ = cKDTree(points_mm[metal]).query(points_mm, distance_upper_bound=reach_mm)

@@ -28,9 +28,9 @@ METHOD = fuzzy_region
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What seeds find: the grid as if the vessel were evenly filled, its region, and its wall on the site's box.
+    """The vessel found from seeds: the grid with its contrast evened out, its region, and its wall on the site's box.
 
-    least : share of contrast that it has everywhere.  blur : the scanner's, mm.
+    least : lowest share of the contrast along the vessel.  blur : the scanner's, mm.
     """
 
     grid: Grid
@@ -42,7 +42,7 @@ class _Found:
 
     @property
     def distance(self) -> Grid:
-        """The wall as it is now."""
+        """The signed distance from the wall, with whatever was added to the vessel so far."""
         return self.site.grid.with_values(read_only(self.wall.values))
 
 
@@ -56,7 +56,7 @@ def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> _Found:
 
 
 def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
-    """The vessel around what was found, where that is the wire, of this radius; else what was found."""
+    """The vessel around the wire, where what was found is a wire of radius ``wire_mm``; otherwise what was found."""
     seed = beside(grid, found.distance, np.asarray(seeds_mm, float), wire_mm, found.blur)
     if seed is None:
         return found

@@ -1,6 +1,7 @@
-"""What is brighter than the vessel and lies at its wall: calcification or bone, where the half level is not the wall's.
+"""Finds what is brighter than the vessel and touches its wall: calcification, bone or metal.
 
-Between two classes of tissue the wall is half way; beside a third, brighter one it lies too far out, or is not there.
+Between two classes of tissue the wall is the half-level surface; beside a third, brighter one that surface lies too far
+out, or there is none.
 """
 
 import numpy as np
@@ -13,13 +14,13 @@ from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
 from solver.grid import Grid
 
 SEEN_VOXELS = 5.0
-"""How far outside the wall is looked."""
+"""How far outside the wall bright voxels are looked for."""
 AT_WALL_VOXELS = 1.5
-"""Distance from the wall within which something touches it: blurred, it lifts the half level there."""
+"""Distance from the wall within which something touches it: its blur moves the half-level surface there."""
 SIGMAS = 3.0
-"""Standard deviations of a voxel's noise by which the mean of 3^3 must be above BRIGHTER of the contrast."""
+"""Standard deviations of the mean of 3^3 voxels by which that mean must be above BRIGHTER of the contrast."""
 THICK = 2
-"""Layers that are taken off: what is left of bone and plaque is nothing of a wire, which is three voxels across."""
+"""Layers that are eroded: something is left of bone and plaque, nothing of a wire, which is three voxels across."""
 
 
 def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
@@ -32,7 +33,7 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
     box = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
     bright = (distance.values < SEEN_VOXELS * h) & (scan.values[box] > limit)
     near = indices_of(bright)
-    # most of what noise lifts above the limit is nothing: what is left lies in a far smaller box
+    # most voxels above the limit are noise: without them the rest lies in a far smaller box
     surely = grey_around(scan, near + corner) > limit + SIGMAS * levels.noise / np.sqrt(27.0)
     bright[tuple(near.T)], near = surely, near[surely]
     if len(near) == 0:
@@ -52,7 +53,7 @@ def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> t
 
 
 def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple[int, NDArray[np.float64]]]:
-    """Voxels at the wall, and their middle, of each bright thing that is thick enough."""
+    """Number of voxels at the wall, and their centroid, of each connected bright object that is thick enough."""
     thick_ones = ndimage.binary_erosion(bright, iterations=THICK, border_value=1)
     touched = indices_of(bright & at_wall)
     if len(touched) == 0 or not thick_ones.any():

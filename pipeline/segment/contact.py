@@ -1,8 +1,9 @@
 """Vessels that run side by side so close that their lumens have merged: found, so that the report can say so.
 
-The core of a vessel is where the wall is at least 0.7 as far as the vessel is thick there. Where two vessels touch
-flank to flank the opening between them is shallow, so their cores stay apart; at a branching the cores are joined, or
-one of them ends there. Merged is what meets without being near along the cores, and goes on both ways on both sides.
+The core of a vessel is where the depth (distance to the wall) is at least 0.7 of the local thickness. Where two vessels
+touch flank to flank, the opening between them is shallow and their cores stay apart; at a branching the cores join, or
+one of them ends there. Vessels have merged where they meet though they are far apart along the cores, and go on there
+in both directions.
 """
 
 from collections.abc import Sequence
@@ -23,15 +24,15 @@ CORE = 0.7
 """Depth over local thickness in a core: tubes of radius r have separate cores until they overlap by r / 2. At 0.8 noise
 breaks tubes of two voxels radius into pieces that look like neighbours; at 0.6 two vessels at 0.5 mm voxels merge."""
 FAR = 3.0
-"""Steps along a core, in sums of both radii, from which two stretches of one vessel are not neighbours."""
+"""Distance along a core, in sums of both radii, from which two stretches of one vessel do not count as neighbours."""
 ONWARD = 1.0
-"""How far (local radii) both vessels must go on beyond the contact: a branch ends in its parent, and does not."""
+"""How far (local radii) both vessels must go on beyond the contact, both ways: a branch ends there, and does not."""
 WINDOW = 2.5
-"""Within how many local radii that is looked for."""
+"""Half width, in local radii, of the box around the contact in which that is looked for."""
 LEAST_FACES = 4
 """Voxel faces shared by two vessels below which they do not count as touching."""
 MOST_FACES = 2000
-"""Faces that are looked at; of more every second, third, ... one: a head taken for a vessel has 100 000."""
+"""Most faces that are looked at; of more, only every second, third, ...: a head taken for a vessel has 100 000."""
 LONG = 3.0
 """Length over radius from which a core is a vessel's: what is shorter is a bump of the wall, or the opening itself."""
 LEAST_DEPTH = 0.75
@@ -68,7 +69,7 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
 
 
 def parts(points: Array, apart: float) -> Index:
-    """The part (n,) that each point (n, 3) belongs to: points at most ``apart`` from one another hang together."""
+    """Number (n,) of the connected component of each point (n, 3); points at most ``apart`` from another are linked."""
     pairs = cKDTree(points).query_pairs(apart, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
@@ -97,7 +98,7 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     distance : signed distance, mm, negative inside; C-contiguous.
     """
     values, spacing = distance.values, np.asarray(distance.spacing_mm)
-    # kernels step to neighbours without looking for the box's border: it is kept free
+    # kernels step to neighbours without checking for the box's border: an empty layer is put around
     inside = np.pad(values < 0, 1)
     inner = np.flatnonzero(inside)
     if len(inner) == 0:

@@ -1,4 +1,4 @@
-"""Segmentation by fuzzy connectedness: what hangs together with the seeds in grey, and its thin branches.
+"""Segmentation by fuzzy connectedness: the voxels connected to the seeds by similar grey, and their thin branches.
 
 Udupa and Samarasekera, Graph. Models Image Process. 58 (1996) 246.
 """
@@ -75,7 +75,7 @@ def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Regi
         "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
     }  # fmt: skip
     region = Region(order, np.zeros(0, np.int64), levels, affinity.taps, counters)
-    if not len(config.other_seeds_mm):  # what is to be left out might be what lies behind
+    if not len(config.other_seeds_mm):  # what lies behind a neck might be what those seeds are to cut off
         region = through_necks(grid, low, region, affinity, config)
     thin = thin_branches(grid, low, region.voxels, levels, affinity)
     counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(thin))}

@@ -1,4 +1,4 @@
-"""What a method of segmentation goes by near the seeds (two grey levels and the noise), and the region that it finds.
+"""The grey levels and noise near the seeds that a segmentation method starts from, and the region that it finds.
 
 A method is a function like :func:`fuzzy.fuzzy_region`.
 """
@@ -21,10 +21,10 @@ BOX_MM = 6.0
 LEAST_BOX = 8
 """Its least half width in voxels."""
 THICK = 5.0
-"""Depth over blur from which grey in the middle is the plateau."""
+"""Depth over blur from which the grey in the middle of a vessel reaches its plateau."""
 BRIGHTER = 1.25
-"""Contrast over the seed's from which grey is not the vessel's but bone's or metal's: bone that hangs together with a
-lumen of 0.6 mm voxels, 1.3 times as bright, was taken for its plateau, and the wall was 0.43 voxels too narrow."""
+"""Contrast, over that at the seed, from which a voxel is bone or metal: bone 1.3 times as bright, connected to a lumen
+of 0.6 mm voxels, was taken for the lumen's plateau, and the wall came out 0.43 voxels too narrow."""
 BRIGHT_SHARE = 0.1
 """Share of the deepest voxels that may be so bright before they are left out."""
 
@@ -36,8 +36,9 @@ Index = NDArray[np.int64]
 class GreyLevels:
     """Grey values of the object and of what surrounds it, and the noise of one voxel before smoothing.
 
-    seed, at_seed : the voxel beside which they were taken first, and the grey inside there.     brightest, foreign :
-    the grey up to which the vessel is believed, and the share of the deepest part that is brighter, where there is any.
+    seed, at_seed : the voxel around which they were first estimated, and ``inside`` as it was there.
+    brightest, foreign : the grey above which a voxel is no vessel, and the share of the deepest voxels that are
+    brighter; set only where that is more than BRIGHT_SHARE.
     """
 
     inside: float
@@ -73,7 +74,7 @@ def _median(values: NDArray[Any], otherwise: float) -> float:
 
 
 def _two_levels(grey: NDArray[Any], seed: float, at: tuple[int, ...]) -> tuple[float, float, NDArray[np.bool_]]:
-    """Median grey of the bright region that holds the seed and of what is darker, by fixed-point iteration.
+    """Median grey of the bright region that holds the seed, that of what is darker, and the region, by fixed point.
 
     The region's median is held near the seed's grey, lest bone that touches it be taken for the vessel.
     """
@@ -103,7 +104,7 @@ def _noise(rough: NDArray[Any], region: NDArray[np.bool_]) -> float:
 
 
 def levels_at(grid: Grid, index: NDArray[Any]) -> tuple[GreyLevels, NDArray[np.int64]]:
-    """GreyLevels around one seed voxel, and the brightest smoothed voxel beside it, where to start.
+    """GreyLevels around one seed voxel, and the voxel (3,) to start at: that of median smoothed grey among its 3^3.
 
     Noise is the spread of (grey - grey smoothed by 1-2-1) inside, which white noise of sd 1 leaves at 0.935.
     """
@@ -134,7 +135,7 @@ def scanner_blur(blur_mm: float, taps: NDArray[Any], voxel: float) -> float:
 
 
 def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> GreyLevels:
-    """The levels again, from the deepest part of the whole segmented vessel.
+    """The levels estimated again, from the deepest part of the whole segmented vessel.
 
     distance : signed, on a box of the scan.  blur_mm : the scanner's.  A tube no thicker than its blur never reaches
     its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2). What is too bright for
@@ -167,7 +168,7 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
 
 
 def _deepest(off_wall: NDArray[Any]) -> tuple[float, Index]:
-    """How deep a vessel is, and which of its voxels lie so."""
+    """Depth of a vessel (99th percentile, mm), and positions of its voxels that are deeper than 0.7 of that."""
     depth = float(np.percentile(off_wall, 99))
     return depth, np.flatnonzero(off_wall > 0.7 * depth)
 
@@ -181,7 +182,7 @@ def grey_around(scan: Grid, index: Index) -> NDArray[np.float64]:
 
 
 def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> float:
-    """The grey up to which the vessel is believed: that at the seed, its blur taken off, and BRIGHTER of it."""
+    """The grey above which a voxel is no vessel: BRIGHTER times the contrast at the seed, corrected for its blur."""
     if levels.seed is None:
         return float("inf")
     depth = -float(distance.values[box_around(distance, np.array(levels.seed) - corner, 0.0, 1)].min(initial=0.0))
@@ -191,7 +192,7 @@ def _brightest(distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float
 
 
 def brighter(levels: GreyLevels) -> tuple[str, ...]:
-    """One sentence for the report where the vessel hangs together with something brighter, or none."""
+    """One sentence for the report where the vessel is connected to something brighter, or none."""
     if not levels.foreign:
         return ()
     return (
@@ -204,10 +205,10 @@ def brighter(levels: GreyLevels) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """The voxels of a vessel (flat indices of the scan), and what its wall is to be found by.
+    """The voxels of a vessel (flat indices of the scan), and what is needed to find its wall.
 
     thin : flat indices of branches too thin for a wall at half height.  levels : grey inside and outside.  taps : the
-    separable smoothing of the grey in which the wall is looked for.  necks : axes (n, 3), voxels, of places that are.
+    separable smoothing of the grey in which the wall is looked for.  necks : axes (n, 3), voxels, of the necks passed.
     """
 
     voxels: Index
@@ -224,7 +225,7 @@ def failed(got: str, allowed: str, do: str) -> StageError:
 
 
 def seed_voxels(grid: Grid, seeds_mm: ArrayLike) -> Index:
-    """The voxels (n, 3) of the seeds; a seed outside the volume has no lumen."""
+    """The voxels (n, 3) of the seeds that lie in the volume; raises StageError where none does."""
     points = np.atleast_2d(np.asarray(seeds_mm, float))
     index = np.rint(grid.to_index(points)).astype(np.int64)
     outside = np.any((index < -1) | (index > np.array(grid.shape)), axis=1)

@@ -1,8 +1,8 @@
 """A vessel that goes on behind a neck too narrow to reach half the contrast: found by its axis, and opened.
 
-A stenosis of one voxel radius peaks at a third of the contrast: connectedness ends there, and with it the lumen. What
-is as bright as the vessel, hangs together with it at a lower grey and lies straight ahead of its end is its other part;
-a vessel or a bone that touches its flank is not.
+A stenosis of one voxel radius peaks at a third of the contrast: connectedness ends there, and with it the lumen. The
+other part of the vessel is as bright, connected to it at a lower grey, and lies straight ahead of its end; a vessel or
+a bone that touches its flank does not.
 """
 
 from collections.abc import Sequence
@@ -25,30 +25,30 @@ from solver.grid import Array, Grid
 REACH = 14.0
 """Longest neck, voxels from end to end."""
 WINDOW = 18.0
-"""Voxels of either end within which its direction is seen: longer than vessels are thick."""
+"""Voxels around an end of a vessel from which its direction is taken: more than vessels are thick."""
 ROOT = 4.0
-"""and within which its middle is."""
+"""Voxels around an end over which its middle is taken."""
 MOST_NECKS, MOST_TRIED = 4, 8
 """Necks that are passed, and ends that are tried for each."""
 MOST_BEYOND = 200_000
-"""Bright voxels beyond the vessel from which they are other tissue."""
+"""Most bright voxels that may lie beyond the vessel: more are other tissue."""
 SIDE_VOXELS = 2.0
 """How far off the straight way between two ends the neck's axis is looked for."""
 
 
 def _points(flat: Index, grid: Grid) -> Array:
-    """Voxels (n, 3) as floats."""
+    """Indices (n, 3) of flat voxels, as floats."""
     return np.stack(np.unravel_index(flat, grid.shape), axis=1).astype(float)
 
 
 def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
-    """Distance (n,) from points (n, 3) to a tree, infinite beyond REACH, and to which of its points."""
+    """Distance (n,) from points (n, 3) to the nearest point of a tree, infinite beyond REACH, and its position."""
     away, at = tree.query(points, distance_upper_bound=REACH)
     return np.asarray(away, float), np.asarray(at, np.int64)
 
 
 def _shell(flat: Index, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which of the voxels, ascending, are not all round among their own kind: the nearest to what lies outside is."""
+    """Which voxels (flat, ascending) have a 6-neighbour outside the set: the one nearest to the vessel is of these."""
     steps = np.array([shape[1] * shape[2], shape[2], 1])
     beside = (flat[:, None] + np.concatenate([steps, -steps])).ravel()
     at = np.minimum(np.searchsorted(flat, beside), len(flat) - 1)
@@ -56,7 +56,7 @@ def _shell(flat: Index, shape: tuple[int, ...]) -> NDArray[np.bool_]:
 
 
 def _runs_along(points: Array, end: Array, heading: Array) -> bool:
-    """Whether an end of a vessel, voxels (n, 3) near it, is longer along a heading (3,) than it is wide."""
+    """Whether a vessel, voxels (n, 3), extends further along a heading (3,) than across it, near its ``end`` (3,)."""
     near = points[np.linalg.norm(points - end, axis=1) < WINDOW]
     spread = np.cov(near.T)
     side = np.eye(3) - np.outer(heading, heading)
@@ -64,12 +64,12 @@ def _runs_along(points: Array, end: Array, heading: Array) -> bool:
 
 
 def _middle(points: Array, end: Array) -> Array:
-    """The middle (3,) of a vessel's end."""
+    """The centroid (3,) of a vessel's voxels (n, 3) within ROOT of its ``end`` (3,)."""
     return np.asarray(points[np.linalg.norm(points - end, axis=1) < ROOT].mean(axis=0))
 
 
 def _axis(grid: Grid, start: Array, stop: Array) -> Array:
-    """The crest (n, 3), voxels, along which a neck leads from one middle to the other."""
+    """The axis (n, 3) of a neck, voxels: the brightest points beside the straight way from ``start`` to ``stop``."""
     way = stop - start
     share = np.linspace(0.0, 1.0, int(np.ceil(2.0 * np.linalg.norm(way))) + 1)
     u = np.cross(way, np.eye(3)[int(np.argmin(np.abs(way)))])
@@ -78,7 +78,7 @@ def _axis(grid: Grid, start: Array, stop: Array) -> Array:
     beside = (steps[:, None, None] * u + steps[None, :, None] * v).reshape(-1, 3)
     places = start + share[:, None, None] * way + beside
     seen = values_at(Blurred(grid.values, np.ones(3), CREST_VOXELS), places.reshape(-1, 3)).reshape(len(share), -1)
-    # a voxel off the straight way costs what noise may gain there
+    # a place off the straight way is marked down, per voxel^2, by what noise may gain there
     seen = seen - 0.02 * np.ptp(seen) * np.sum(beside**2, axis=1)
     best = places[np.arange(len(share)), np.argmax(seen, axis=1)]
     window = np.ones(3) / 3.0
@@ -129,7 +129,7 @@ def _neck(
 
 
 def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region:
-    """The region with all that lies behind its necks. low : flat indices of what hangs together at a lower grey."""
+    """The region with all that lies behind its necks. low : flat indices of what is connected to it at a lower grey."""
     while len(region.necks) < MOST_NECKS:
         grown = _next(grid, low, region, affinity, config)
         if grown is None:
@@ -139,11 +139,10 @@ def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, co
 
 
 def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least: int) -> list[Array]:
-    """The axes of necks that connectedness passes and the wall does not.
+    """The axes of necks that are open to connectedness, but closed in the signed distance.
 
-    Grey is smoothed before the wall is looked for: between a radius of 1.0 and 1.4 voxels half the contrast is reached
-    before, and not after. distance : signed distance on the box that begins at ``corner``; least : voxels of a
-    part.
+    The wall is looked for in smoothed grey: a neck of 1.0 to 1.4 voxels radius reaches half the contrast before the
+    smoothing, and not after. distance : on the box that begins at ``corner``; least : voxels that a part must have.
     """
     inside = distance < 0
     numbers, _ = ndimage.label(inside)
@@ -172,7 +171,7 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
 
 
 def _ahead(grid: Grid, here: tuple[Array, Array], there: tuple[Array, Array]) -> Array | None:
-    """The axis between two parts, each voxels (n, 3) and its end (3,); None where one does not go on as the other."""
+    """The axis of a neck between two parts, each voxels (n, 3) and its end (3,); None where they are not in line."""
     start, stop = _middle(*here), _middle(*there)
     heading = (stop - start) / np.linalg.norm(stop - start)
     on = _runs_along(*here, heading) and _runs_along(*there, heading)
@@ -182,7 +181,7 @@ def _ahead(grid: Grid, here: tuple[Array, Array], there: tuple[Array, Array]) ->
 def add_necks(
     necks: Sequence[Array], box: tuple[NDArray[np.float32], Index], grid: Grid, levels: GreyLevels, blur_mm: float
 ) -> tuple[str, ...]:
-    """Lower the signed distance to that of the union with the necks; a sentence for each.
+    """Lower the signed distance to that of the union with the necks; returns a sentence for each.
 
     box : signed distance, and the voxel of the grid at which it begins.  blur_mm : the scanner's.
     """

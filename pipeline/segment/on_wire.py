@@ -1,4 +1,4 @@
-"""A scan that shows the wire, too: a seed that lies on a wire of several voxels finds the wire and not its vessel."""
+"""Scans that show the wire as well: a seed on a wire several voxels thick finds the wire instead of its vessel."""
 
 from typing import Any
 
@@ -11,16 +11,16 @@ from pipeline.segment.levels import grey_around
 from solver.grid import Grid
 
 AS_THIN, AS_THIN_VOXELS = 1.25, 0.5
-"""Depth of a region, in radii of the wire and in voxels more, up to which it may be the wire: of 0.9 mm wires in
-voxels of 0.1 to 0.3 mm it is 1.1 radii, and no vessel that a wire goes through is as narrow."""
+"""Greatest depth of a region that may be the wire: so many radii of the wire plus so many voxels. 0.9 mm wires in
+voxels of 0.1 to 0.3 mm have 1.1 radii, and no vessel that a wire goes through is as narrow."""
 OFF_VOXELS, OFF_BLURS, SHELL_VOXELS = 2.0, 2.5, 1.5
 """How far outside its wall the wire's blur is gone, and how thick the shell is in which the vessel is looked for."""
 NEAR_MM = 3.0
-"""Distance from the seeds within which that is."""
+"""Distance from the seeds within which the vessel is looked for."""
 VESSEL_SHARE = 0.75
 """Quantile of the shell's grey that is the vessel's: a wire at the wall has tissue on up to half of its sides."""
 SWALLOWED = 0.9
-"""Share of the wire's voxels that the vessel around it holds at the least."""
+"""Least share of the wire's voxels that must lie in the vessel around it."""
 
 
 def _inside(distance: Grid) -> NDArray[np.bool_]:
@@ -28,7 +28,7 @@ def _inside(distance: Grid) -> NDArray[np.bool_]:
 
 
 def beside(scan: Grid, distance: Grid, seeds_mm: Array, wire_radius_mm: float, blur_mm: float) -> Array | None:
-    """A seed (1, 3) LPS mm beside a region that is as thin as the wire; None where it is thicker.
+    """A seed (1, 3) LPS mm beside a region as thin as the wire; None if it is thicker, or no place is near enough.
 
     distance : signed, of the region, on a box of the scan.  blur_mm : the scanner's.
     """

@@ -1,4 +1,4 @@
-"""A lumen that the real wire ran out of was too small: opened where traces say so."""
+"""Opens a lumen where traces of the real wire run outside it: there it was too small."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from solver.grid import Grid, read_only
 OUTSIDE_VOXELS = 1.0
 """How far outside the wall a wire's axis lies before the wall is at fault: both are known to a fraction of that."""
 SIGMAS = 3.0
-"""and by so many standard deviations of the trace: at CNR 3 one ran 1.2 voxels outside a lumen that was right."""
+"""Standard deviations of the trace to be added to that: at CNR 3 a trace ran 1.2 voxels outside a correct lumen."""
 ROOM_VOXELS = 0.5
 """Room around the wire where the lumen is opened: the error of a trace that was bridged."""
 
@@ -22,7 +22,7 @@ ROOM_VOXELS = 0.5
 def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bool = False) -> Lumen:
     """The lumen with room for every trace of a wire of this radius, and a warning that says where it had none.
 
-    The lumen itself where they all lie within it.     given : whether it was given as a file instead of segmented.
+    The lumen itself where all traces lie within it. given : whether it was given as a file instead of segmented.
     """
     grid, axes = in_memory_order(lumen.distance)
     spacing = np.asarray(grid.spacing_mm)
@@ -55,7 +55,7 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bo
 
 
 def _depth(grid: Grid, index: Array) -> Array:
-    """Signed distance (n,) at places (n, 3) in voxels; beyond the last voxel the most that it can be there.
+    """Signed distance (n,), mm, at places (n, 3) in voxels; beyond the scan's end an upper bound of it.
 
     A scan ends half a voxel beyond the middle of its last slice, and a wire enters through that end: there the vessel
     goes on, as far as anybody sees.

@@ -1,4 +1,4 @@
-"""From a mask and grey values to a signed distance: half-level surface, closest points, blur's bias taken off.
+"""From a mask and grey values to a signed distance: half-level surface, closest points, correction of the blur's bias.
 
 Blur puts the half-level surface of a curved wall inside the true wall. For a wall of small curvature the offset is
 sigma^2 (k1 + k2) / 2; for a tube as thin as the blur it is far more, so the offset is taken from the exact profile of a
@@ -27,14 +27,14 @@ DEEP = 3
 LEVEL_TOLERANCE = 0.03
 """Change of the wall's level, in contrasts, that is worth a second surface; a smaller one just shifts the wall."""
 THIN_TOLERANCE = 0.004
-"""The same where no vessel is thick: there level, curvature and blur hang together."""
+"""The same where no vessel is thick: there level, curvature and blur depend on each other."""
 SURFACE_ROUNDS = 3
 """Surfaces at most beyond the first: only a vessel as thin as its blur, whose plateau is not seen, needs them."""
 NOISE_LEFT = 0.29
 """Share of a voxel's noise that moves the wall, after smoothing: with 0.6 to 0.2 mm voxels, noise of 0.03 to 0.21 of
-the contrast, the wall is off by 0.06 to 0.22 voxels (standard deviation), of which 0.07 is no noise's."""
+the contrast, the wall is off by 0.06 to 0.22 voxels (standard deviation), of which 0.07 is not due to noise."""
 INWARDS = 2.5
-"""How far from the wall grey is its plateau's, voxels."""
+"""How far inside the wall, in voxels, the grey has reached its plateau."""
 THINNEST = 1.2
 """Radius over blur below which a blurred cylinder no longer reaches half its contrast (1.177), with a margin."""
 
@@ -144,7 +144,7 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
 
 
 def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArray[np.bool_]:
-    """Whether what lies INWARDS of surface voxels (flat, of the box) is the vessel: bone's wall is steeper."""
+    """Which surface voxels (flat box indices) have vessel, not bone, INWARDS of them: the wall of bone is steeper."""
     if not np.isfinite(levels.brightest):
         return np.ones(len(voxels), bool)
     index = np.stack(np.unravel_index(voxels, site.state.shape), axis=1) - PAD + site.corner
@@ -167,8 +167,8 @@ def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: flo
 def signed(box: Owned, wall: tuple[Array, Array, Array], outer_mm: float, pad: int) -> NDArray[np.float32]:
     """Signed distances on a box without its padding, from every voxel's foot and the wall's normal and curvature there.
 
-    wall : feet (n, 3), normals (n, 3), curvatures (n,).  The result lies in the memory of ``box.owner``, whose numbers
-    of feet it replaces one by one: one box is held instead of two.
+    wall : feet (n, 3), normals (n, 3), curvatures (n,).  The result lies in the memory of ``box.owner``, whose entries
+    it overwrites one by one: one box is held instead of two.
     """
     shape = tuple(n - 2 * pad for n in box.owner.shape)
     values = box.owner.reshape(-1).view(np.float32)[: int(np.prod(shape))].reshape(shape)
@@ -182,7 +182,7 @@ class SignedDistance:
 
     values : float32, mm, negative inside, on the site's grid; ``outer_mm`` wherever the wall is further away outside.
 
-    levels : at half of them is the wall.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
+    levels : the wall is at their half level.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
     """
 
     values: NDArray[np.float32]
@@ -192,13 +192,13 @@ class SignedDistance:
 
     @property
     def noise_mm(self) -> float:
-        """Standard deviation of the wall by noise: NOISE_LEFT of it, over the wall's steepness."""
+        """Standard deviation (mm) of the wall's place by noise: NOISE_LEFT of the noise over the wall's steepness."""
         levels = self.levels
         return float(NOISE_LEFT * levels.noise * np.sqrt(2 * np.pi) * self.blur_mm / levels.contrast)
 
 
 def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
-    """The distance from the surface at the half level."""
+    """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface."""
     spacing: Array = np.asarray(site.volume.spacing_mm)
     inside, owner = sparse_zeros(site.state.shape, np.uint8), np.zeros(site.state.shape, np.int32)
     box = Owned(owner, inside, spacing)
@@ -227,7 +227,7 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
 
 
 def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
-    """The distance from the wall, whose level is taken again from the surface that it leads to."""
+    """The distance from the wall, whose level is estimated again from each surface found until it hardly changes."""
     voxel = float(np.min(site.volume.spacing_mm))
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
@@ -235,7 +235,7 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
         again = plateau(site.volume, site.grid.with_values(read_only(found.values)), levels, own)
         thin = -float(found.values.min()) < 4 * found.blur_mm
         near = abs(again.half - levels.half) < (THIN_TOLERANCE if thin else LEVEL_TOLERANCE) * levels.contrast
-        # bone that has just been seen is in this surface's blur
+        # a surface made before bone was noticed has the bone in its blur: one more round
         if near and bool(again.foreign) == bool(levels.foreign):
             break
         levels = again

@@ -1,8 +1,8 @@
 """Branches too thin to reach half the contrast: followed at a lower grey, and given the radius that their peak tells.
 
 A cylinder of radius r blurred by sigma peaks at 1 - exp(-r^2 / 2 sigma^2) of the contrast: two voxels across and a blur
-of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half height ends there. Beyond the blurred
-skirt of the vessel, what hangs together at a lower grey, is long, thin and nowhere bright, is such a branch.
+of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half height ends there. Such a branch is
+connected to the vessel at a lower grey, and beyond the vessel's blurred skirt it is long, thin and nowhere bright.
 """
 
 import numpy as np
@@ -25,15 +25,15 @@ from pipeline.segment.surface import into_box, padded_box
 from solver.grid import Array, Grid
 
 FAINTEST = 0.09
-"""Least share of the contrast at which branches are followed: other tissue may be brighter than that."""
+"""Least share of the contrast at which branches are followed: at a lower one, other tissue would be followed, too."""
 SIGMAS = 5.0
-"""The same in standard deviations of the smoothed noise: none of a hundred million voxels is above by chance."""
+"""The same in standard deviations of the smoothed noise: 30 of a hundred million voxels are above by chance."""
 SKIRT = 3
 """Layers around the voxels at FULL that the vessel's own blur may fill: from 0.65 to 0.09 it falls in two voxels."""
 SHORTEST = 6
 """Voxels from end to end of a branch."""
 FATTEST = 45.0
-"""Voxels per step along a branch: its cross-section where the skirt ends, and oblique steps."""
+"""Most voxels per step along a branch: room for its cross-section where the skirt ends, and for oblique steps."""
 BRIGHTEST = 0.75
 """Share of the contrast above which something is no thin branch, but a vessel that connectedness did not reach."""
 FULL = 0.65
@@ -45,11 +45,11 @@ BRIDGE_VOXELS = 7.0
 LEAST_RADIUS = 0.6
 """Voxels: a thinner tube falls between the nodes of the distance and comes to pieces."""
 NEAR_VOXELS = 3.0
-"""How far round about the highest point of a crest is looked for."""
+"""Radius in which a crest point is compared with the highest one."""
 HIGHEST = 0.85
-"""Share of the brightest crest point within three voxels that another must have: half a blur off it is 0.88."""
+"""Least height of a crest point over that of the highest one within NEAR_VOXELS; half a blur off a crest it is 0.88."""
 SHARP = 0.4
-"""Curvature of a crest over that of a Gaussian line of its height: half a blur off its middle it is down to 0.7."""
+"""Least curvature of a crest over that of a Gaussian line of its height; half a blur off the middle it is still 0.7."""
 
 
 Balls = tuple[Array, Array]
@@ -81,7 +81,7 @@ def beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
 
 
 def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinity) -> tuple[Index, float]:
-    """Flat indices of what hangs together with the seeds at the faintest grey, and the number of voxels read."""
+    """Flat indices of the voxels connected to the seeds at the faintest grey, and the number of voxels read."""
     tables = _low_affinity(levels, affinity)
     return (np.zeros(0, np.int64), 0.0) if tables is None else connect(volume, seeds, tables, 0.5, neighbours(6))
 
@@ -109,7 +109,7 @@ def thin_branches(volume: Grid, low: Index, order: Index, levels: GreyLevels, af
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:
-    """Which points (n, 3), in voxels, have no much brighter one beside them: on the flank of a crest one does."""
+    """Which points (n, 3), in voxels, have no much brighter one within NEAR_VOXELS; points on a crest's flank have."""
     near = cKDTree(points).query_ball_point(points, NEAR_VOXELS)
     return np.array([s >= HIGHEST * share[n].max() for s, n in zip(share, near, strict=True)], bool)
 
@@ -137,10 +137,10 @@ def _nearest(places: Array, points: Array) -> tuple[Array, NDArray[np.int64]]:
 
 
 def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_], Array]:
-    """Which points (n, 3) hang together with the vessel's (m, 3) over gaps of at most ``reach``, and the bridges.
+    """Which points (n, 3) are connected to the vessel's (m, 3) over gaps of at most ``reach``, and the bridges.
 
-    Returns also (b, 2): from a point to the place it hangs on, (b, 2, 3). Pieces are joined nearest first, as in
-    Prim's minimum spanning tree: the gaps are the skirts that were cut out of one connected region.
+    A bridge, of (b, 2, 3), leads from a point to the place to which it is joined. Pieces are joined nearest first, as
+    in Prim's minimum spanning tree: the gaps are the skirts that were cut out of one connected region.
     """
     piece = parts(points, 2.0)
     gap, at = _nearest(vessel, points)
@@ -160,7 +160,7 @@ def joined(points: Array, vessel: Array, reach: float) -> tuple[NDArray[np.bool_
 
 
 def add_balls(distance: NDArray[np.float32], spacing: Array, found: Balls, outer_mm: float) -> None:
-    """Lower the signed distance to that of the union with the balls that hang together with the vessel."""
+    """Lower the signed distance to that of the union with the balls connected to the vessel, and with their bridges."""
     vessel = indices_of(distance < 0).astype(float)
     centre, radius = found
     if len(radius) == 0 or len(vessel) == 0:

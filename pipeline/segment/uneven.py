@@ -1,7 +1,7 @@
-"""Contrast that is not the same everywhere: medium that settles, mixes, decays along the vessel.
+"""Vessels whose contrast is not the same everywhere: the medium settles, mixes or decays along the vessel.
 
-The lumen's own level is taken from its core, block by block, carried on by a few millimetres, and the grey divided by
-it; what hangs together with the seeds is looked for anew, until it no longer grows.
+The local level is measured in the lumen's core, block by block, and carried on by a few millimetres. The contrast is
+divided by it, and the vessel is segmented again, until it no longer grows.
 """
 
 from collections.abc import Callable
@@ -20,26 +20,29 @@ BLOCK = 5
 CORE = 2
 """Voxels that a core lies inside the region: deeper than the wall's blur."""
 LEAST = 12
-"""Voxels of core in a block from which its median is believed."""
+"""Least number of core voxels in a block whose median is believed."""
 EVEN = 0.82
 """Share of the contrast that all blocks reach in a vessel that is filled evenly."""
 SURE = 3.0
 """Standard deviations by which a block is below EVEN before the vessel is called unevenly filled."""
 LOWEST, HIGHEST = 0.25, 1.1
-"""Shares of the contrast between which a level is believed: brighter is bone or metal, darker is tissue."""
+"""Shares of the contrast to which levels are clipped: brighter is bone or metal, darker is tissue."""
 SMOOTH = 0.7
-"""Gaussian over blocks."""
+"""Standard deviation, in blocks, of the Gaussian that smooths the levels."""
 CARRIED_BLOCKS = 2
 """How far beyond the last block with a core a level is carried."""
 GROWN = 1.01
-"""Growth of the region from one round to the next below which it is whole."""
+"""Growth of the region from one round to the next below which it counts as whole."""
 ROUNDS = 8
 """Rounds at most; each takes the lumen on by CARRIED_BLOCKS."""
 
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """Share of the contrast in blocks of the box that begins at ``corner``; least : of any block with a core."""
+    """Share of the contrast in each block of the box that begins at ``corner``.
+
+    least : the lowest of any block with a core, plus SURE standard deviations; 1 at most.
+    """
 
     share: Array
     corner: Index
@@ -47,7 +50,7 @@ class Filling:
 
 
 def filling(grid: Grid, region: Region) -> Filling:
-    """How full the vessel is where it was found."""
+    """The share of the contrast that the vessel has, block by block, measured in its core."""
     index = np.stack(np.unravel_index(region.voxels, grid.shape), axis=1)
     margin = CARRIED_BLOCKS * BLOCK + CORE
     low = np.maximum(index.min(axis=0) - margin, 0)
@@ -72,7 +75,7 @@ def filling(grid: Grid, region: Region) -> Filling:
     top, below = (ndimage.gaussian_filter(a.reshape(shape), SMOOTH, mode="constant") for a in (sums, weight))
     known = below > 1e-3 * float(weight.max())
     share = np.where(known, top / np.maximum(below, 1e-9), 1.0)
-    # how far blocks are off their neighbours is the noise of their levels, however it is correlated
+    # the scatter of blocks about the mean of their neighbours is the noise of their levels, correlated or not
     least = level + SURE * spread(level - share.reshape(-1)[name[good]])
     away, at = ndimage.distance_transform_edt(~known, return_indices=True)
     carried = share[tuple(at)]
@@ -81,7 +84,7 @@ def filling(grid: Grid, region: Region) -> Filling:
 
 
 def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
-    """The grid as if the vessel were full everywhere."""
+    """The grid as if the vessel had its full contrast everywhere: grey above ``outside`` over the local share."""
     shape = np.minimum(np.array(found.share.shape) * BLOCK, np.array(grid.shape) - found.corner)
     axes = [(np.arange(int(n)) + 0.5) / BLOCK - 0.5 for n in shape]
     share: NDArray[np.float64] = found.share
@@ -98,7 +101,7 @@ def filled(grid: Grid, levels: GreyLevels, found: Filling) -> Grid:
 
 
 def evened(grid: Grid, region: Region, again: Callable[[Grid], Region]) -> tuple[Grid, Region, float]:
-    """Grid and region of a vessel that is filled evenly, or as if it were; and the least share of contrast in it.
+    """Grid and region of the vessel, its contrast evened out where it varies, and the least share of contrast in it.
 
     again : segments another grid from the same seeds.
     """

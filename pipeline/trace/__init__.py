@@ -43,11 +43,11 @@ def trace(
 ) -> Curve:
     """The wire of one frame from the plane of entry to the tip.
 
-    frame, reference : scans of one geometry, with and without wire (without, or where correlated noise hides the wire:
-    the background is modelled from the lumen's wall).  entry_mm, entry_direction : (3,) LPS mm.  previous : the curve
-    of the frame before, if any; it is consulted only where the frame alone leaves doubts.  expected_mm : insertion
-    depth, which helps to decide.  opacity : the wire's brightness per length over the distance from its tip (any
-    unit), a number or pairs; found where it is not given.
+    frame, reference : scans of one geometry, with and without wire; where there is no reference, or correlated noise
+    hides the wire, the background is modelled from the lumen's wall.  entry_mm, entry_direction : (3,) LPS mm.
+    previous : the curve of the frame before, if any; it is consulted only where the frame alone leaves doubts.
+    expected_mm : insertion depth, which helps to decide.  opacity : the wire's brightness per length over the distance
+    from its tip (any unit), a number or pairs; found where it is not given.
     Returns a Curve; what went wrong is its status and note.
     """
     config = config or TraceConfig()
@@ -81,13 +81,13 @@ def _seen(
     curve = BACK_END(image, entry, previous, config)
     if reference is None or not image.correlated or curve.status is not FrameStatus.TRACE_LOW_CONTRAST:
         return curve
-    # smoothing takes white noise off the reference; correlated noise it adds to the frame's, 1.4 times as much
+    # smoothing removes the reference's white noise; correlated noise stays and adds to the frame's: 1.4 times as much
     alone = BACK_END(subtracted(frame, lumen, None), entry, previous, config)
     return alone if alone.status is FrameStatus.OK and _same(alone, curve, image.voxel, 2.0) else curve
 
 
 def _same(curve: Curve, other: Curve, voxel: float, tip_voxels: float) -> bool:
-    """Whether two ways to see the wire found the same one: to a voxel along it and to so many at its tip."""
+    """Whether two curves are the same wire: under a voxel apart along 95 % of it, under ``tip_voxels`` at the tip."""
     if len(other.points_mm) == 0:
         return False
     near = cKDTree(other.points_mm).query(curve.points_mm)[0]
@@ -100,10 +100,10 @@ CATHETER_END_MM = 1.0
 
 
 def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
-    """The curve; one that ends with a stated catheter, whose tip may hide where the wire ends, is not to be trusted.
+    """The curve; ambiguous if it ends where the stated catheter does, whose tip may hide where the wire ends.
 
-    One that gets dimmer where the catheter ends is no longer doubted for that. For frames without a stated depth: where
-    there is one, it says which of the two was traced.
+    A curve that gets dimmer where the catheter ends is no longer doubted for that. Used for frames without a stated
+    depth alone: where there is one, it says which of the two was traced.
     """
     dim = curve.levels.get(DIM_FROM_TIP, np.inf)
     if abs(curve.length_mm - dim - catheter_mm) < CATHETER_END_MM:
@@ -122,7 +122,7 @@ HARDLY_BEGUN = 0.25
 
 
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
-    """The curve, traced or given; one that is ok but too far from the expected length has that as its status."""
+    """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
         return curve
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "

@@ -20,14 +20,15 @@ from pipeline.trace.tube import Tube, fit_tube, predicted
 ENTRY_REACH_MM = 4.0
 """How far from the manifest's entry the wire may pass."""
 PREFIX_MM = 3.0
-"""How much wire before the entry is fitted along: its end must not disturb the fit at the entry."""
+"""Length of wire before the entry that is fitted as well, so that its end does not disturb the fit at the entry."""
 STREAK_SHARE = 0.2
 """Crest grey, as a share of the wire's peak, below which a bright line is a streak of the wire: a second wire's crest
 has 0.6 to 0.9 of it, streaks of steel in a cone-beam scan reach a few hundredths."""
 WIDE_KNOTS = 1.4
-"""Times CLOSEST from which closer knots are tried: below 6 noises. At 8 they gain 2 % for a fourth of the time."""
+"""Knot distance over CLOSEST from which closer knots are tried, as below 6 noises. At 8 noises they would gain 2 % and
+cost a fourth of the time."""
 BENDS_SURE = 4.0
-"""Standard deviations of what they save by chance from which they are taken."""
+"""Standard deviations by which closer knots must save more than they do by chance."""
 NEAR_VOXELS = 2.5
 """Crests nearer than this to the curve belong to it."""
 
@@ -50,8 +51,8 @@ class Attempt:
     """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain.
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
-    behind_mm : length of the line before the path's first point, beyond the entry.  goes_on : past its tip, faintly.
-    confirmed : by the length that the manifest states.  late_mm : of wire that is missing at the entry.
+    behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
+    is seen past its tip.  confirmed : whether the manifest states a length.  late_mm : wire missing at the entry.
     """
 
     tube: Tube
@@ -187,7 +188,7 @@ def cold(
 
 
 def beside(image: Subtraction, attempt: Attempt, pieces: list[Tracklet]) -> Attempt:
-    """The attempt held against the crests of another one, which may stay apart where its own have merged."""
+    """The attempt with its leftover by the crests of another one, which may be apart where its own have merged."""
     left_mm = _leftover(image, attempt.tube, pieces, attempt.known)
     return replace(attempt, pieces=pieces, leftover_mm=left_mm)
 

@@ -1,4 +1,4 @@
-"""Scans in larger voxels: a wire nine voxels thick is no crest to a blur of one, and has nine times the noise."""
+"""Scans in larger voxels: in a blur of one voxel a wire nine voxels thick has no crest, and nine times the noise."""
 
 from dataclasses import replace
 from weakref import WeakKeyDictionary
@@ -13,11 +13,11 @@ COARSE_MM = 0.3
 
 _of_lumen: WeakKeyDictionary[Lumen, tuple[int, Lumen]] = WeakKeyDictionary()
 _of_scan: WeakKeyDictionary[Volume, tuple[int, Volume]] = WeakKeyDictionary()
-"""The last of each, which frames share."""
+"""The last coarse version of each lumen and scan, with its factor: frames share them."""
 
 
 def times(voxel_mm: float) -> int:
-    """How many voxels of this size go into one along an edge; 1 where they are large enough."""
+    """How many voxels of this size, along each axis, are averaged into one; 1 where they are large enough."""
     return max(1, int(COARSE_MM / voxel_mm + 1e-6))
 
 

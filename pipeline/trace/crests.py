@@ -17,7 +17,7 @@ from pipeline.trace.subtraction import Subtraction
 SEED_SIGMAS = 5.5
 """A tracklet starts at smoothed grey this many standard deviations up: noise gives none in 150 000 voxels."""
 KEEP_SIGMAS = 3.0
-"""and goes on down to this many."""
+"""It goes on down to grey this many standard deviations up."""
 TURN = 0.75
 """Least cosine between the directions of two steps of one voxel: a wire turning within 1.5 voxels is none."""
 PREFILTER = 1.5

@@ -1,4 +1,4 @@
-"""What is held against a frame or a curve in the end: no wire, too much noise for it, or more wire than was found."""
+"""The last objections to a frame or a curve: no wire, too much noise for it, or more wire than was found."""
 
 from dataclasses import replace
 
@@ -19,7 +19,9 @@ from pipeline.trace.whose_end import nothing_beyond, of_one_device
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
-    """Whether the lumen holds more bright voxels than noise makes: three times as many above 3.5 sigmas, and 15."""
+    """Whether the lumen has more bright voxels than noise makes: over 15 and over 3 times as many above 3.5 sigmas as
+    there are below -3.5.
+    """
     sample = smooth_voxels(image.grey, gaussian_taps(1.0), image.region.within)
     limit = 3.5 * spread(sample)
     up, down = (int(np.sum(s * (sample - np.median(sample)) > limit)) for s in (1, -1))
@@ -27,7 +29,7 @@ def _traces_of_wire(image: Subtraction) -> bool:
 
 
 def no_wire(image: Subtraction) -> Curve:
-    """What is said of a frame in which no line passes the entry."""
+    """The empty curve, with status and note, of a frame in which no line passes the entry."""
     status, allowed = FrameStatus.NO_WIRE, f"a bright line in the lumen within {ENTRY_REACH_MM} mm of entry_mm"
     do = "check entry_mm and that the frame shows a wire"
     if _traces_of_wire(image):

@@ -10,22 +10,22 @@ from pipeline.arrays.grids import spread
 from pipeline.model import Array, Volume
 
 REACH_MM = 12.0
-"""How far around the entry it is looked for: a vessel's width and some."""
+"""How far around the entry the line is looked for: a vessel's width and some."""
 LEAST_SPREADS, LEAST_MM = 5.0, 4.0
-"""How far it stands out of all that is near, and how long it is at least: a wire of contrast 6 noises has 5.7 to 8.1
-and its length, the same vessel without wire 3.2."""
+"""Least height of the line, in standard deviations of all that is near, and its least length: a wire of contrast 6
+noises has a height of 5.7 to 8.1, the same vessel without wire 3.2."""
 BESIDE_MM = 1.0
-"""From which distance on the entry is not on it: as far as a clamp may lie from the manifest's."""
+"""Distance from the line beyond which the entry is not on it: a clamp may lie as far from the manifest's entry."""
 
 
 class Line(NamedTuple):
-    """How near it comes to the entry, mm, and where, (3,) LPS mm."""
+    """A bright line: how near it comes to the entry, mm, and its point nearest to it, (3,) LPS mm."""
 
     distance_mm: float
     nearest_mm: Array
 
     def __str__(self) -> str:
-        """What it says of the entry."""
+        """A hint for the user on where the entry belongs."""
         place = ", ".join(f"{mm:.1f}" for mm in self.nearest_mm)
         where = f"passes {self.distance_mm:.1f} mm from entry_mm, at [{place}] mm (LPS)"
         return f"the brightest line near it {where}: if that is the wire, entry_mm belongs on it"
@@ -56,7 +56,7 @@ def brightest_line(frame: Volume, reference: Volume | None, entry_mm: Array) -> 
 
 
 def _of_lines(grey: NDArray[np.float32], spacing: Array) -> Array:
-    """How far each voxel lies on a bright line: curved down across it both ways, and not along it."""
+    """How much like a bright line each voxel is, by its Hessian: curved down both ways across, and not along."""
     sigma = float(spacing.max()) / spacing
     second = np.empty((*grey.shape, 3, 3), np.float32)
     for i in range(3):
@@ -70,7 +70,7 @@ def _of_lines(grey: NDArray[np.float32], spacing: Array) -> Array:
 
 
 def _strongest(strength: Array, spacing: Array) -> NDArray[np.int64]:
-    """Voxels (n, 3) of the line with the strongest one; none where it is weak or short."""
+    """Voxels (n, 3) of the line that holds the strongest voxel; none where it is weak or short."""
     peak = float(strength.max())
     if not peak > LEAST_SPREADS * spread(strength):
         return np.zeros((0, 3), np.int64)

@@ -13,28 +13,29 @@ from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
 
 EDGE_VOXELS = 2.0
-"""Distance from the scan's end within which a tip is none: wires that leave end 1.0 inside at the most (100 traces at
-5 to 90 degrees, CNR 4 to 30; nearly all lie outside), tips within the scan where they are, to 0.4."""
+"""Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
+it at most (100 traces at 5 to 90 degrees, CNR 4 to 30; nearly all outside); tips in the scan are right to 0.4."""
 MOST_APART = 3.0
-"""Slice distance over pixel size from which no curve stands: of 22 wires in slices of 2 mm and pixels of 0.5 mm, with
-insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
+"""Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
+with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
 LATE_MM, LATE_VOXELS = 1.0, 2.0
-"""A curve that begins so much beyond the plane of entry, in all, is shorter than the wire: 3 mm in correlated noise."""
+"""Their sum: a curve that begins further than that beyond the plane of entry lacks wire (3 mm in correlated noise)."""
 END_VOXELS, EVEN_END_VOXELS, STATED_END_VOXELS = 1.75, 3.0, 1.5
-"""How far off (voxel) an end may be possible, at three standard deviations. Of 277 dim ends on tuning seeds 103 were ok
-with 2.0, one of them 2.6 voxels off and one 2.0; with 1.75 it is 74, the worst 1.2 off. An even wire in correlated
-noise is refused by more than its end alone, and may have the second. A stated step shows the end to half a voxel: what
-is further off than the third contradicts it."""
+"""How far (voxel) from a curve's end the wire's may lie, at three standard deviations: where steps were found, in an
+even wire, and where steps are stated. Of 277 dim ends on tuning seeds 103 were ok with 2.0, one of them 2.6 voxels off
+and one 2.0; with 1.75 it is 74, the worst 1.2 off. An even wire in correlated noise is refused for other reasons, too.
+A stated step shows the end to half a voxel: what is further off than the third contradicts it."""
 HAIRPIN_DEG, HAIRPIN_VOXELS = 140.0, 7.0
-"""A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were one, there and back."""
+"""A turn, and the length (voxel) within which no wire makes it: two wires 3 voxels apart were traced as one, there and
+back."""
 J_MM = 6.0
-"""What goes on for no longer than this behind such a turn is the hook of a J tip, of 1 mm radius and less."""
+"""A curve that goes on for no longer than this after such a turn is the hook of a J tip, of 1 mm radius and less."""
 TIP_BESIDE = 3.5
 """Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
 
 
 def beside_itself(points: Array, step: float, near: float) -> NDArray[np.bool_]:
-    """Points (n,) within ``near`` mm of a stretch of the curve that is further along it than that can be."""
+    """Which points (n,) lie within ``near`` mm of another stretch of the curve, over 3 ``near`` away along it."""
     apart = round(3.0 * near / max(step, 1e-9))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     out = np.zeros(len(points), bool)
@@ -65,9 +66,9 @@ def _at_edge(image: Subtraction, point: Array) -> bool:
 
 
 def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, float]:
-    """How much further back and on a wire may end whose brightness has steps, or in correlated noise; and may at most.
+    """How much further back and further on the wire may end, and the most that is allowed of either, mm.
 
-    All in mm.
+    Both are 0 for a wire without steps of brightness in white noise.
     """
     stepped = len(attempt.tube.steps.edges) > 0
     least = STATED_END_VOXELS if attempt.tube.steps.stated else END_VOXELS
@@ -130,7 +131,7 @@ def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
 
 
 def of_a_pair(pair: float, attempt: Attempt) -> tuple[Objection, ...]:
-    """Two wires in contact all along: as bright everywhere as one, and their line lies midway."""
+    """Why a curve may be two wires in contact all along: evenly bright like one, but its line lies midway."""
     return (
         (pair > 1.0 and not attempt.from_previous, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that is out of round all along, {pair:.1f} times as much as one wire may be", "a round one",

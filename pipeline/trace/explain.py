@@ -38,7 +38,7 @@ FINE_VOXELS = 0.55
 WIDE_VOXELS = 1.2
 """Blur in which crests are looked for when the finest one gave doubts: right between contrasts of 2.5 and 5."""
 WIDE_SIGMAS = 4.0
-"""and the height at which they start there: noise gives some, which are too short to matter."""
+"""Height, in standard deviations of noise, at which they start there: noise gives some, too short to matter."""
 MOST_PIECES = 4
 """Times that wire is looked for beyond the tip."""
 BEND_SHARE = 0.0125
@@ -46,11 +46,11 @@ BEND_SHARE = 0.0125
 WALL_ERROR, WALL_REACH = 0.13, 5.0
 """Error (voxel) of a wire beside a wall that no reference shows, and the distance (voxel) at which it is gone."""
 PLAIN_TIP, BRIGHT_TIP, DIM_TIP = 0.08, 0.16, 0.25
-"""Error (voxel) of the tip that is none of the noise: of a plain wire, of one with a bright coil or band, of one with
+"""Error (voxel) of the tip that is not due to noise: of a plain wire, of one with a bright coil or band, of one with
 a dim end. With 0.08 a platinum tip was 2.5 times its sigma off, with 0.25 a fifth of it."""
 BLUNT_TIP = 0.2
-"""The same of a thick wire, whose end is flatter than its blur: over half its radius (0.9 mm wires, 2 times too small
-without)."""
+"""The same of a thick wire, whose end is flatter than its blur, as a share of half its radius (without it, the sigma of
+0.9 mm wires was 2 times too small)."""
 TIPS_MM = 1.5
 """Most that two fits of one wire, before and after its background is told from it, may end apart."""
 BRIDGE_SIGMA_VOXELS = 0.5
@@ -111,7 +111,7 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
 
 
 def missed_mm(length_mm: float, expected_mm: float | None, config: TraceConfig) -> float:
-    """How far a length is beyond what may differ from the expected depth, mm."""
+    """By how much (mm) a length misses the expected depth beyond the tolerance; 0 where none is expected."""
     if expected_mm is None:
         return 0.0
     return max(0.0, abs(length_mm - expected_mm) - config.length_tolerance_mm)
@@ -153,7 +153,7 @@ def best_of(image: Subtraction, entry: EntryPose, previous: Curve | None, config
             found += _read_off(image, cold(image, entry, FINE_VOXELS, SEED_SIGMAS, gap, STRICT_BEND), entry)
         wide = cold(image, entry, WIDE_VOXELS, WIDE_SIGMAS, gap)
         if wide is not None and found and found[0].attempt.cnr(image) > SURE_CNR:
-            wide = beside(image, wide, found[0].attempt.pieces)  # wide crests of two wires are one
+            wide = beside(image, wide, found[0].attempt.pieces)  # in the wide blur two wires may share a crest
         found += _read_off(image, wide, entry)
         if previous is not None and len(previous.points_mm):
             found += _read_off(image, warm(image, entry, previous, config.ridge_voxels, gap), entry)
@@ -173,7 +173,7 @@ def _prolonged(image: Subtraction, best: Candidate, entry: EntryPose) -> Candida
 
 
 def _model_error(image: Subtraction, best: Candidate) -> Array:
-    """What the fit's own shape adds to its noise (n,): bends shorter than its knots, a wall that is modelled."""
+    """Errors (n,), mm, that the model adds to those by noise: bends shorter than its knots, and a modelled wall."""
     controls = best.attempt.tube.controls
     rough = np.diff(controls, n=4, axis=0) if len(controls) > 4 else np.zeros((1, 3))
     bends = BEND_SHARE * float(np.sqrt(np.mean(rough**2)))
@@ -185,7 +185,7 @@ def _model_error(image: Subtraction, best: Candidate) -> Array:
 
 
 def _own_tip(image: Subtraction, tube: Tube) -> float:
-    """What the tip's error is besides the noise, mm."""
+    """The part of the tip's error that is not due to noise, mm."""
     own = DIM_TIP if tube.steps.levels[-1] < DIM_END else BRIGHT_TIP if len(tube.steps.edges) else PLAIN_TIP
     half_radius = float(np.sqrt(max(0.0, tube.sigma**2 - image.wall_blur_mm**2)))
     return max(own * image.voxel, BLUNT_TIP * half_radius)
@@ -216,9 +216,9 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
 
 
 def _agreed(first: Candidate, second: Candidate, *, modelled: bool) -> Candidate:
-    """The second fit of a wire; refused where it ends elsewhere than the first: in noise it was once cut by 7.5 mm.
+    """The second fit of a wire; ambiguous where it ends elsewhere than the first: in noise it was once cut by 7.5 mm.
 
-    modelled : whether the background is guessed, which the difference to a good reference scan spares.
+    modelled : whether the background is modelled, as there is no reference scan that fits the frame.
     """
     apart = abs(first.length_mm - second.length_mm)
     if apart < TIPS_MM or second.verdict.status is not FrameStatus.OK:

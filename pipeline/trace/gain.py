@@ -1,4 +1,4 @@
-"""Contrast medium is never twice the same: the contrast of a frame over its reference's, taken before the subtraction.
+"""A frame's contrast over its reference's, and its correction: contrast medium is never twice the same.
 
 A wire, blurred, reaches every voxel of a narrow vessel and makes it brighter, never darker: the medium is read off the
 darkest tenth of the lumen.
@@ -16,10 +16,10 @@ from pipeline.trace.region import SearchRegion, voxels_of
 from solver.grid import Grid
 
 LEAST_LEVEL = 200
-"""Voxels from which a level is taken."""
+"""Fewest voxels from which a level is estimated."""
 DARKEST = 0.1
-"""Share of the lumen's voxels that shows the medium alone: a wire in all but three tenths moves it by a third of the
-noise of a voxel, and a median by any amount."""
+"""Share of the lumen's voxels that shows the medium alone: a wire that reaches all but three tenths of them moves this
+quantile by a third of the noise of a voxel, and a median by any amount."""
 SAME_GAIN = 0.02
 """Difference of two scans' contrast, as a share of it, that is left alone."""
 SAME_NOISE = 0.5
@@ -29,8 +29,9 @@ SAME_NOISE = 0.5
 def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[np.bool_]) -> float:
     """By how much the contrast differs, as a share of it; 0 for the same.
 
-    rest : (n,) a scan less that without wire, both as they were scanned: a smoothed one is lower in the middle of a
-    narrow vessel.  full : (n,) the vessel above what is around, which is less near its wall.
+    rest : (n,) frame minus reference, both as they were scanned: smoothing lowers the middle of a narrow vessel.
+    full : (n,) the background above what surrounds the vessel; less near the wall.  deep, out : which of the n voxels
+    lie well inside the lumen, and outside it.
     """
     noise, contrast = spread(rest[out]), float(np.median(full[deep]))
     inner = deep & (full > 0.5 * contrast)
@@ -44,7 +45,7 @@ def _difference(rest: Array, full: Array, deep: NDArray[np.bool_], out: NDArray[
 def matched(
     grey: NDArray[np.float32], background: NDArray[Any], region: SearchRegion, frame: Grid, still: NDArray[Any]
 ) -> float:
-    """The frame's contrast over the reference's; what is not 1 is taken away from ``grey``, the frame less background.
+    """The frame's contrast over the reference's; ``grey``, frame minus background, is corrected where that is not 1.
 
     still : the reference's own grey at ``region.sample``.
     """

@@ -13,8 +13,8 @@ CLOSEST = 8.0
 THICK_SLICES = 1.5
 """Largest over smallest voxel edge (as the kernels see them) from which slices count as thick."""
 KNOTS_PER_PITCH = 2.0
-"""Least distance between knots in lengths of wire from slice to slice: with one a slice the curve follows each slice's
-own error (0.15 mm of ripple at 2.5 mm slices)."""
+"""Least distance between knots, in :func:`slice_pitch`: with one knot a slice the curve follows each slice's own error
+(0.15 mm of ripple at 2.5 mm slices)."""
 FIRST_BLUR = 0.9
 """The wire's blur (voxel) before it is fitted: scanner 0.8, wire and voxel the rest."""
 

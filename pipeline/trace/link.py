@@ -1,7 +1,7 @@
 """Tracklets to one wire: ends are joined where one tangent leads to the other, from the entry to the tip.
 
-A shortest path takes every short cut between strands; ends joined by direction do not (they cross, run past each
-other and over gaps), because a tracklet ends where the image is ambiguous and its tangent there is still good.
+A shortest path would take every short cut between strands. Ends joined by direction do not, where strands cross, run
+side by side or have gaps: a tracklet ends where the image is ambiguous, and its tangent there is still good.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ WIDEST_ANGLE = 1.2
 DOUBLED = 1.25
 """Crest grey over the usual from which a piece is offered twice."""
 LONGEST_DOUBLE = 0.2
-"""Share of all crests above which a bright piece is just a brighter wire."""
+"""Share of the length of all crests above which a bright piece is just a brighter wire."""
 END_SPAN = 6
 """Crest points over which an end's tangent is averaged."""
 BRIDGE_STEP_MM = 0.2
@@ -50,7 +50,8 @@ def _ends(pieces: list[Tracklet]) -> tuple[Array, Array]:
 def _bridges(pieces: list[Tracklet], longest: float) -> NDArray[np.int64]:
     """Feasible bridges (m, 2) of ends of different tracklets, cheapest first.
 
-    Cost: gap times (1 + squares of both angles to the chord), a stand-in for the bending energy of the bridge.
+    Cost: gap times (1 + 4 times the squares of both angles to the chord + 2 times that of the angle between the ends),
+    a stand-in for the bending energy of the bridge.
     """
     position, outward = _ends(pieces)
     gap = position[None] - position[:, None]
@@ -97,9 +98,9 @@ def hermite(p: Array, tp: Array, q: Array, tq: Array, step: float) -> Array:
 
 
 def _end_at_entry(pieces: list[Tracklet], entry: Array, direction: Array, reach: float) -> int | None:
-    """The end to which the tracklet leads that passes the entry, in the wire's direction.
+    """The end, numbered as in :func:`_ends`, to which the tracklet nearest the entry leads in the wire's direction.
 
-    Nearest point first; a piece that runs across the entry direction is another strand.
+    None where no tracklet passes within ``reach`` mm; one that runs across the entry direction is another strand.
     """
     best: tuple[float, int] | None = None
     for m, piece in enumerate(pieces):

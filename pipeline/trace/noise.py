@@ -13,7 +13,7 @@ CLEAR_VOXELS = 3.5
 """Distance from the wire's axis from which grey less the fitted wire is taken for noise alone: nearer, the fit has
 taken some of it away."""
 BESIDE_VOXELS = 12.0
-"""and up to which: noise and background are those of the wire's own surroundings."""
+"""Distance up to which it is taken for that: noise and background are those of the wire's own surroundings."""
 PLACES = 300
 """Places at which the templates are tried, in DEPTHS groups: a standard deviation to 6 per cent in each."""
 DEPTHS = 4
@@ -25,9 +25,9 @@ HALF = 4
 
 
 def _templates(sigma: float) -> tuple[list[Array], list[Array]]:
-    """What the fit multiplies noise with: a sideways step of a piece of wire (three runs of the axes), and an end's.
+    """Patterns by which the fit takes noise for a shift: sideways, of a piece of wire along an axis; and of its end.
 
-    An end's is a blob less what amplitude and offset, which are fitted too, take of it.
+    The end's is a blob made orthogonal to a change of amplitude and of offset, which are fitted, too.
     """
     x = np.arange(-HALF, HALF + 1) / sigma
     bell, side = np.exp(-0.5 * x**2), x * np.exp(-0.5 * x**2)
@@ -43,7 +43,7 @@ def _templates(sigma: float) -> tuple[list[Array], list[Array]]:
 
 
 def _orthogonal(template: Array, taken: Array) -> Array:
-    """What is left of a template beside a multiple of another one and a constant."""
+    """The part of a template that is orthogonal to another one (``taken``) and to a constant."""
     basis = np.linalg.qr(np.stack([taken.ravel(), np.ones(taken.size)], axis=1))[0]
     flat = template.ravel()
     return np.asarray((flat - basis @ (basis.T @ flat)).reshape(template.shape))
@@ -56,7 +56,7 @@ def _responses(patches: NDArray[np.float32], templates: list[Array]) -> Array:
 
 
 def _spread(square: Array) -> float:
-    """Root mean square, what lies three standard deviations out cut off."""
+    """Root mean square, from squares that are cut off at three (robust) standard deviations."""
     return float(np.sqrt(np.mean(np.minimum(square, 9 * np.median(square) / 0.4549))))
 
 
@@ -75,7 +75,7 @@ def _places(image: Subtraction, curve: Array) -> NDArray[np.int64]:
 
 
 def _patches(image: Subtraction, tube: Tube, index: NDArray[np.int64]) -> tuple[NDArray[np.float32], Array]:
-    """Grey less the tube's around places (n, 3), and the share of it (n,) that was read: the rest is 0."""
+    """Patches of grey less the tube's around places (n, 3), and the share (n,) of each that was read: the rest is 0."""
     offset = np.arange(-HALF, HALF + 1)
     i, j, k = (index[:, axis, None] + offset for axis in range(3))
     at = (i[:, :, None, None], j[:, None, :, None], k[:, None, None, :])

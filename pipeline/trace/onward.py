@@ -26,7 +26,7 @@ WIDE_VOXELS = 1.2
 SIGMAS = 3.7
 """Height at which it starts, in standard deviations of the smoothed noise."""
 SURE_APART = 9.0
-"""The same for a piece behind a gap, which any noise within the reach might be."""
+"""Significance (as SURE) from which a piece behind a gap is wire: any noise within the reach might be taken for one."""
 APART_TIMES = 4.0
 """How much brighter than the faintest a piece behind a gap must be: a quarter of the wire at least."""
 SHORTEST_VOXELS = 5.0
@@ -38,15 +38,15 @@ FAINTEST = 0.06
 RAY_MM = 3.0
 """Length of a straight piece along which grey is averaged: a bend of 15 mm radius leaves it by a voxel."""
 RAY_STEP = 0.1
-"""Angle (rad) from one to the next: a voxel at its end."""
+"""Angle (rad) from one such piece that is tried to the next: a voxel at its end."""
 RAY_SURE = 4.5
 """Standard deviations of its mean, or its first half's, from which the brightest of a hundred is no noise."""
 OUTER_SURE = 2.5
-"""and those from which its outer half is."""
+"""The same for the mean of its outer half."""
 OUTSIDE_CONE = 0.85
 """Least cosine between the wire's end and the way on which the lumen may have ended too early."""
 OUTSIDE_VOXELS = 1.5
-"""Distance from the wall from which its blur is none."""
+"""Distance from the wall at which its blur is gone."""
 BRIGHT = 0.5
 """Share of the vessel's contrast from which something outside the lumen is no tissue."""
 BONE = 1.25
@@ -56,11 +56,11 @@ FEW = 0.1
 AHEAD_RAD = 0.15
 """Angle to the wire's end up to which a way is straight ahead: the nearest of ``cone``."""
 MOST_RAYS = 24
-"""Pieces followed at most."""
+"""Most straight pieces that are followed."""
 BESIDE_VOXELS = 2.0
 """A piece nearer to the wire than this is what the fit left of it."""
 LEADS_ON = 0.3
-"""Least cosine between that way and the direction of the piece where it begins."""
+"""Least cosine between the way from the tip to a piece and the direction of the piece where it begins."""
 TOUCHING_MM = 1.0
 """Distance from the tip at which a piece needs no way to it."""
 TANGENT_MM = 1.5
@@ -119,7 +119,7 @@ def _ray(image: Subtraction, start: Array, heading: Array, least: float) -> Arra
     noise = image.noise_in(CREST_VOXELS)
     for stop in (len(s) // 2, len(s)):
         mean, outer = np.mean(grey[:stop], axis=0), np.mean(grey[stop // 2 : stop], axis=0)
-        # the way on that noise prefers begins on the wire's last voxels, and ends on nothing
+        # a way that only noise suggests begins on the wire's last voxels, and has nothing further out
         ends = outer * np.sqrt((stop - stop // 2) / INDEPENDENT_VOXELS) > OUTER_SURE * noise
         best = int(np.argmax(np.where(ends, mean, -np.inf)))
         if mean[best] * np.sqrt(stop / INDEPENDENT_VOXELS) > RAY_SURE * noise and mean[best] > least and ends[best]:
@@ -192,7 +192,7 @@ def _from_crests(image: Subtraction, line: Array, known: Array, faintest: float)
 
 
 def _off(piece: Tracklet, tree: cKDTree, voxel: float) -> bool:
-    """Whether most of a piece is no rest of the wire that was fitted."""
+    """Whether most of a piece lies off the wire that was fitted, whose points are in ``tree``."""
     return bool(np.mean(tree.query(piece.points)[0] > BESIDE_VOXELS * voxel) > 0.5)
 
 

@@ -24,13 +24,13 @@ UNEVEN = (0.55, 1.6)
 STEP_SIGMAS = 5.0
 """The same in standard deviations of that mean."""
 LINEAR = 0.15
-"""Share of the usual grey above which brightness is compared by its logarithm: 0.2 to 1 is a step as 1 to 5."""
+"""Share of the usual grey above which brightness is compared by its logarithm: 0.2 to 1 is as much as 1 to 5."""
 STEP_COST = 1.5
 """What a further step must save: the square of a threefold change of brightness over three samples."""
 LEAST_LEVEL = 0.1
 """Share of the usual grey from which something is wire: a plastic tip has 0.15, streaks a few hundredths."""
 INDEPENDENT_VOXELS = 1.7
-"""Length of wire over which the noise of crest grey is one."""
+"""Length of wire that holds one independent value of the noise of crest grey."""
 SURE = 6.0
 """Standard deviations by which a fainter piece stands out of the noise, all of it taken together."""
 
@@ -39,7 +39,7 @@ SURE = 6.0
 class Steps:
     """Brightness (m,) over the usual one, between edges (m - 1,) in shares of the wire's length from its start.
 
-    stated : by the manifest, not found.  missing_mm : by which the wire then goes on beyond the line that was found.
+    stated : by the manifest, not found.  missing_mm : how far, if so, the wire goes on beyond the line that was found.
     """
 
     edges: Array
@@ -58,7 +58,7 @@ EVEN = Steps(np.zeros(0), np.ones(1))
 def step_position(profile: Array, arc: Array, sigma: float) -> float:
     """Arc length at which a blurred step (height free, foot at 0) fits the profile best, least squares.
 
-    The step may lie beyond neither end of ``arc``; tried every tenth of a blur.
+    Positions between the ends of ``arc`` are tried, every tenth of a blur.
     """
     tries = np.arange(arc[0], arc[-1], 0.1 * sigma)
     shape = ndtr((tries[:, None] - arc[None]) / sigma)
@@ -123,8 +123,8 @@ def _is_even(share: Array, noise: float, voxels: float) -> bool:
 def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Steps]:
     """The path ended (or continued) where its crest ends, and its steps. points : (n, 3).  blur_mm : of the wire.
 
-    The wire ends with the last piece that is bright; where in it is told by a step fitted to the profile of that piece,
-    so that a marker band or a coil of platinum does not stand for the wire's height.
+    The wire ends in the last piece that is bright; a step fitted to the profile of that piece alone tells where, so
+    that a marker band or a coil of platinum is not taken for the wire's height.
     """
     h = image.voxel
     step = 0.25 * h
@@ -142,7 +142,7 @@ def ended(image: Subtraction, points: Array, blur_mm: float) -> tuple[Array, Ste
         last = int(np.flatnonzero(seen)[-1]) if seen.any() else 0
     end = _end_of(last, edges, arc, grey, (blur, h))
     if last and level[last] < level[last - 1]:
-        # four samples a voxel, and each voxel's noise is that of INDEPENDENT_VOXELS
+        # there are four samples a voxel, and INDEPENDENT_VOXELS voxels share one value of noise
         least = SURE**2 * 4.0 * INDEPENDENT_VOXELS * image.noise_in(CREST_VOXELS) ** 2
         if end - edges[last - 1] < BAND_VOXELS * h or _saved(grey, arc, edges[:last], end, (blur, h)) < least:
             last -= 1  # the blur of the end, not a part of the wire
@@ -171,7 +171,7 @@ def _end_of(last: int, edges: Array, arc: Array, grey: Array, size: tuple[float,
 
 
 def _saved(grey: Array, arc: Array, edges: Array, end: float, size: tuple[float, float]) -> float:
-    """How much squared grey less is left of a profile by its last piece than if the wire ended without it.
+    """By how much a last piece lowers the sum of squares left of a profile, against a wire that ends without it.
 
     edges : (m,) of the pieces.  end : of the last one.  size : blur and voxel, mm.
     """
@@ -184,7 +184,7 @@ def _saved(grey: Array, arc: Array, edges: Array, end: float, size: tuple[float,
 
 
 def _seen(level: Array, voxels: Array, noise: float) -> NDArray[np.bool_]:
-    """Which pieces, of so many voxels, are wire and no noise."""
+    """Which pieces, of these levels and lengths in voxels, are wire and not noise. noise : of one sample."""
     independent = np.maximum(1.0, voxels / INDEPENDENT_VOXELS)
     return np.asarray(level > np.maximum(LEAST_LEVEL, SURE * noise / np.sqrt(independent)))
 

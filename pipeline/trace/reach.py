@@ -1,4 +1,4 @@
-"""How much further back or on a wire may end: by all voxels around its end, each with the noise that it has.
+"""How much further back or further on a wire may end, by the grey of all voxels around its end.
 
 A profile read along the wire tells less: blurred by 0.7 voxel it holds 0.6 of what the voxels say of a blurred wire.
 """
@@ -22,13 +22,13 @@ END_SIGMAS = 3.0
 STEP_VOXELS = 0.25
 """Distance of the sources that stand for the wire, and of the ends that are tried."""
 FURTHEST_STEP = 100.0
-"""Distance (voxel) from the end up to which a stated step is asked: beyond, it would take long and much memory."""
+"""Distance (voxel) from the end up to which a stated step is used: further ones would take long and much memory."""
 
 
 def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Array]:
-    """Grey (n,) of the voxels around a line (m, 3), and what wire up to each of its points gives them (n, m).
+    """Grey (n,) of the voxels around a line (m, 3), and what a wire of height 1 up to each point gives them (n, m).
 
-    Without the voxels that wire before the line lights up, too.
+    Voxels that wire before the line lights up, too, are left out.
     """
     slot, h = sparse_zeros(image.grey.shape, np.int32), image.voxel
     voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(line), WINDOW * sigma)
@@ -42,7 +42,7 @@ def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Arra
 def _costs(
     grey: Array, wire: Array, before: NDArray[np.int64], tries: NDArray[np.int64], now: int, levels: Array
 ) -> Array:
-    """Sums of squares (t,) that wires leave which end at sources ``tries`` (t,), with steps at sources ``before`` (s,).
+    """Sums of squares (t,) left by wires that end at sources ``tries`` (t,), with steps at sources ``before`` (s,).
 
     levels : (s + 1,) brightness between the steps as stated: one height is free, and the steps keep their distance from
     the end, which is ``now``. Empty where each piece's height is free and the steps stay where they are.
@@ -70,8 +70,8 @@ def _stated_back_mm(tube: Tube, end: float, voxel: float) -> float:
 def end_range(image: Subtraction, tube: Tube) -> tuple[float, float]:
     """How much further back and further on (mm) the wire of a tube may end.
 
-    Ends are as likely as they leave the grey explained; what is three standard deviations off counts as possible. A
-    stated step tells of the end, too: it lies as far before it as is stated.
+    An end is possible if it explains the grey to within three standard deviations of the best one. A stated step tells
+    of the end, too: it lies as far before it as is stated.
     """
     h, step, skirt = image.voxel, STEP_VOXELS * image.voxel, WINDOW * tube.sigma
     points = resampled(dense(tube, step), step)

@@ -82,7 +82,7 @@ def _onto(frame: Grid, distance: Grid) -> tuple[Grid, NDArray[np.int64]]:
 def _region(frame: Grid, distance: Grid) -> SearchRegion:
     box, corner = _onto(frame, distance)
     box = contiguous(box)
-    # float64: rounded to float32 the limit may take in the distances that were cut off there
+    # in float64: a limit rounded up to float32 may include the distances that were cut off at it
     near = box.values < HALO_VOXELS * np.float64(box.spacing_mm.min())
     near = np.pad(near, ((0, 0), (0, 0), (1, 1)))
     edges = np.argwhere(near[..., 1:] != near[..., :-1])
@@ -93,7 +93,7 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
 
 
 _regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()
-"""The last region of each lumen: frames share it, and it hangs on nothing but the lumen and the frames' lattice."""
+"""The last region of each lumen: frames share it, as it depends on the lumen and the frames' lattice alone."""
 
 
 def region_of(frame: Grid, lumen: Lumen, axes: tuple[int, int, int]) -> SearchRegion:
@@ -154,7 +154,7 @@ def _smoothed(reference: Volume, region: SearchRegion, lumen: Lumen, axes: tuple
 
 
 _smoothed_of: weakref.WeakKeyDictionary[Grid, tuple[SearchRegion, Background]] = weakref.WeakKeyDictionary()
-"""The last background of each reference, which frames share; it hangs on the reference and the lumen's region alone."""
+"""The last background of each reference: frames share it, as it depends on reference and lumen's region alone."""
 
 
 def background_of(

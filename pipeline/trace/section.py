@@ -14,20 +14,20 @@ ANGLES = 12
 RING_BLURS = 1.4
 """Radius of the ring in blurs of the line: where two strands differ most from one that is as wide."""
 OVER_MM = 3.0
-"""Length over which it is averaged: shorter, a crossing shows."""
+"""Length over which the harmonic is averaged: over less, a crossing stands out."""
 
 
 PAIRED = 0.03
-"""How far out of round two wires in contact all along are in the median of their line: 0.031 and more for 0.3 to 0.5 mm
-ones in voxels of 0.3 mm, and 0.022 and less for one. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
+"""Median harmonic from which a line is two wires in contact all along: two have 0.031 and more (0.3 to 0.5 mm wires in
+voxels of 0.3 mm), one has 0.022 and less. Uneven voxels make a round wire oblong by 0.018 at 1.6 to 1."""
 MEDIAN = 1.18
 """Median of a complex number's size over the standard deviation of its parts."""
 SURE = 2.0
-"""Three standard deviations of the median of independent ones, over that median and the root of their number."""
+"""Three standard deviations of the median of n independent ones, over that median, times the square root of n."""
 
 
 def carried(tangents: Array) -> tuple[Array, Array]:
-    """Two unit normals (n, 3) each, that turn about the curve as little as can be."""
+    """Two unit normals (n, 3) each, along a curve with these unit tangents (n, 3), that twist as little as possible."""
     first = np.empty_like(tangents)
     normal = np.cross(tangents[0], np.eye(3)[int(np.argmin(np.abs(tangents[0])))])
     for n, t in enumerate(tangents):
@@ -74,7 +74,7 @@ def paired(image: Subtraction, oblong: Array, noise: float, length_mm: float) ->
 def fills_vessel(image: Subtraction, points: Array, sigma: float) -> bool:
     """Whether the line is as thick as the lumen that it runs in: then it is the vessel itself, brighter than it was.
 
-    A disc of radius r blurs to a variance of r^2 / 4 more; a ring of 1.4 r about a wire is somewhere in its lumen.
+    A disc of radius r adds r^2 / 4 to the blur's variance; a ring of 1.4 r about a wire lies in its lumen somewhere.
     """
     radius = 2.0 * float(np.sqrt(max(0.0, sigma**2 - image.wall_blur_mm**2)))
     if radius < image.voxel:

@@ -1,6 +1,6 @@
 """How bright a wire is along its length where the manifest says so: where it must end, and how it looks until there.
 
-A step of the profile (the end of a coil) shows where the tip is as the tip itself does, also where that cannot be seen.
+A step of the profile (the end of a coil) shows where the tip is, even where the tip itself cannot be seen.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 RAMP = 0.1
 """Largest change of brightness (of its logarithm) from one piece of a ramp to the next."""
 TRIES = 0.5
-"""Blurs from one place at which the wire may end to the next; the best is looked at ten times as closely."""
+"""Distance, in blurs, of the ends that are tried; about the best of them, they are tried ten times as closely."""
 BLUR_SAMPLES = 10
 """Samples of the profile in one blur."""
 
@@ -44,14 +44,14 @@ class Opacity:
         return np.interp(distance, self.distance, self.value)
 
     def crests(self, from_tip: Array, blur: float) -> Array:
-        """The same as it is seen, nothing beyond the tip: at distances (any shape) that may be negative."""
+        """The blurred brightness at distances from the tip (any shape); negative ones lie beyond it, without wire."""
         step = blur / BLUR_SAMPLES
         at = np.arange(-5.0 * blur, max(float(from_tip.max()), 0.0) + 5.0 * blur, step)
         sharp = np.where(at < 0.0, 0.0, self.at(at))
         return np.interp(from_tip, at, gaussian_filter1d(sharp, BLUR_SAMPLES, mode="nearest"))
 
     def steps(self, length: float, missing: float) -> Steps:
-        """The profile of a line of this length that ends ``missing`` mm before the tip, in pieces."""
+        """The profile of a line of this length that ends ``missing`` mm before the tip, in evenly bright pieces."""
         low, high = missing, missing + length
         knots = np.unique(np.clip([low, *self.distance, high], low, high))
         cuts = [low]

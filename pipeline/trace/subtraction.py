@@ -1,4 +1,4 @@
-"""What a wire stands out from: the frame minus its background, on the lumen's box, at the lumen's voxels alone.
+"""The frame minus its background, from which the wire stands out: on the lumen's box, at the lumen's voxels alone.
 
 Where no reference scan shows the background, the grey under the wire is taken from beside it (:func:`levelled`).
 """
@@ -42,7 +42,7 @@ LEAST_SHARE = 0.02
 CORRELATED = 1.5
 """Noise of blurred grey over that of blurred white noise from which noise counts as correlated."""
 UNEVEN = 0.82
-"""Share of the vessel's contrast that it has everywhere if it is filled evenly."""
+"""Least share of its contrast, anywhere along it, of a vessel that counts as filled evenly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ class Subtraction:
         return float(np.max(size) / np.min(size))
 
     def noise_in(self, blur_voxels: float) -> float:
-        """Standard deviation of the noise in grey blurred by so many voxels, as correlated as it is."""
+        """Standard deviation of the noise in grey blurred by so many voxels, measured: correlation counts."""
         if blur_voxels not in self.noises:
             sample = smooth_voxels(self.grey, gaussian_taps(blur_voxels), self.region.within[::8])
             self.noises[blur_voxels] = max(spread(sample), 1e-6)
@@ -118,7 +118,7 @@ class Subtraction:
 
     @property
     def correlated(self) -> bool:
-        """Whether noise is, so that smoothing leaves it."""
+        """Whether the noise is so correlated that smoothing leaves it."""
         return self.correlation > CORRELATED
 
     def local(self, points_mm: ArrayLike) -> Array:
@@ -141,7 +141,7 @@ class Subtraction:
 
     @contextmanager
     def showing(self, voxels: NDArray[np.int64], grey: NDArray[Any]) -> Iterator[None]:
-        """Other grey at some voxels (flat) for the length of the block: in place, as a copy holds a whole box."""
+        """Put other grey at some voxels (flat) inside a ``with`` block: in place, as a copy would hold a whole box."""
         flat = self.grey.reshape(-1)
         kept = flat[voxels]
         flat[voxels] = grey
@@ -151,7 +151,7 @@ class Subtraction:
             flat[voxels] = kept
 
     def depth_at(self, points: Array) -> NDArray[Any]:
-        """Signed distance to the wall (n,) at the voxels nearest to points (n, 3); the box's edge stands for beyond."""
+        """Signed distance to the wall (n,) at the voxels nearest to points (n, 3); beyond the box, that at its edge."""
         box = self.region.box
         index = np.clip(np.rint(points / self.spacing).astype(int), 0, np.array(box.shape) - 1)
         return np.asarray(box.values[tuple(index.T)])

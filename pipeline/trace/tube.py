@@ -16,18 +16,18 @@ from pipeline.trace.subtraction import Subtraction
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
 STIFFNESS = 2.0
-"""Standard deviation (voxel) that the prior gives third differences of control points: it carries gaps, not bends."""
+"""Prior's standard deviation (voxel) of third differences of control points: it carries gaps and leaves bends free."""
 FULL_KNOT = 8.0
-"""Knot distance (voxel) from which that holds. A short wire has two intervals whatever its length, and the third
-differences of one and the same bend fall with the cube of their length: without that its ends curl up in the noise."""
+"""Knot distance (voxel) from which that holds; below, it falls with the cube of the distance, as third differences of
+one and the same bend do: else a short wire, which has two intervals whatever its length, curls up in the noise."""
 TIGHTEST = 10.0
 """Radius (voxel) of the bend that second differences of a short wire get as standard deviation: it cannot turn back."""
 TINT_KNOTS = 4
 """Spline intervals per amplitude node."""
 GREGORY = np.array([3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0])
-"""End weights of the fourth-order Gregory rule: the tip's position hangs on the quadrature of the last samples."""
+"""End weights of the fourth-order Gregory rule: the tip's position depends on the quadrature of the last samples."""
 START_VOXELS = 8.0
-"""How far from its point the start plane reaches: what the blurred wire before it lights up."""
+"""How far from its point the start plane masks voxels: those that the blurred wire before it lights up."""
 DIM_END = 0.5
 """Brightness of the wire's end, over that of its brightest part, below which the fit has no offset."""
 BLUR_HELD = 2
@@ -94,7 +94,7 @@ def weights_at(u: Array, intervals: int) -> tuple[NDArray[np.int64], Array, Arra
 
 
 def _combined(controls: Array, first: NDArray[np.int64], weights: Array) -> Array:
-    """Sums (n, 3) of four control points each."""
+    """Weighted sums (n, 3) of four control points each."""
     return np.asarray(np.einsum("nk,nkd->nd", weights, controls[first[:, None] + np.arange(4)]))
 
 
@@ -201,7 +201,7 @@ def _damped(normal: Array, tube: Tube, amount: float) -> Array:
 
 
 def _hold(normal: Array, right: Array, columns: list[int]) -> None:
-    """Leave some unknowns as they are."""
+    """Hold some unknowns: change the equations, in place, so that their step is 0."""
     for column in columns:
         normal[column], normal[:, column], right[column] = 0.0, 0.0, 0.0
         normal[column, column] = 1.0
@@ -219,8 +219,8 @@ def _factors(normal: Array) -> tuple[Array, NDArray[np.int64]]:
 def _moved(tube: Tube, step: Array, voxel: float, line: Line) -> tuple[Tube, float]:
     """The tube after a step that moves its curve by at most a voxel; and the largest move that counts.
 
-    The first and the last control point hang beyond the curve, and sliding along the wire changes nothing: what
-    counts is how far the curve moves sideways, and its tip at all.
+    The first and the last control point lie beyond the curve, and sliding along the wire changes nothing: what
+    counts is how far the curve moves sideways, and how far its tip moves in any direction.
     """
     k, a = len(tube.controls), len(tube.tint)
     shift = step[: 3 * k].reshape(k, 3)
@@ -249,7 +249,7 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
     """
     samples, prior = sampling(tube, image.voxel), _prior(tube, image)
     slot = sparse_zeros(image.grey.shape, np.int32)
-    # a bright piece is no Gaussian to a few hundredths, which its offset takes up; a dim one drowned in that
+    # a bright piece is off a Gaussian by a few hundredths, which the offset takes up; a dim end would drown in that
     stepped = [-1] if tube.steps.levels[-1] < DIM_END * tube.steps.levels.max() else []
     done = 0
     for done in range(1, iterations + 1):

@@ -22,18 +22,18 @@ from pipeline.trace.tube import Tube
 LEAST_CNR = 2.5
 """Contrast over noise below which a frame alone does not give a curve."""
 LEAST_WITH_PRIOR = 1.5
-"""and below which a previous curve does not help either: the frame no longer shows where the wire ends."""
+"""The same with a previous curve, which does not help below that: the frame no longer shows where the wire ends."""
 NARROWEST = 0.7
-"""Share of the scanner's blur that a faint line is wide at the least: nothing is sharper, but noise."""
+"""Least width of a faint line over the scanner's blur: only noise is narrower."""
 LEAST_SEEN = 2.0
-"""The same over what noise does to the fit: noise correlated over 0.8 voxel counts 2.4-fold. Below it the wire is
-followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
+"""Least contrast over noise where that counts as it disturbs the fit: correlated over 0.8 voxel it counts 2.4-fold.
+Below it the wire is followed in pieces (on tuning seeds, right curves had 2.1 and more, wrong ones 1.9 and less)."""
 SURE_CNR = 5.0
-"""and from which crests at the finest blur are enough."""
+"""Contrast over noise from which crests at the finest blur are enough."""
 FAINT = 0.35
 """Share of the usual crest grey below which there is no wire to be seen: a gap."""
 DOUBLE = 1.6
-"""Share above which two strands lie on one crest."""
+"""Share of the usual crest grey above which two strands lie on one crest."""
 LEFTOVER_MM = 2.5
 """Length of crests that run elsewhere from which the curve may be the wrong one."""
 FAINT_LEFTOVER_MM = 4.0
@@ -41,14 +41,14 @@ FAINT_LEFTOVER_MM = 4.0
 MOST_FAINT_MM = 5.0
 """Length without a bright line that a curve may have if that is less than a quarter of it (a gap is 3 mm)."""
 MOST_DOUBLE = 2.6
-"""Share from which it is no two strands but a brighter wire."""
+"""Share of the usual crest grey from which it is not two strands but a brighter wire."""
 IN_CONTACT = 0.035
 """How far out of round (second harmonic over peak) two strands in contact are at the least; a round wire, with the wall
 beside it, is below 0.03."""
 ALONE = 0.15
-"""Share of a line in which one strand may lie alone at the least: 5 mm of 35."""
+"""Least share of a line in which one strand lies alone: 5 mm of 35."""
 OBLONG = 0.12
-"""and from which a line of any brightness is no single wire; two that are two voxels apart have 0.2."""
+"""How far out of round a line of any brightness is that is no single wire; two that are two voxels apart have 0.2."""
 BESIDE_VOXELS = 2.2
 """Two strands of one curve nearer than this share their crest."""
 MOST_DOUBLE_MM = 2.0
@@ -126,9 +126,9 @@ def _outside(image: Subtraction, points: Array) -> NDArray[np.bool_]:
 
 
 def _ends_there(image: Subtraction, points: Array) -> bool:
-    """Whether the crest is nearer its usual height than nothing over the last TIP_VOXELS, and not so beyond the tip.
+    """Whether the crest is above half its usual height over the last TIP_VOXELS, and below TIP_AHEAD of it beyond.
 
-    A previous curve says where the wire lay, not how far it has been pushed since: that the frame alone must show.
+    A previous curve says where the wire lay, not how far it has been pushed since: only the frame can show that.
     """
     h = image.voxel
     grey = image.along(resampled(extended(points, TIP_VOXELS * h, h), h))
@@ -175,12 +175,12 @@ def judge(image: Subtraction, attempt: Attempt, points: Array, bridged: NDArray[
 
 
 def _of_one_strand(share: Array, seen: NDArray[np.bool_]) -> float:
-    """The height of one strand, in that of most of the line: two that lie together nearly all along are the usual."""
+    """Height of one strand over that of most of the line: below 1 where two strands lie together nearly all along."""
     return min(1.0, float(np.quantile(share[seen], ALONE))) if seen.any() else 1.0
 
 
 def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArray[np.bool_]:
-    """Points (n,) where two strands may lie on one crest: not round, or too bright where nobody can tell.
+    """Points (n,) where two strands may lie on one crest: not round, or too bright where noise hides the shape.
 
     The closer two strands are, the brighter and the rounder is their crest; one that is over MOST_DOUBLE times as
     bright is no two strands but a coil of platinum.
@@ -188,7 +188,7 @@ def _doubled(share: Array, oblong: Array, bright: Array, noise: float) -> NDArra
     own = noise / np.maximum(share, 1.0)
     least = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [OBLONG, IN_CONTACT]), OBLONG)
     hidden = (share > bright) & (share < MOST_DOUBLE) & (own > 0.25 * IN_CONTACT)
-    # one that is as bright as two needs no more than its own noise: two in contact have 0.06, which three would hide
+    # in a line as bright as two, one standard deviation is enough: two in contact have 0.06, which three would hide
     sure = np.where(share < MOST_DOUBLE, np.interp(share, [1.0, DOUBLE], [3.0, 1.0]), 3.0)
     return np.asarray(hidden | (oblong > least + sure * own))
 

@@ -19,12 +19,12 @@ TURN, TURN_STEP = 0.35, 0.175
 PIECE_VOXELS, SAMPLES, PIECES = 5.0, 3, 6
 """Length of a piece, at how many places grey is read on it, and how many are put together: 9 mm of voxels of 0.3 mm."""
 KEPT = 30
-"""Ways that are followed on, the brightest, their ends in different voxels: with 10 a wire of 1.2 noises was lost."""
+"""How many ways are continued, the brightest with ends in different voxels: with 10 a wire of 1.2 noises was lost."""
 QUICK, MAYBE = 8, 4.5
 """How many are followed at first, in a third of the time, and the height from which KEPT are: noise has 3.8 (median)
 with 10, that wire of 1.2 noises 6."""
 FIRST_VOXELS = 1.0
-"""What is left out behind the tip, as the fit of the wire takes some of it."""
+"""How much is left out just beyond the tip, as the fit of the wire takes some of it."""
 SURE = 7.0
 """Standard deviations of its mean from which the brightest of all ways is no noise: where nothing lies beyond a tip it
 had at most 5.9 with a reference and 6.5 without (90 and 50 tips), along 6 and 13 mm of wire 1.7 and 1.2 noises bright
@@ -81,9 +81,9 @@ def _noise(image: Subtraction) -> float:
 
 
 def brightest(image: Subtraction, tip: Array, heading: Array, least: float, kept: int = KEPT) -> float:
-    """How many standard deviations the brightest way on from a tip stands out, of those that are ``least`` bright.
+    """How many standard deviations the brightest way on from a tip stands out; 0 where its mean is below ``least``.
 
-    least : grey that a wire has.
+    least : grey that a wire has.  kept : how many ways are continued.
     """
     noise, height = _noise(image), 0.0
     ways, sums, headings = tip[None, None], np.zeros(1), heading[None]

@@ -1,4 +1,4 @@
-"""Is what a curve ends with the wire's end? A catheter may reach beyond it, and a marker may lie beyond what is seen.
+"""Is a curve's end that of the wire? A catheter may reach beyond the wire, a marker may lie beyond what is seen.
 
 Asked of frames without a stated depth alone: where there is one, it says where the wire ends.
 """
@@ -23,7 +23,7 @@ MARK_BLUR = 1.0
 MARK_SHARE, MARK_SIGMAS = 0.35, 8.0
 """Share of the wire's own height, and standard deviations of noise, from which something is a mark."""
 MARK_VOXELS, MARK_OFF = 4, 4.0
-"""Voxels that it has at the least, and how many it lies off the tip: what is nearer is the tip's own."""
+"""Fewest voxels of a mark, and its least distance from the tip in voxels: what is nearer belongs to the tip."""
 BODY_MM = 3.0
 """Length from which a piece is the wire's body, and no marker band."""
 DIM_FROM_TIP = "dim_from_tip_mm"
@@ -33,7 +33,7 @@ DIM_FROM_TIP = "dim_from_tip_mm"
 def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
     """How far beyond the tip (mm) the lumen holds something as bright as the wire; 0 for nowhere.
 
-    Crests are too long for a band of 1 mm that lies behind a stretch that nobody sees.
+    A band of 1 mm that lies behind a stretch that nobody sees is too short to be found as a crest.
     """
     h, blur = image.voxel, MARK_BLUR * image.voxel
     voxels = voxels_of(image.region.runs)
@@ -66,11 +66,11 @@ def nothing_beyond(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
 
 
 def dim_from_tip_mm(steps: Steps, length_mm: float, voxel: float) -> float:
-    """How far from the end of a line begins what is far dimmer than the body before it, to the end; 0 for nothing.
+    """Length (mm) of the end of a line that is far dimmer than the body before it; 0 where none is.
 
-    A catheter of up to 1.2 times the wire's own brightness is so where the wire within it has ended; where a wire
-    comes out of such a one, the line is dimmer by less. What is dimmer than LEAST_LEVEL is a gap; and where the line is
-    body again for longer than a marker is, nothing has ended.
+    A catheter of up to 1.2 times the wire's own brightness looks so where the wire in it has ended; where a wire comes
+    out of such a catheter, the line gets dimmer by less. What is dimmer than LEAST_LEVEL is a gap; and where the line
+    is body again for longer than a marker is, nothing has ended.
     """
     if steps.stated:
         return 0.0

@@ -57,7 +57,7 @@ class Search(NamedTuple):
 
 @kernel
 def _read_tile(s: Search, tile: int, work: NDArray[Any]) -> None:
-    """Quantised smoothed grey 0..GREY_STEPS-1 of one tile into its cells; those outside the volume are marked SEEN."""
+    """Fill a tile's cells with smoothed grey, quantised to 0..GREY_STEPS-1; those outside the volume become SEEN."""
     a, b, c = unravelled(tile, s.layout)
     i0, j0, k0 = (a - 1) * SIDE, (b - 1) * SIDE, (c - 1) * SIDE
     ni, nj, nk = s.volume.shape
@@ -85,7 +85,7 @@ def _read_tile(s: Search, tile: int, work: NDArray[Any]) -> None:
 
 @kernel
 def _away(cell: int, x: int, y: int, z: int, tiles: tuple[int, int, int]) -> tuple[int, int]:
-    """The cell that lies ``x, y, z`` voxels from another one, and its tile; ``tiles`` along each axis there are."""
+    """The cell ``x, y, z`` voxels away from ``cell``, and the tile it is in; tiles : their number along each axis."""
     x, y, z = x + ((cell >> (2 * SHIFT)) & INNER), y + ((cell >> SHIFT) & INNER), z + (cell & INNER)
     tile = cell // CELLS + ((x >> SHIFT) * tiles[1] + (y >> SHIFT)) * tiles[2] + (z >> SHIFT)
     return tile * CELLS + (((x & INNER) << (2 * SHIFT)) | ((y & INNER) << SHIFT) | (z & INNER)), tile
@@ -110,9 +110,9 @@ def _flat(s: Search, cells: NDArray[Any]) -> NDArray[Any]:
 
 @kernel
 def _affinity(cells: NDArray[Any], homogeneity: NDArray[Any], feature: NDArray[Any], here: int, to: int) -> float:
-    """Affinity of a voxel of grey level ``here`` and that of the cell ``to``, 0 to 255; -1 where that is SEEN.
+    """Affinity, 0 to 255, between a voxel of grey level ``here`` and that of the cell ``to``; -1 if the cell is SEEN.
 
-    Arrays, not a Search: both searches spend their time here, and would take five times as long.
+    Takes arrays instead of a Search: both searches spend their time here, and would take five times as long.
     """
     there = np.int64(cells[to])
     if there >= SEEN:
@@ -131,10 +131,10 @@ def _seed(s: Search, seeds: NDArray[Any], n: int, work: NDArray[Any]) -> int:
 
 @entry_point
 def flood(s: Search, seeds: NDArray[Any], threshold: int) -> NDArray[Any]:
-    """Voxels whose strength of connectedness is at least ``threshold``: an alpha cut needs no queue.
+    """Voxels whose strength of connectedness is at least ``threshold`` (an alpha cut), without a priority queue.
 
-    Any order of visiting links of at least the threshold reaches exactly that set, so first come first served does,
-    which is several times faster than ordering by strength. Returns flat indices in the order they were reached in.
+    Links of at least the threshold reach exactly that set in whatever order they are visited: first come, first served
+    is several times faster than ordering by strength. Returns flat indices in the order in which they were reached.
     """
     work, cut = scratch(s.affinity.taps), np.float32(threshold - 0.5)
     cells, tiles, offsets, (homogeneity, feature) = s.cells, s.tiles, s.offsets, s.affinity[:2]
@@ -164,7 +164,7 @@ def flood(s: Search, seeds: NDArray[Any], threshold: int) -> NDArray[Any]:
 
 
 class _Buckets(NamedTuple):
-    """Cells to go on from, by strength: the first entry of each bucket, and of an entry its cell and the next one."""
+    """Cells still to visit, one linked list per strength: each list's first entry; each entry's cell and next entry."""
 
     head: NDArray[Any]
     cell: NDArray[Any]
@@ -178,9 +178,9 @@ def _push(b: _Buckets, strength: int, cell: int, entry: int) -> None:
 
 @kernel
 def _pop(b: _Buckets, strength: NDArray[Any], bucket: int, threshold: int) -> tuple[int, int]:
-    """The strongest cell left to go on from, and its bucket; -1 where there is none of at least ``threshold``.
+    """Take out the strongest cell still to visit; returns it, -1 if none has at least ``threshold``, and its bucket.
 
-    A cell is pushed only when its strength rises, so an entry is stale exactly when its bucket is not that strength.
+    A cell is pushed only when its strength rises: an entry is stale if its bucket is not the cell's present strength.
     """
     while bucket >= threshold:
         entry = b.head[bucket]
@@ -195,7 +195,7 @@ def _pop(b: _Buckets, strength: NDArray[Any], bucket: int, threshold: int) -> tu
 
 @kernel
 def _once(s: Search, entries: NDArray[Any], strength: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Voxels (flat) and strengths of cells that may be listed several times; sets their ``strength`` back to 0."""
+    """Each of the cells once, though listed several times: flat voxel and strength; sets ``strength`` back to 0."""
     found, count = np.empty(entries.shape[0], np.uint8), 0
     for cell in entries:
         if strength[cell] > 0:

@@ -19,7 +19,7 @@ class Inner(NamedTuple):
 
 
 class Cores(NamedTuple):
-    """For each voxel (n,) the number of the connected core that it is of, and the steps to one of that core's ends.
+    """For each voxel (n,) the number of the connected core that it belongs to, and the steps to one end of that core.
 
     Both are -1 outside the cores.
     """
@@ -71,9 +71,9 @@ def thickness(voxels: Inner, depth: NDArray[Any], spacing: NDArray[Any]) -> NDAr
 
 @kernel
 def _spread(voxels: Inner, allowed: NDArray[Any], steps: NDArray[Any], queue: NDArray[Any]) -> int:
-    """Number voxels by 26-neighbour steps from the first in ``queue``; ``steps`` is -1 where not reached yet.
+    """Breadth-first search over allowed voxels from the first in ``queue``: their 26-neighbour steps into ``steps``.
 
-    Returns how many were reached; they stand in ``queue`` in that order.
+    ``steps`` is -1 where not reached yet. Returns how many were reached; ``queue`` holds them in that order.
     """
     inner, ids, around = voxels.flat, voxels.ids.reshape(-1), steps_around(voxels.ids.shape, 1)
     steps[queue[0]] = done = 0
@@ -92,7 +92,7 @@ def _spread(voxels: Inner, allowed: NDArray[Any], steps: NDArray[Any], queue: ND
 
 @entry_point
 def along_cores(voxels: Inner, core: NDArray[Any]) -> Cores:
-    """The connected parts of the voxels that are marked as ``core`` (n,)."""
+    """The 26-connected parts of the ``core`` voxels (n,); steps count from the voxel furthest from a part's first."""
     size = voxels.flat.shape[0]
     part, steps, first = np.full(size, -1, np.int32), np.full(size, -1, np.int32), np.full(size, -1, np.int32)
     queue = np.empty(size, np.int32)
@@ -111,7 +111,7 @@ def along_cores(voxels: Inner, core: NDArray[Any]) -> Cores:
 
 @entry_point
 def nearest_core(voxels: Inner, core: NDArray[Any]) -> NDArray[Any]:
-    """For every voxel the core voxel (position) that reaches it first, layer by layer; -1 where none does."""
+    """For every voxel the position of the core voxel fewest 6-neighbour steps away; -1 where none leads to it."""
     inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
     size = inner.shape[0]
     owner, queue = np.full(size, -1, np.int32), np.empty(size, np.int32)
@@ -134,9 +134,10 @@ def nearest_core(voxels: Inner, core: NDArray[Any]) -> NDArray[Any]:
 
 @entry_point
 def meetings(voxels: Inner, owner: NDArray[Any], cores: Cores, reach: NDArray[Any]) -> NDArray[Any]:
-    """Faces (m, 3) between voxels of different parts, or far along one part: voxel, and the core voxels of both sides.
+    """Voxel faces at which two parts meet, or two stretches of one part that are far from each other along it.
 
-    reach : (n,) steps along a part within which a neighbour belongs to the same stretch of vessel.
+    reach : (n,) steps along a part within which a neighbour belongs to the same stretch of vessel. Returns (m, 3): a
+    voxel at the face, and the core voxels that own its two sides.
     """
     inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
     part, steps = cores

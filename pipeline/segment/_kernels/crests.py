@@ -10,17 +10,17 @@ from pipeline.arrays.lattice import entry_point, unravelled
 
 ROUNDS = 6
 STILL = 0.1
-"""Voxels that one more step to the crest may be long: a flank that leads nowhere is no crest."""
+"""Longest further step, in voxels, of a point that has arrived at a crest: on a flank without one steps stay longer."""
 FURTHEST = 1.8
-"""Voxels that a point may move to its crest: further off lies another one."""
+"""Furthest, in voxels, that a point may move to its crest: beyond that lies another crest."""
 
 
 @entry_point
 def crests(field: Blurred, voxels: NDArray[Any], outside: float, sharp: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Crest points (n, 3), index * spacing, and the blurred grey there, of flat voxels that have one.
+    """Crest points (n, 3), index * spacing, to which the flat voxels lead, if any, and the blurred grey there.
 
-    On a crest the weaker curvature across is at least ``sharp`` (1/mm^2) of the height above ``outside``; a flank's is
-    less, or of the other sign.
+    On a crest the weaker curvature across it is at least ``sharp`` (1/mm^2) times the height above ``outside``; on a
+    flank it is less, or of the other sign.
     """
     probe, spacing = new_probe(), field.spacing
     p, out, step = probe.place, probe.jet, probe.step

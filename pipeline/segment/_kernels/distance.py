@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.arrays.lattice import entry_point, grown, kernel, unravelled
 
 QUEUED = 2
-"""Mark in ``inside``, for as long as feet are handed on, of a voxel that has one to hand on."""
+"""Bit of ``inside`` that marks a voxel waiting to hand on its foot (closest point); used by :func:`propagate` alone."""
 
 
 class Owned(NamedTuple):
@@ -31,9 +31,9 @@ def _square(x: float, y: float, z: float, p: NDArray[Any]) -> float:
 
 @kernel
 def _takes(at: tuple[float, float, float], known: int, inside: int, foot: NDArray[Any], m: int, most: float) -> bool:
-    """Whether a voxel at ``at`` takes foot m for its own: nearer than what it has (``known`` - 1), or its first.
+    """Whether a voxel at ``at`` takes over foot m: it has none yet, or one (``known`` - 1) that is further away.
 
-    Outside a first one must lie within the square root of ``most``.
+    Outside the wall the first foot must lie within ``most`` (mm^2).
     """
     x, y, z = at
     far = _square(x, y, z, foot[m])
@@ -80,9 +80,9 @@ def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float
 
 @entry_point
 def lost_feet(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], good: NDArray[Any]) -> NDArray[Any]:
-    """Voxels beside the surface whose foot was not found and whose neighbours' are two voxels off and more.
+    """Voxels beside the surface that have no foot of their own, and got none nearer than two voxels from a neighbour.
 
-    A branch as thin as that has its peak at the level of the wall: the wall is put through the voxel itself.
+    A branch as thin as that peaks at the level of the wall: the wall is put through the voxel itself.
     Returns positions in ``voxels``; their ``owner`` and ``foot`` are set.
     """
     owner, _, spacing = box
@@ -127,7 +127,7 @@ def distances(
     """Signed distance (float32) of every voxel from its owner's foot; ``outer`` where it has none.
 
     wall : feet, normals and curvatures.  ``out`` is the inner part of the box, and may be the beginning of ``owner``'s
-    memory seen as float32: a voxel is written after it is read, and never further on.
+    memory seen as float32: nothing is written over an owner that is still to be read.
     """
     (owner, inside, spacing), (foot, normal, bend) = box, wall
     hx, hy, hz = spacing[0], spacing[1], spacing[2]

@@ -16,14 +16,14 @@ def cones(
     start: NDArray[Any], end: NDArray[Any], r0: NDArray[Any], r1: NDArray[Any], spacing: NDArray[Any], outer: float,
     distance: NDArray[Any],
 ) -> None:  # fmt: skip
-    """Lower ``distance`` to that of the union of round cones, within ``outer`` mm of each."""
+    """Lower ``distance`` (signed, mm) to that of the union with round cones, within ``outer`` mm of each."""
     ni, nj, nk = distance.shape
     for n in range(start.shape[0]):
         reach = max(r0[n], r1[n]) + outer
         ax, ay, az = start[n, 0], start[n, 1], start[n, 2]
         dx, dy, dz = end[n, 0] - ax, end[n, 1] - ay, end[n, 2] - az
         square = dx * dx + dy * dy + dz * dz + 1e-12
-        # a cone's flank leans: at distance d the nearest point lies further along by lean * d
+        # the way to a leaning flank is at right angles to it: its foot on the axis lies nearer to the thick end
         length = np.sqrt(square)
         lean = min(0.95, max(-0.95, (r0[n] - r1[n]) / length))
         shift = lean / (np.sqrt(1.0 - lean * lean) * length)

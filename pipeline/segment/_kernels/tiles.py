@@ -19,14 +19,14 @@ INNER = SIDE - 1
 CELLS = SIDE**3
 """8^3 voxels: with 16^3 a vessel of 10 voxels smooths three times as many as it needs, with 4^3 halos dominate."""
 GREY_STEPS = 1024
-"""Grey steps of the affinity tables; 256 to 1024 change fewer than ten voxels of a vessel tree."""
+"""Grey steps of the affinity tables; 1024 instead of 256 changes fewer than ten voxels of a vessel tree."""
 
 
 @kernel
 def _sweep(source: NDArray[Any], taps: NDArray[Any], stride: int, length: int, out: NDArray[Any]) -> None:
     """One axis of the kernel over a flat array: out[n] = sum of taps[t] source[n + t stride], three taps at a time.
 
-    Runs over row ends as well, where the result is not used: one long loop is what the compiler makes vectors of.
+    Runs over row ends as well, where the result is not used: one long loop is what the compiler can vectorise.
     """
     d = out[:length]
     s0, s1, s2 = source[:length], source[stride : stride + length], source[2 * stride : 2 * stride + length]
@@ -44,9 +44,9 @@ def _sweep(source: NDArray[Any], taps: NDArray[Any], stride: int, length: int, o
 def smooth_tile(
     volume: NDArray[Any], taps: NDArray[Any], at: tuple[int, int, int], one: NDArray[Any], two: NDArray[Any]
 ) -> None:
-    """The kernel at the SIDE^3 voxels from ``at`` on, into ``two`` seen as (w, w, w) with w = SIDE + 2 reach.
+    """Smooth the SIDE^3 voxels from ``at`` on by the kernel, into ``two`` seen as (w, w, w) with w = SIDE + 2 reach.
 
-    one, two : float32, w^3; only the first SIDE entries along each axis of ``two`` are meant. Border voxels are
+    one, two : float32, w^3; only the first SIDE entries along each axis of ``two`` are valid. Border voxels are
     repeated outside. Exact for 16-bit grey and up to three binomial taps.
     """
     reach = taps.shape[0] // 2
@@ -80,6 +80,6 @@ def smooth_tile(
 
 @kernel
 def scratch(taps: NDArray[Any]) -> NDArray[Any]:
-    """Room (2, w^3) for :func:`smooth_tile`."""
+    """Working memory (2, w^3) for :func:`smooth_tile`."""
     w = SIDE + 2 * (taps.shape[0] // 2)
     return np.zeros((2, w * w * w), np.float32)

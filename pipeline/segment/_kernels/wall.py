@@ -103,9 +103,9 @@ def hessian(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float, float
 class Wall(NamedTuple):
     """The surface's closest points to n voxels, and what they tell.
 
-    distance : (n,) mm, negative inside; NaN where no closest point was found within two voxels (0.1 voxel off after the
-    last step, say).  foot, normal : (n, 3), mm and outward unit.  curvature : (n,) sum of principal curvatures, 1/mm,
-    positive for a vessel.  steepness : (n,) fall of grey per mm along the normal.
+    distance : (n,) mm, negative inside; NaN where Newton steps leave two voxels or end over 0.1 voxel off the surface.
+    foot, normal : (n, 3), mm and outward unit.  curvature : (n,) sum of principal curvatures, 1/mm, positive for a
+    vessel.  steepness : (n,) fall of grey per mm along the normal.
     """
 
     distance: NDArray[Any]
@@ -148,7 +148,7 @@ def smooth_lattice(
     voxels: NDArray[Any],
     lattice: NDArray[Any],
 ) -> None:
-    """Fill ``lattice`` where ``state`` is not 0, which is at the flat box indices ``voxels``.
+    """Fill ``lattice`` with smoothed grey where ``state`` is not 0, that is at the flat box indices ``voxels``.
 
     Voxel (PAD, PAD, PAD) of the box is ``corner`` of the volume. Outside the volume the border's smoothed value is
     repeated.
@@ -180,9 +180,9 @@ def smooth_lattice(
 def surface_voxels(
     state: NDArray[Any], lattice: NDArray[Any], level: float, deep: int, voxels: NDArray[Any], inside: NDArray[Any]
 ) -> NDArray[Any]:
-    """Voxels (flat) with a 6-neighbour on the other side, and beside those; ``inside`` gets 1 where it holds.
+    """Voxels (flat) with a 26-neighbour on the other side of the wall, padding left out; sets ``inside`` to 1 inside.
 
-    Inside is what is brighter than ``level``, of the mask (``state`` 1) and its dilated layers (2, 3, ...) up to
+    Inside are those brighter than ``level`` in the mask (``state`` 1) and in its dilated layers (2, 3, ...) up to
     ``deep``: noise or metal may make the mask itself darker.
     """
     marks, grey, sides, steps = (

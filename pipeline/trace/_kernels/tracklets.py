@@ -1,4 +1,4 @@
-"""Bright ridges as ordered sub-voxel points: a predictor-corrector walk from every strong voxel that is left."""
+"""Bright ridges as ordered sub-voxel points: a predictor-corrector walk from every strong voxel not yet passed."""
 
 from typing import Any, NamedTuple
 
@@ -91,7 +91,7 @@ def _swung(probe: Probe, track: Track, count: int, bend: float) -> int:
 
 @kernel
 def _step(field: Blurred, rules: Rules, probe: Probe) -> bool:
-    """Move the probe along the crest; whether it is still on one: strong, sharp, and where the tangent led."""
+    """Move the probe a step along the crest; whether it is still on one: bright, sharp, and where the tangent led."""
     p, t = probe.place, probe.tangent
     ox, oy, oz = t[0], t[1], t[2]
     qx, qy, qz = p[0] + rules.stride * ox, p[1] + rules.stride * oy, p[2] + rules.stride * oz
@@ -106,7 +106,7 @@ def _step(field: Blurred, rules: Rules, probe: Probe) -> bool:
 
 @kernel
 def _unstamp(stamp: NDArray[Any], points: NDArray[Any], spacing: NDArray[Any]) -> None:
-    """Take the marks of the walk that is under way from the voxels of points (n, 3)."""
+    """Clear the marks (negative) that the walk under way has left at points (n, 3)."""
     for point in points:
         i, j, k, there = _voxel(point, spacing, stamp.shape)
         if there:

@@ -62,8 +62,9 @@ class Claim(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """The model (n,) of n voxels and its derivatives: by sigma (n,), and by those controls and nodes (``ids``) that a
-    voxel sees, of which it has ``used`` so many. What finds a row full goes into its last place, which nobody reads.
+    """The model (n,) of n voxels and its derivatives: by sigma (n,), and a row per voxel by the control points and
+    amplitude nodes (``ids``) that it sees; ``used`` counts its entries. What finds a row full goes into the row's last
+    place, which nobody reads.
     """
 
     model: NDArray[Any]
@@ -160,7 +161,7 @@ def _add_tints(
 
 @kernel
 def _add_line(rows: _Rows, line: Line, slot: NDArray[Any], spacing: NDArray[Any], blob: Blob) -> None:
-    """Add what every sample m of the wire gives the voxels s around it."""
+    """Add what every sample m of the wire contributes to the model and derivatives of the voxels s around it."""
     model, by_sigma, ids, used, by_control, tint_ids, tint_used, by_tint = rows
     curve, velocity, speed, amplitude, (measure, first, value, slope, tint_first, tint_share, opacity) = line
     (sigma, radius, _), (hx, hy, hz) = blob, (spacing[0], spacing[1], spacing[2])
