@@ -1,4 +1,4 @@
-"""What may become of a job, wherever it runs."""
+"""The outcome of a job, the same wherever it runs."""
 
 import traceback
 from collections.abc import Callable
@@ -33,7 +33,7 @@ class Outcome(Generic[J, R]):
 
 
 def guarded(work: Callable[[J], R], job: J) -> Outcome[J, R]:
-    """Run one job; an error becomes its outcome, since it must not take the batch along."""
+    """Run one job; an exception becomes its outcome, so that it does not end the whole batch."""
     try:
         return Outcome(job, work(job))
     except WriteError as error:

@@ -51,7 +51,7 @@ def digest(value: Any) -> str:
     if isinstance(value, (str, bytes, int, float, bool, type(None))):
         return f"{type(value).__name__} {value!r}"
     if is_dataclass(value) and value.__hash__ is object.__hash__:
-        # compared by identity, its arrays read-only: one lumen stands in the keys of all frames
+        # an object that is never changed: its digest is kept, since one lumen is in the keys of all frames
         if value not in _known:
             _known[value] = _digest_of_parts(value)
         return _known[value]

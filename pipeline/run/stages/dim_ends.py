@@ -18,8 +18,7 @@ MOVED_MM = 5.0
 
 
 def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
-    """The frames, without the doubt that their dim end may be a catheter's where they all have one; and what was
-    assumed.
+    """The frames, cleared of the doubt about a dim end where they agree on it; and what was assumed.
 
     A catheter that stays where it is shows less of itself the further the wire is pushed.
     """
