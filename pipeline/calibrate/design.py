@@ -18,7 +18,7 @@ from pipeline.simulate.clamp import Seen
 from pipeline.simulate.config import SolverConfig
 
 TRACE_VOXELS, TIP_VOXELS = 0.07, 0.2
-"""What traces of a plain study are off, across the wire per axis and at the tip (README)."""
+"""Standard deviation of a plain study's traces in voxels, across the wire per axis and at the tip (README)."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Predicted:
 
     @property
     def seen(self) -> bool:
-        """It is small enough."""
+        """Whether it is small enough."""
         return self.sd <= self.unknown.enough
 
 

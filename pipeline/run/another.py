@@ -72,7 +72,7 @@ class Others:
         self.depths_mm = np.array([depth for _, depth, _, _ in self.traces])
 
     def nearest(self, depth_mm: float, curve: Array) -> list[Array]:
-        """Of each other insertion the trace of the nearest depth, of those that begin where the curve does."""
+        """The trace of nearest depth of each other case, unless it begins elsewhere; at most MOST_OTHERS."""
         near: list[Array] = []
         seen: set[int] = set()
         for place in np.argsort(np.abs(self.depths_mm - depth_mm), kind="stable"):

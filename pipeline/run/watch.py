@@ -34,7 +34,10 @@ def share_done(log: str) -> float:
 
 @dataclass
 class Watch:
-    """Follows the jobs of a batch. silent : say nothing; lines : no bar, even on a terminal.     stream : where to."""
+    """Follows the jobs of a batch.
+
+    silent : say nothing.     lines : no bar, even on a terminal.     stream : where bar and lines are written.
+    """
 
     jobs: Sequence[Job]
     silent: bool = False
