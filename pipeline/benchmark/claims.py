@@ -187,7 +187,7 @@ def skips() -> Iterator[Claim]:
     """Every skip off in turn: the same wire, and what the skip saves."""
     for name in Skips._fields:
         hull = MANY_LOOK_UPS if name in ("clearance", "cheap") else "offset"
-        # only in a long sheath does what the tip meets die out before it comes to the base
+        # only in a long sheath is the base not affected by what the tip meets
         scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(), 0.5)
         wall = scene.wall(hull)
         # wires are compared at a tolerance so tight that where an iteration stops does not show

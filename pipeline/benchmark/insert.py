@@ -70,8 +70,7 @@ def insert(scene: BenchScene, setting: SolverSetting, wall: VesselWall | None = 
 def timed(work: Callable[[], Result], repeats: int = 3) -> tuple[float, Result]:
     """Median seconds of processor time over the repeats, and the last result.
 
-    Not wall-clock time: all that is measured here runs in one thread, and other work of a busy machine would count,
-    too.
+    Not wall-clock time: all that is measured here runs in one thread, and a busy machine would be measured along.
     """
     seconds: list[float] = []
     for _ in range(repeats):

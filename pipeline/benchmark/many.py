@@ -15,7 +15,7 @@ COUNT, DEPTHS, PART = 256, 30, 64
 
 
 class Outcome(NamedTuple):
-    """Speed-up over one insertion after the other, on one core and on two.     apart : mm, (COUNT, DEPTHS)."""
+    """Speed-up over one after the other, on one core and on two.     apart : (COUNT, DEPTHS) largest difference, mm."""
 
     one_core: float
     two_cores: float

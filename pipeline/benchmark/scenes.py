@@ -32,8 +32,7 @@ class BenchScene:
     """A wire to be pushed to ``depth_mm`` in steps of ``step_mm`` through a wall, or bent by a dead tip load.
 
     guide_wire : the wire; ``wire`` gives it segments of a length.
-    distance : signed distance (n,) of points (n, 3), None without a wall.     box : two corners of the sampled box, LPS
-    mm.
+    distance : signed distance (n,) of points (n, 3), None without a wall.     box : corners of the sampled box, LPS mm.
     ready : the wall's grid where there is one already (a user's case), in place of ``distance``.
     """
 
@@ -143,8 +142,7 @@ def _willis_setup(seed: int) -> Setup:
 
 
 REACH_MM = np.array([[12.0, 34.0, 8.0], [24.0, 10.0, 62.0]])
-"""Size of the box around the entry of the carotid, downwards and upwards along each axis: what 80 mm of wire can
-see."""
+"""The box around the entry of the carotid, downwards and upwards along each axis: what 80 mm of wire can see."""
 
 
 def of_setup(name: str, setup: Setup) -> BenchScene:

@@ -3,8 +3,7 @@
 An error of a single point is claimed beyond its own 2u; a small error that all frames share shows only in their common
 pattern. Each wire's end, across the traced one, becomes a few coefficients per frame; the real one's Mahalanobis
 distance is ranked among those of the ensemble's members, each judged by the others, with random errors of a trace
-added. With a right model the real wire is like one of them: a rank in the last 5 % then comes by chance in 5 % of
-studies.
+added. With a right model the real wire is like one of them: a rank in the last 5 % is then chance in 5 % of studies.
 """
 
 from collections.abc import Sequence

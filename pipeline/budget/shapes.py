@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.model import Array
 
 DISTAL_MM = 20.0
-"""A tip lets go, not a whole wire: shapes are told apart by so much of its end."""
+"""Length of the wire's end by which shapes are told apart: a tip lets go, not a whole wire."""
 GAP_MM, GAP_SIGMAS = 0.1, 3.0
 """Two shapes are told apart by a gap between members along the main direction of the spread: wider than this in mm, and
 than so many standard deviations within the shapes."""

@@ -35,7 +35,7 @@ class Predicted:
 
 
 def straight_to(trial: Trial, depths_mm: Sequence[float], rolls_deg: Sequence[float]) -> Trial:
-    """A trial whose traces are only as long as the planned depths: straight ones."""
+    """The trial with straight lines as traces: so far only their lengths, the planned depths, and the rolls matter."""
     seen = []
     for n, (depth, roll) in enumerate(zip(depths_mm, rolls_deg, strict=True)):
         points = trial.given.entry_mm + np.linspace(0.0, depth, 2)[:, None] * trial.given.direction

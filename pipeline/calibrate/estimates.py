@@ -18,8 +18,7 @@ from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
 OFFSETS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
-"""Offsets in standard deviations at which profiles are evaluated, beside +- the one at which a parameter counts as
-seen."""
+"""Offsets, in standard deviations, at which profiles are evaluated, beside +- the unknown's ``enough``."""
 RISE = 1.0
 """Rise of the objective (minus twice the log-posterior) at one standard deviation."""
 

@@ -106,7 +106,7 @@ class Problem:
         return float(sum(r @ r for r in residual) + np.sum(((x - means)[free] / sigmas[free]) ** 2))
 
     def columns(self, index: int) -> dict[int, float]:
-        """Entries of a vector that move an insertion's wires, each with its step; depths, moved together, apart."""
+        """Entries of a vector that move an insertion's wires, each with its step; not the depths, moved all at once."""
         trial, part = self.evidence[index].trial, self.parts()[index]
         found = {k: u.step for k, u in enumerate(self.free) if self._concerns(u, index)}
         return found | {part.start + k: OWN_STEPS[k] for k in range(OWN) if trial.sigmas[k] > 0}

@@ -28,8 +28,7 @@ MODEL_VOXELS, MODEL_BELL_MM = 0.15, 6.0
 contact that opens or closes decides): standard deviation in voxels, and the length (mm) over which it is correlated.
 The true rod and the solver differ by 0.003 to 0.04 mm in this way."""
 LOST_MM = 1.0
-"""Distance that stands for a wire that did not come to rest: its frame tells nothing, but looks no better than
-others."""
+"""Distance that is taken for a wire that did not come to rest: its frame tells nothing, but looks no better for it."""
 FORCE_SHARE = 0.03
 """Relative error of the model in a push force, one standard deviation."""
 FARTHEST_MM, OUTLYING = 0.6, 4.0

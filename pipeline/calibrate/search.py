@@ -17,7 +17,7 @@ MOST_STARTS, FIRST_ROUNDS = 3, 4
 AS_GOOD = 4.0
 """Rise of the objective, minus twice the log-posterior, up to which another roll is as good."""
 FIRST_FRICTION = 0.03
-"""Friction starts here instead of at 0: that is the end of its range, where its derivative is one-sided."""
+"""Friction starts no lower than this: 0 is the end of its range, where its derivative is one-sided."""
 
 
 @dataclass(frozen=True, eq=False)

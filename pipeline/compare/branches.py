@@ -54,7 +54,7 @@ def branches_of(distance: Grid, entry_mm: Array) -> Branches:
     reached = np.isfinite(way)
     band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int32)
     slices, at = np.asarray(label(band, connectivity=3), dtype=np.int32), tuple(inside.T)
-    # what cannot be reached from the entry is no branch of this vessel: 0
+    # what cannot be reached from the entry is no branch of this vessel and has the number 0
     nodes, middle = slices[at], distance.to_mm(inside.astype(float))
     graph = _Graph(slices, band, depth, thick)
     names = graph.names()

@@ -184,9 +184,8 @@ def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[s
 def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:
     """The predictors that are compared with each other, and the frames (frames,) for which all of them have a guess.
 
-    known : by name, the frames for which it has one.     points : number of points in each frame.     A predictor takes
-    part that has LEAST_SHARE of all points; while all together have less in common, the one is dropped that costs most
-    of it.
+    known : by name, the frames for which it has one.     points : number in each frame.     A predictor takes part that
+    has LEAST_SHARE of all points; while all together have less in common, the one is dropped that costs most of it.
     """
 
     def share(names: Sequence[str]) -> float:

@@ -50,7 +50,7 @@ class Gathered:
 
 
 def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """The cases to calibrate with; CalibrationError where there is none, or wires of several kinds."""
+    """The cases to calibrate with; CalibrationError where there is none, where wires differ or parameters are given."""
     found = tuple(case for case in cases if case.role == "calibration")
     if not found:
         raise CalibrationError(['no case has role = "calibration"; mark the insertions to calibrate with so'])

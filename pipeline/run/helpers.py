@@ -30,7 +30,7 @@ Work = Callable[[int, Earlier[R]], R]
 ERROR = "error"
 """The file in which a helper writes the exception that it met."""
 LOOK_S = 0.002
-"""Seconds between looks whether a part that is waited for is there."""
+"""Seconds between checks for a part that is waited for."""
 
 
 class _LostError(Exception):

@@ -70,7 +70,7 @@ class Plan:
 
     @property
     def jobs(self) -> list[Job]:
-        """One per case, the longest first, so that no long case is left for the end."""
+        """One per case; with several workers the longest first, so that no long case is left for the end."""
         several = self.workers > 1 or self.address
         longest = sorted(self.cases, key=lambda case: -case.frame_count) if several else self.cases
         return [replace(self.template, case=case) for case in longest]

@@ -16,8 +16,8 @@ LOST = "the worker process was killed twice (out of memory?); run this case alon
 class Outcome(Generic[J, R]):
     """A result, or an error with its traceback or the like in ``log``.
 
-    status : ``crashed``, ``worker_lost``, ``over_limit``, or ``unwritable`` where nothing can be written any more, so
-    that going on makes no sense.
+    status : ``ok``, ``crashed``, ``worker_lost``, ``over_limit``, or ``unwritable`` where nothing can be written any
+    more, so that going on makes no sense.
     """
 
     job: J
@@ -28,7 +28,7 @@ class Outcome(Generic[J, R]):
 
     @property
     def lost(self) -> bool:
-        """Its worker has died."""
+        """Whether its worker has died."""
         return self.status == "worker_lost"
 
 

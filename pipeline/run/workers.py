@@ -26,7 +26,7 @@ R = TypeVar("R")
 PRELOADED = "pipeline.run.case"
 """Imported once (1.5 s) by the server that workers are forked from."""
 LOOK_S = 0.1
-"""Seconds between looks at a worker under limits: for so long it may exceed them."""
+"""Seconds between checks of a worker against its limits: for that long it may exceed them."""
 
 
 class Limits(NamedTuple):

@@ -34,8 +34,7 @@ near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
 TANGENT_MM = 0.25
 SNAPS = 3.0
-"""A derivative of more than this many times a rigid wire's means that the wire snaps: its frame is not used in this
-round."""
+"""A derivative of more than this many times a rigid wire's is a snap: that frame is not used in this round."""
 
 
 @dataclass(frozen=True)

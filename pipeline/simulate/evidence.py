@@ -19,8 +19,7 @@ SHARED, SHARED_MM, SHARED_FARTHER = 0.45, 1.5, 0.15
 scan is subtracted from all frames, so its noise is in all of them where the wires coincide. At the entry they do;
 measured 0.4 to 0.5 there, 0.1 to 0.2 from 2 mm on."""
 START = 1.0
-"""Relative excess of a trace's variance at its beginning, over half a knot: measured 0.2 to 1.5 at contrasts of 16 to
-4."""
+"""Relative excess of a trace's variance at its start, over half a knot: measured 0.2 to 1.5 at contrasts of 16 to 4."""
 UNKNOWN_VOXELS = 0.15
 """Standard deviation of a trace that states none, as a user's own."""
 MODEL_VOXELS, MODEL_MM = 0.1, 8.0

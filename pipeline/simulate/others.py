@@ -18,8 +18,7 @@ LARGEST_TURN_DEG = 60.0
 """Largest angle between a wire's first 2 mm and the entry's direction."""
 OVER_MM = 2.0
 STEP_BACK_MM, BACK = 0.05, -0.5
-"""A step longer than this (mm) whose cosine to the one before is less than this: no wire turns by 120 degrees at a
-point."""
+"""A step longer than this (mm) whose cosine to the one before is below this: no wire turns by 120 degrees there."""
 ROUNDING_MM = 1e-3
 UNITS = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 SAME = 0.15

@@ -18,8 +18,7 @@ RADIUS_MM = scenes.RADIUS_MM
 MOMENT_MM4 = 0.25 * np.pi * RADIUS_MM**4
 """Second moment of area of the round section."""
 EA_N = 4.0 * EI / RADIUS_MM**2
-"""Axial stiffness of a round wire of one material, 1.2 kN: 1 mN stretches it by 1e-6, as good as not at all, like the
-chain."""
+"""Axial stiffness of a round wire of one material, 1.2 kN: 1 mN stretches it by 1e-6, practically not at all."""
 GJ = EI / 1.3
 """Torsional stiffness of the same material with a Poisson number of 0.3, N mm^2."""
 
@@ -120,7 +119,7 @@ class RivalWire(ABC):
 
 
 def pushed(rival: type[RivalWire], task: Task, most: int | None = None) -> tuple[RivalWire, list[float]]:
-    """Build a rival's wire and push it in, all the way or so often; seconds of processor time of each push."""
+    """Build a rival's wire and push it in, all the way or ``most`` times; also each push's processor time, s."""
     wire, seconds = rival(task), []
     for depth in task.depths()[:most]:
         start = process_time()

@@ -16,7 +16,7 @@ turn to less well, and a stiff wall's last place is lost in a second look-up."""
 MADE = 0.02
 """Tolerated energy from nowhere, over the hand's work, beside the error of the trapezium rule."""
 SPRING_MM = 1e-3
-"""Slip of the springs by which friction holds a point: such a spring stores its load over half of this."""
+"""Slip of the springs by which friction holds a point: such a spring stores the work of its load over half of this."""
 
 
 def rubbed(plan: ScenePlan, chain: StaticChain, solution: Solution) -> tuple[str, Array]:

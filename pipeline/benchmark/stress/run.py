@@ -21,11 +21,9 @@ from solver._compile import hash_of
 SCENES_CSV, STRESS_CSV = "stress_scenes.csv", "stress.csv"
 SCENES, QUICK_SCENES = 5000, 200
 LIMIT_S = 60.0
-"""Processor time beyond which a scene counts as hanging: work per depth is limited, the slowest scene takes some 15
-s."""
+"""Processor time beyond which a scene hangs: work per depth is limited, the slowest scene takes some 15 s."""
 BUSY = 10.0
-"""Limit of wall-clock over processor time: a busy machine gives a process a tenth of a core; one that takes longer is
-stuck."""
+"""Limit of wall-clock over processor time: a busy machine gives a process a tenth of a core; beyond, it is stuck."""
 
 
 def run_isolated(seed: int, indices: Sequence[int], jobs: int = 1, limit_s: float = LIMIT_S) -> Iterator[SceneOutcome]:

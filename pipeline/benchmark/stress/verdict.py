@@ -12,7 +12,7 @@ from pipeline.benchmark.stress.statics import Array, StaticChain, assemble
 from solver import GuideWire, Solution, VesselWall
 
 STRETCH = 1e-12
-"""Largest change of a segment's length, relative to the larger of the segment and its distance from the origin."""
+"""Largest change of a segment's length, relative to the larger of the segment and the wire's largest coordinate."""
 RESIDUAL = 1e-4
 """Largest moment left at a joint of a wire called converged, relative to the largest moment in it: ten times
 what the solver itself asks for, because the last place of a stiff wall is lost in a second assembly."""
@@ -23,8 +23,7 @@ TURNED = 0.01
 """Share of mu N, per mm of the wire's radius, that contacts which still stick may be off, with the same lever: settled
 directions may have turned by 1e-4 rad, and a spring slips at 1e-3 mm, so one alone may be off by ten times as much."""
 ENERGY_PLACE = 1e-12
-"""A residual does not count where even a wire free of its wall would gain less than this fraction of the energy by
-following it."""
+"""Fraction of the energy: a residual does not count where following it would gain less, even without the wall."""
 MOMENT_FLOOR_RAD = 1e-6
 """Joint angle whose moment counts as none: where the rest shape is the answer there is no moment to compare with."""
 ROSE = 1e-9

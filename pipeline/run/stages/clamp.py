@@ -1,4 +1,4 @@
-"""simulate, its beginning: where the wire is held, by the manifest or by the scans."""
+"""The beginning of simulate: where the wire is held, by the manifest or by the scans."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -17,11 +17,11 @@ AROUND = 5
 FEWEST = 4
 """Fewest frames for a check."""
 SURE = 5.0
-"""A length is out of step where its difference is off the usual one by so many standard deviations of all frames,"""
+"""First limit on how far a difference may be off the usual one: so many standard deviations of all frames."""
 SURE_TIP = 4.0
-"""by so many standard deviations of the frame's own tip,"""
+"""Second limit: so many standard deviations of the frame's own tip."""
 LEAST_VOXELS = 3.0
-"""and by so many voxels; the largest of the three counts."""
+"""Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
 
 
 def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:

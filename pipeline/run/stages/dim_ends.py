@@ -12,7 +12,7 @@ from pipeline.trace import DIM_FROM_TIP, cleared
 FEWEST = 3
 """Frames that must agree."""
 AGREE_VOXELS = 3.0
-"""How much their dim ends may differ in length: where a step is told from a dim end it is 1 voxel off, the tip 1.75."""
+"""How much the lengths of their dim ends may differ: the step in brightness is located to 1 voxel, the tip to 1.75."""
 MOVED_MM = 5.0
 """By how much the wire must have been pushed between the first and the last of them."""
 

@@ -70,7 +70,7 @@ class Frame:
 
     @property
     def traced(self) -> bool:
-        """There is a curve to compare with, whether or not it is to be trusted."""
+        """Whether there is a curve to compare with, trusted or not."""
         return self.curve is not None and len(self.curve.points_mm) > 1
 
     @property
@@ -90,7 +90,7 @@ class Frame:
 
     @property
     def uncertain(self) -> bool:
-        """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
+        """Whether the simulated wire was about to snap, or segments of twice the length lead elsewhere."""
         return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":

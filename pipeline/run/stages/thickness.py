@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from pipeline.run.stages.known import Frame
 
 LEAST_SHARE = 0.9
-"""Ratio of the seen to the stated radius below which the stated one is doubted. It is 1.15 to 2.1 in 17 scenes of the
-catalogue (the fit is wider than a blurred disc); with twice the radius stated it is 0.57 to 1.05, and 15 of the 17 are
+"""Ratio of the seen to the stated radius below which the latter is doubted. It is 1.15 to 2.1 in 17 scenes of the
+catalogue (the fit is wider than a blurred disc); with twice the radius stated it is 0.57 to 1.05: 15 of them are
 noticed."""
 LEAST_VOXELS = 1.2
-"""Least stated diameter, voxels, whose blur differs enough from that of a thin line: at 0.84 voxels the ratio was
-1.0."""
+"""Least stated diameter, voxels, whose blur differs from a thin line's: at 0.84 voxels the ratio was 1.0."""
 
 
 def too_thin(

@@ -23,8 +23,7 @@ STILL_MM = {"cantilever": 1e-6, "bend": 1e-5}
 """A step that moves no node by more ends the wait; ten times tighter changes the answers by less than 1 %."""
 MOST_STEPS = 4000
 GRAVITY = np.array([0.0, -9.81, 0.0])
-"""The library's own gravity, which cannot be turned off from Python; it is taken out of the velocity before each
-step."""
+"""The library's own gravity, which Python cannot turn off; it is taken out of the velocity before each step."""
 ALONG = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """The library twists about a segment's own y, so y is laid along the wire."""
 CORNERS = "--- +-- ++- -+- --+ +-+ +++ -++"
