@@ -64,7 +64,7 @@ class Frame:
 
     @property
     def ok(self) -> bool:
-        """Traced, simulated to its depth, converged and compared (or simulated, or what the roll was fitted on)."""
+        """Whether it was traced, simulated to its depth and compared, or only simulated, or used to fit the roll."""
         good = FrameStatus.OK, FrameStatus.SIMULATED, FrameStatus.ROLL_FITTED
         return self.status in (status.identifier for status in good)
 
