@@ -6,8 +6,9 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ITK_
 
 
 def one_thread() -> None:
-    """Let no library that is imported from here on take threads of its own.
+    """Limit every library that is imported from now on to one thread.
 
-    ``-j`` is the one budget of cores, and a sum by two threads differs from that by one in its last digit.
+    ``-j`` alone decides how many cores are used, and a sum computed by two threads differs in its last digit from one
+    computed by a single thread.
     """
     os.environ.update(dict.fromkeys(THREADS, "1"))

@@ -24,7 +24,7 @@ COMMAND_LINE = "the command line"
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, as a batch system sends it before it kills: ends like Ctrl-C."""
+    """SIGTERM, which a batch system sends before it kills; handled like Ctrl-C."""
 
 
 KINDS = {"int": "a whole number", "float": "a number"}
@@ -42,7 +42,7 @@ WORDED: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
     (r"the following arguments are required: (.*)", lambda m: f"missing: {', '.join(map(_short, m[1].split(', ')))}"),
     (r"one of the arguments (.*) is required", lambda m: f"missing: one of {', '.join(m[1].split())}"),
 )
-"""What argparse says, and how it is said here."""
+"""Patterns of argparse's error messages, each with the function that rewords the match."""
 
 
 def _short(names: str) -> str:
@@ -50,7 +50,7 @@ def _short(names: str) -> str:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that tells what is wrong as everything else is told, without a page of usage."""
+    """A parser that raises its errors as InputError, worded like all others, instead of printing a page of usage."""
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError."""
@@ -84,7 +84,7 @@ def parsers() -> tuple[Parser, dict[str, Parser]]:
 
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
-    """What was typed; InputError for what cannot be carried out, argparse's exit for --help."""
+    """Parse the command line; InputError for what cannot be carried out, argparse's exit for --help."""
     if "" in words:
         raise _usage("an empty argument; name a file, a folder or a value, or leave it out")
     parser, verbs = parsers()
@@ -108,9 +108,9 @@ def _usage(problem: str) -> InputError:
 
 
 def carried_out(args: argparse.Namespace) -> int:
-    """Carry out a verb: its exit code. Raises InputError or StageError where what was given cannot be used.
+    """Carry out a verb and return its exit code; InputError or StageError where what was given cannot be used.
 
-    Nobody computes for an hour what cannot be written then: every place to write is tried first.
+    First it checks that every place to write is writable, so that no result is computed that cannot be saved.
     """
     places = ((getattr(args, name, None), option) for name, option in (("out", "-o"), ("junit", "--junit")))
     problems = [text for place, option in places if place is not None for text in unwritable(Path(place), option)]
@@ -121,7 +121,7 @@ def carried_out(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _ended_by_signal() -> Iterator[None]:
-    """SIGTERM ends a command like Ctrl-C: with its workers ended and what is finished kept."""
+    """Let SIGTERM end a command as Ctrl-C does: its workers are ended, finished results are kept."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -137,7 +137,7 @@ def _ended_by_signal() -> Iterator[None]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code, which a reader of its output that has gone does not change."""
+    """Run one command and return its exit code; a reader that closes the output pipe early does not change it."""
     with lasting() as out:
         code = _main(argv)
         out.flush()
@@ -148,7 +148,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _main(argv: Sequence[str] | None) -> int:
     args = argparse.Namespace()
-    if argv is None:  # a process of our own, in which nothing has computed yet
+    if argv is None:  # run as a program: nothing has been computed in this process yet
         one_thread()
     try:
         args = parsed(sys.argv[1:] if argv is None else argv)
@@ -163,7 +163,7 @@ def _main(argv: Sequence[str] | None) -> int:
             return carried_out(args)
     except (InputError, StageError) as error:
         problems, place = (error.problems, error.place) if isinstance(error, InputError) else ([str(error)], "")
-        then = {"then": ""} if getattr(args, "command", "") == "check" else {}  # it runs nothing in any case
+        then = {"then": ""} if getattr(args, "command", "") == "check" else {}  # check never runs anything
         return complain(problems, place or str(getattr(args, "manifest", COMMAND_LINE)), **then)
     except KeyboardInterrupt as why:
         number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
@@ -175,7 +175,7 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 def _kept(args: argparse.Namespace) -> str:
-    """What of an interrupted command is left, and how it goes on."""
+    """Words for an interrupted run or score: what is kept and how to continue; empty for other commands."""
     if getattr(args, "command", None) not in ("run", "score") or getattr(args, "dry_run", False):
         return ""
     again = "the same command without --fresh" if args.fresh else "the same command"

@@ -19,9 +19,9 @@ from solver.grid import Grid, read_only
 
 Array = NDArray[np.float64]
 Counters = Mapping[str, float]
-"""What was counted, by name; over frames such numbers add up."""
+"""Counts by name; over frames they are summed."""
 Levels = Mapping[str, float]
-"""What was measured (a noise, a blur, a share), by name; over frames such numbers have a median."""
+"""Measured values by name (a noise, a blur, a share); over frames their least, median and greatest are reported."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,11 @@ class Clamp:
 
 @dataclass(frozen=True, eq=False)
 class OtherWire:
-    """A wire that another simulator made: joints_mm (n, 3) from the clamp's plane to the tip, LPS mm; nothing is known
-    of forces. max_penetration_mm : how far it comes out of the lumen, its radius with it."""
+    """A wire that another simulator made; its forces are not known.
+
+    joints_mm : (n, 3) from the clamp's plane to the tip, LPS mm.
+    max_penetration_mm : how far its surface (its radius included) reaches out of the lumen.
+    """
 
     joints_mm: Array
     max_penetration_mm: float
@@ -131,8 +134,8 @@ class OtherWire:
 class Volume(Grid):
     """Grey values of one scan (or of a crop of it), indexed x, y, z.
 
-    assumed : what the file lacked.     made_of : what the values were read from, where they are as read; it stands
-    for them in the keys of stored results.
+    assumed : what the file lacked and was assumed.     made_of : what the values were read from, where they are
+    unchanged since; it stands for them in cache keys.
     """
 
     assumed: tuple[str, ...] = ()
@@ -165,7 +168,7 @@ class Branches:
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS; radius_mm (n,) where a file gives one a point."""
+    """Triangles (t, 3) and lines, as indices of points_mm (n, 3) LPS; radius_mm (n,) where a file has one per point."""
 
     points_mm: Array
     triangles: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Kinds of values that users may give; any other is refused at the door, in the words of ``pipeline.wording``."""
+"""Types of the values that users may give; others are refused with the messages of ``pipeline.wording``."""
 
 import math
 from functools import partial
@@ -9,7 +9,7 @@ from pydantic_core import PydanticCustomError
 
 
 def _number(value: Any) -> Any:
-    """The value itself; an error for a text or a truth value, which pydantic would take for a number."""
+    """The value itself; an error for a text or a boolean, which pydantic would convert to a number."""
     if isinstance(value, (bool, str)):
         raise PydanticCustomError("number", "no number")
     return value
@@ -24,12 +24,12 @@ Count = Annotated[int, Field(ge=0, le=10**6), Number]
 PositiveCount = Annotated[int, Field(ge=1, le=10**6), Number]
 Millimetres = Annotated[float, Field(ge=0, le=50, allow_inf_nan=False), Number]
 Reach = Annotated[float, Field(ge=0.1, le=50, allow_inf_nan=False), Number]
-"""Distances beside a vessel or along it."""
+"""A distance beside a vessel or along it, mm."""
 Depth = Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False), Number]
-"""How far a wire is pushed in: no wire is longer than 5 m."""
+"""Insertion depth, mm: no wire is longer than 5 m."""
 Factor = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), Number]
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
-"""A length in mm that curves are cut into: below 10 µm it is a hang, not a resolution."""
+"""Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""
 Radius = Annotated[float, Field(ge=1e-3, le=20, allow_inf_nan=False), Number]
 Place = Annotated[float, Field(ge=-1e4, le=1e4, allow_inf_nan=False), Number]
 Point = tuple[Place, Place, Place]
@@ -78,7 +78,7 @@ def _checked(value: Profile, *, lowest: float, highest: float) -> Profile:
 
 Axis = Annotated[Vector, AfterValidator(_not_zero)]
 Direction = Annotated[Vector, AfterValidator(_unit)]
-"""A vector that is made to have length 1."""
+"""A vector, normalised to length 1."""
 PositiveProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-12, highest=1e9)), _PROFILE]
 OpacityProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=1e-3, highest=1e6)), _PROFILE]
 FiniteProfile = Annotated[Profile, AfterValidator(partial(_checked, lowest=-100.0, highest=100.0)), _PROFILE]

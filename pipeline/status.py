@@ -1,4 +1,4 @@
-"""What can go wrong, in the words that the user reads: with a frame, and with what the user wrote."""
+"""What can go wrong with a frame or with the user's input, in the words that the user reads."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches

@@ -1,4 +1,4 @@
-"""Output whose reader may go before the command ends: ``| head``, ``| less``."""
+"""Output streams whose reader may close them before the command ends: ``| head``, ``| less``."""
 
 import os
 import sys
@@ -9,13 +9,13 @@ from typing import Any, TextIO, cast
 
 
 class Lasting:
-    """A stream that goes nowhere once its reader has gone, so that the command ends with the exit code that it has.
+    """A stream that discards its output once writing has failed, so that the command ends with its own exit code.
 
-    lost : why it goes nowhere where that is no reader's doing, as a full disk; empty otherwise.
+    lost : the reason where it is not a closed pipe, such as a full disk; empty otherwise.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
-        # Python has none where it was closed before, as by `>&-`
+        # None where the shell closed the stream, as by `>&-`
         self._stream = stream or Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - it is the process's
         self.lost = ""
 
@@ -23,13 +23,13 @@ class Lasting:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write; the number of characters."""
+        """Write a text; returns its number of characters."""
         with self._without_reader():
             self._stream.write(text)
         return len(text)
 
     def flush(self) -> None:
-        """Flush; what cannot be is dropped."""
+        """Flush; output that cannot be written is dropped."""
         with self._without_reader():
             self._stream.flush()
 
@@ -46,7 +46,7 @@ class Lasting:
 
 @contextmanager
 def lasting() -> Iterator[Lasting]:
-    """Let stdout and stderr outlast their readers; what stands for stdout, which knows what it lost."""
+    """Replace stdout and stderr by ``Lasting`` streams while the block runs; yields the one for stdout."""
     before = sys.stdout, sys.stderr
     out, errors = (Lasting(stream) for stream in before)
     sys.stdout, sys.stderr = cast(TextIO, out), cast(TextIO, errors)

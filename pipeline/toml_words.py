@@ -1,4 +1,4 @@
-"""What is wrong with a file that is no TOML, as a reader says it: where, the line, what is allowed."""
+"""Error messages for files that are not valid TOML: where, the line, what is allowed."""
 
 import re
 
@@ -21,11 +21,11 @@ ALLOWED = {
     "Illegal character": "a text ends with the quote it begins with, on its line",
     "escape": "in double quotes \\\\ stands for a backslash; single quotes take it as it is",
 }
-"""By a piece of what the parser says."""
+"""What is allowed, by a piece of the parser's error message."""
 
 
 def not_toml(where: object, text: str, error: Exception) -> str:
-    """The sentence on ``text``, read from ``where``, that tomllib refused with ``error``."""
+    """The error message for ``text``, read from ``where``, which tomllib refused with ``error``."""
     said = str(error)
     general = f"a line is key = value, [table] or # a comment; {_VALUE}"
     allowed = next((words for piece, words in ALLOWED.items() if piece in said), general)
@@ -33,7 +33,7 @@ def not_toml(where: object, text: str, error: Exception) -> str:
 
 
 def _line(text: str, said: str) -> str:
-    """The line that the parser named, and what stands there; empty where it named none."""
+    """Number and text of the line that the parser named; empty where it named none."""
     lines, place = text.splitlines(), _PLACE.search(said)
     number = int(place[1]) if place else len(lines) if _AT_END in said else 0
     if not 0 < number <= len(lines):

@@ -1,6 +1,6 @@
 """Compile every kernel once by running a tiny study (``python -m pipeline.warm_up``); later runs load them.
 
-The solver compiles in a process of its own beside the imaging kernels: on two cores that is nearly half the time.
+The solver compiles in a process of its own beside the imaging kernels: on two cores that nearly halves the time.
 """
 
 import contextlib
@@ -14,12 +14,12 @@ from time import perf_counter
 from pipeline.cli import main
 from solver.warm import no_collection
 
-# with a third core the solver takes one more; two would only get in each other's way (56 s instead of 46)
+# with a third core the solver compiles in two processes; on two cores that would take 56 s instead of 46
 SOLVER = f"from solver import warm_up; warm_up(beside={(os.cpu_count() or 1) > 2})"
 
 
 def warm_up() -> float:
-    """Seconds that it took; the tiny study and its output are thrown away."""
+    """Compile all kernels; returns the seconds that it took. The tiny study and its output are thrown away."""
     clock = perf_counter()
     silent = io.StringIO()
     with (

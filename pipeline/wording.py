@@ -1,7 +1,7 @@
-"""What a validation refused, as a user reads it: where, what was found, what is allowed, what to do.
+"""Error messages for values that a validation refused: where, what was found, what is allowed, what to do.
 
-pydantic says what broke in its own words, once for each branch of a union and with the names of Python's types; here
-one sentence a key is made from the JSON schema of what was to be written.
+pydantic reports in its own words, once for each branch of a union and with the names of Python's types. Here one
+sentence per key is made from the JSON schema of the model.
 """
 
 import json
@@ -17,22 +17,22 @@ from pydantic_core import PydanticCustomError
 from pipeline.status import did_you_mean
 
 Place = tuple[int | str, ...]
-"""Keys and positions in lists that lead to a value in what the user wrote."""
+"""The path to a value in the user's input: keys, and positions in lists."""
 Schema = Mapping[str, Any]
 OWN, WHOLE_CASE = "value_error", "whole_case"
-"""Kinds of errors whose message is ours: on a key, and one that says all, beyond the case that it belongs to."""
+"""pydantic error types whose messages are written here: on one key, and on a whole case."""
 WRITTEN_HERE: dict[str, Any] = {"not": {}}
-"""Schema of a field that no user may write."""
+"""JSON schema of a field that the program fills in and no user may write."""
 UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 LIMITS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
-VAST = 1e6  # a bound against overflow, of which nobody needs to be told who is within it
+VAST = 1e6  # bounds from here on guard against overflow: named only to a user who exceeds one
 KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": "a text"}
 SEVERAL = {"number": "numbers", "integer": "whole numbers", "string": "texts", "object": "tables"}
 LONGEST = 60
 
 
 def sentences(error: ValidationError, data: Any, schema: Schema) -> Iterator[tuple[Place, str]]:
-    """(place, sentence) of each key that is wrong in ``data``, which was held against a model of that JSON schema."""
+    """(place, sentence) for each wrong key of ``data``, which was validated against a model with this JSON schema."""
     groups: dict[Place, list[tuple[Place, Mapping[str, Any]]]] = {}
     for item in error.errors():
         place = _written(data, item["loc"])
@@ -42,7 +42,7 @@ def sentences(error: ValidationError, data: Any, schema: Schema) -> Iterator[tup
             yield place, _no_such_key(schema, place)
         elif item["type"] == "missing" and isinstance(key := item["loc"][-1], str):
             yield (*place, key), MISSING
-        elif item["type"] != "default_factory_not_called":  # it hangs on another key, which is named already
+        elif item["type"] != "default_factory_not_called":  # it depends on another key, which has an error of its own
             groups.setdefault(_key_of(place), []).append((place, item))
     for key_place, items in groups.items():
         own = next((item["msg"] for _, item in items if item["type"] == OWN), "")
@@ -57,12 +57,12 @@ MISSING = ": missing; this key is required"
 
 
 def saying(*problems: str) -> PydanticCustomError:
-    """The error that says these sentences and nothing else."""
+    """A pydantic error whose message consists of these sentences alone."""
     return PydanticCustomError(WHOLE_CASE, "{problems}", {"problems": problems})
 
 
 def said(place: Sequence[int | str], sentence: str) -> str:
-    """One of ``sentences``, with its place in front: keys apart by blanks, positions in brackets."""
+    """One of ``sentences`` with its place in front: keys separated by blanks, list positions in brackets."""
     words = [f"[{part}]" if isinstance(part, int) else f" {part}" for part in place]
     return ("".join(words).strip() + sentence).removeprefix(": ")
 
@@ -75,7 +75,7 @@ def expected(found: Any, node: Schema, definitions: Schema, *, optional: bool) -
 
 
 def _refused(data: Any, key: Place, place: Place, schema: Schema) -> tuple[Place, str]:
-    """The sentence on one key: the whole value, or of a long list the entry that is wrong."""
+    """(place, sentence) on one key: on its whole value or, where that is long, on the entry that is wrong."""
     node, needed = _node(schema, key)
     whole = _value(data, key)
     where = key if len(as_toml(whole)) <= LONGEST else place
@@ -84,7 +84,7 @@ def _refused(data: Any, key: Place, place: Place, schema: Schema) -> tuple[Place
 
 
 def _written(data: Any, location: Sequence[int | str]) -> Place:
-    """A location of pydantic without its names of the branches of a union."""
+    """pydantic's location of an error as a place in ``data``: without its names for the branches of a union."""
     place: list[int | str] = []
     for part in location:
         inside = part in data if isinstance(data, dict) else isinstance(part, int) and part < _length(data)
@@ -99,7 +99,7 @@ def _length(data: Any) -> int:
 
 
 def _key_of(place: Place) -> Place:
-    """The place of the nearest key: a list is one value."""
+    """The place up to its last key: a list counts as one value."""
     last = max((n for n, part in enumerate(place) if isinstance(part, str)), default=-1)
     return place[: last + 1]
 
@@ -111,7 +111,7 @@ def _value(data: Any, place: Place) -> Any:
 
 
 def _branches(node: Schema, definitions: Schema) -> Iterator[Schema]:
-    """A schema as the alternatives that it allows."""
+    """The alternatives that a schema allows, with references resolved."""
     if "$ref" in node:
         yield from _branches(definitions[node["$ref"].rpartition("/")[2]], definitions)
     elif "anyOf" in node:
@@ -133,7 +133,7 @@ def _node(schema: Schema, place: Place) -> tuple[Schema, bool]:
         owner = next((one for one in options if part in one.get("properties", {})), None)
         if owner is not None:
             node, needed = owner["properties"][part], part in owner.get("required", ())
-        else:  # a table with names of the user's own
+        else:  # a table whose keys the user chooses
             node = next((one["additionalProperties"] for one in options if one.get("additionalProperties")), {})
     return node, needed
 
@@ -146,7 +146,7 @@ def _no_such_key(schema: Schema, place: Place) -> str:
 
 
 def _numbers(found: Any) -> Iterator[float]:
-    """Every number of a value."""
+    """Every number in a value, those in nested lists included."""
     if isinstance(found, (list, tuple)):
         for one in found:
             yield from _numbers(one)
@@ -177,7 +177,7 @@ def _is_number(text: str) -> bool:
 
 
 def as_toml(value: Any) -> str:
-    """A value as its file writes it."""
+    """A value as text in TOML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {as_toml(one)}" for key, one in value.items()) + "}"
     if isinstance(value, (list, tuple)):
@@ -195,9 +195,9 @@ def shortened(text: str) -> str:
 
 
 def in_words(node: Schema, definitions: Schema | None = None, *, exact: bool = False, null: bool = True) -> str:
-    """What a JSON schema allows, as a reader says it.
+    """What a JSON schema allows, in words.
 
-    exact : with bounds against overflow, too.     null : whether it says that a value may be left out.
+    exact : name the bounds that only guard against overflow, too.     null : say, too, that a value may be left out.
     """
     how: dict[str, Any] = {"exact": exact, "null": null}
     if "$comment" in node:

@@ -98,7 +98,7 @@ def widest_path(tree: Tree, longest_mm: float = LONGEST_WAY_MM) -> Index:
 def _usable(tree: Tree, path: Index, longest_mm: float) -> Index:
     """The part of a path that is neither too wide nor too narrow nor too long."""
     radius = tree.radii_mm[path]
-    first = int(np.argmax(radius < WIDEST_MM))
+    first = int(np.argmax(np.append(radius < WIDEST_MM, True)))
     narrow = np.flatnonzero(radius[first:] < NARROWEST_MM)
     last = first + (int(narrow[0]) if len(narrow) else len(path) - first)
     kept = path[first:last]

@@ -1,4 +1,4 @@
-"""The promises of the solver, each one function: numbers, their aims, and whether they are met."""
+"""The promises of the solver, one function each: measured numbers, their targets, and whether they are met."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ SHAPE, TIP, ENERGY = range(3)
 VOXELS_MM = (0.8, 0.4, 0.2, 0.1)
 """Sizes of the wall's voxels; the finest one is the limit."""
 OFF_LATTICE = 0.37
-"""Of a voxel: a node on the axis of the tube would be luck."""
+"""Shift of the grid in voxels: nodes exactly on the axis of the tube would be luck."""
 MANY_LOOK_UPS = "samples:16"
 """The hull with which skips of look-ups are measured; with one look-up a joint there is little to save."""
 PAIRS = 9
@@ -49,7 +49,7 @@ print(perf_counter() - wall, process_time() - cpu)
 
 @dataclass(frozen=True)
 class Claim:
-    """One measured promise. aim : in words; met : None where no aim is set; timed : of run time, which fails nothing.
+    """One measured promise. aim : in words; met : None where no aim is set; timed : of run time, never a failure.
 
     An order of convergence keeps what it was fitted to. against : what was made smaller, with its unit.
     sizes, errors : its values, and the errors found there in ``error_unit``.
@@ -187,7 +187,7 @@ def skips() -> Iterator[Claim]:
     """Every skip off in turn: the same wire, and what the skip saves."""
     for name in Skips._fields:
         hull = MANY_LOOK_UPS if name in ("clearance", "cheap") else "offset"
-        # only in a long sheath does what the tip meets die out before it comes to the base
+        # only in a long sheath is the base not affected by what the tip meets
         scene, segment = (scenes.sheath(), 1.0) if name == "window" else (scenes.bend(), 0.5)
         wall = scene.wall(hull)
         # wires are compared at a tolerance so tight that where an iteration stops does not show

@@ -29,7 +29,7 @@ VARIANTS = (
 """Each is tried with every segment length; the default comes first."""
 CLOSED_FORM = SolverSetting(1.0, "closed_form", quadrature="joints", tolerance=1e-6, max_iterations=20_000)
 ASKED = ("method", "segment_mm", "hull", "quadrature", "tolerance")
-"""What a row says of its setting."""
+"""The columns in which a row tells its setting."""
 CLOSED_FORM_SHORTEST_MM = 1.0
 """Sweeps grow with the square of the number of joints: below 1 mm one insertion takes minutes."""
 

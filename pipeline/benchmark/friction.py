@@ -38,7 +38,7 @@ def _inserted(scene: BenchScene, depths: Array, step_mm: float = 1.0, **more: ob
 
 
 def any_step() -> Iterator[Claim]:
-    """Push and loss over 75 mm of the bend, by steps of 1 to 0.01 mm."""
+    """Push and loss over 75 mm of the bend, in steps of 1 to 0.01 mm."""
     scene = replace(scenes.bend(75.0), friction=COEFFICIENT)
     runs = [_inserted(scene, np.arange(1.0, 76.0), step) for step in STEPS_MM]
     push = np.array([run[-1].push_force_N for run in runs])
@@ -50,7 +50,7 @@ def any_step() -> Iterator[Claim]:
 
 
 def work_and_loss() -> Iterator[Claim]:
-    """75 mm in and 30 mm out by 0.25 mm; within the millimetre in which the push turns into a pull by 0.05 mm."""
+    """75 mm in and 30 mm out in steps of 0.25 mm; of 0.05 mm in the millimetre in which the push turns into a pull."""
     there = QUARTER_MM * np.arange(1, 301)
     back = there[-1] - np.concatenate([0.05 * np.arange(1, 20), QUARTER_MM * np.arange(4, 121)])
     run = _inserted(replace(scenes.bend(75.0), friction=COEFFICIENT), np.concatenate([there, back]))

@@ -19,7 +19,7 @@ LONG_S = 2.0
 
 @dataclass(frozen=True)
 class SolverSetting:
-    """How the solver is asked; the names are those of ``solver.Insertion``."""
+    """Settings of the solver; the names are those of ``solver.Insertion``."""
 
     segment_mm: float
     method: str = "newton"
@@ -49,7 +49,7 @@ class Run:
 def insert(scene: BenchScene, setting: SolverSetting, wall: VesselWall | None = None) -> Run:
     """Push the scene's wire in; a free wire, whose one step is its length, is bent by its dead load at once.
 
-    wall : made already (it costs more than an insertion).
+    wall : one that is made already, since making it costs more than an insertion.
     """
     wall = scene.wall(setting.hull) if wall is None else wall
     wire = scene.wire(setting.segment_mm)
@@ -70,8 +70,7 @@ def insert(scene: BenchScene, setting: SolverSetting, wall: VesselWall | None = 
 def timed(work: Callable[[], Result], repeats: int = 3) -> tuple[float, Result]:
     """Median seconds of processor time over the repeats, and the last result.
 
-    Processor time, not time on the wall: all that is measured here runs in one thread, and a busy machine would
-    otherwise be measured along.
+    Not wall-clock time: all that is measured here runs in one thread, and a busy machine would be measured along.
     """
     seconds: list[float] = []
     for _ in range(repeats):

@@ -1,4 +1,4 @@
-"""Work in a process of its own: what crashes or hangs costs itself alone."""
+"""Run work in a process of its own, so that a crash or a hang affects nothing else."""
 
 import multiprocessing
 import signal
@@ -19,10 +19,11 @@ class Lost:
 
 
 def alone(method: str, work: Callable[[], Answer], wall_s: float, processor_s: float = 0.0) -> Answer | Lost:
-    """Call a function in a process that is made for it, and ended after so many seconds.
+    """Call a function in a new process, which is killed after a limit; returns its answer, or Lost.
 
-    method : "fork", in which everything is there that is loaded here, or "spawn", in which nothing is.
-    wall_s : on the clock on the wall.     processor_s : of processor time, kept by the system; 0 is no limit.
+    method : "fork", which inherits all that is loaded here, or "spawn", which starts with nothing.
+    wall_s : limit in seconds of wall-clock time.     processor_s : limit in seconds of processor time, kept by the
+    system; 0 is no limit.
     """
     context = multiprocessing.get_context(method)
     ours, theirs = context.Pipe(duplex=False)
@@ -44,7 +45,7 @@ def alone(method: str, work: Callable[[], Answer], wall_s: float, processor_s: f
 
 
 def _answer(pipe: Connection, processor_s: float, work: Callable[[], object]) -> None:
-    """Send what the work returns, or what it raises in words; Ctrl-C is left to the process that waits."""
+    """Send what the work returns, or in words what it raises; Ctrl-C is left to the waiting process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.setitimer(signal.ITIMER_PROF, processor_s)
     try:

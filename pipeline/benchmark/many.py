@@ -1,4 +1,4 @@
-"""Many insertions at once against one after the other: 256 variations of one scene, as in an uncertainty study."""
+"""Many insertions at once against one after the other: 256 variations of a scene, as in an uncertainty study."""
 
 from collections.abc import Sequence
 from time import perf_counter, process_time
@@ -11,11 +11,11 @@ from pipeline.model import Array
 from solver import GuideWire, Insertion, Insertions, Solution, VesselWall
 
 COUNT, DEPTHS, PART = 256, 30, 64
-"""Insertions, depths of each, and how many are timed at a time, the three ways in turns."""
+"""Insertions, depths of each, and insertions in a part: the three ways take turns, part by part."""
 
 
 class Outcome(NamedTuple):
-    """Times as many insertions a second: on one core, and on two.     apart : mm, (COUNT, DEPTHS)."""
+    """Speed-up over one after the other, on one core and on two.     apart : (COUNT, DEPTHS) largest difference, mm."""
 
     one_core: float
     two_cores: float
@@ -35,7 +35,7 @@ def varied(scene: BenchScene, wall: VesselWall, seed: int) -> tuple[Insertion, f
 
 
 def compared(scene: BenchScene, seed: int) -> Outcome:
-    """Go all ways and say how they compare; medians over the parts."""
+    """Simulate one after the other, at once on one core, and at once on two; medians over the parts."""
     wall = scene.wall()
     assert wall is not None
     depths = np.linspace(scene.depth_mm / DEPTHS, scene.depth_mm, DEPTHS).tolist()
@@ -59,7 +59,7 @@ def compared(scene: BenchScene, seed: int) -> Outcome:
 def together(
     scene: BenchScene, wall: VesselWall, depths: Sequence[float], seeds: Sequence[int], threads: int
 ) -> list[list[Solution]]:
-    """The variations of these seeds at once."""
+    """The wires of the variations with these seeds, simulated at once."""
     insertions, rolls = zip(*(varied(scene, wall, n) for n in seeds), strict=True)
     return Insertions(insertions, threads=threads).to_depths(depths, rolls)
 

@@ -1,4 +1,4 @@
-"""The page of a benchmark, made of the tables that its parts have left in the folder."""
+"""The page of a benchmark, made from the tables that its parts have left in the folder."""
 
 from pathlib import Path
 

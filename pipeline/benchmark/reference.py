@@ -12,9 +12,10 @@ from pipeline.benchmark.scenes import BenchScene
 from pipeline.model import Array
 
 FINE_MM = 0.1
-"""Half the smallest segment but one that is judged; the pair 0.1, 0.05 mm leaves about 1e-4 mm in the bend."""
+"""Segments of the coarser of the two insertions, as short as the shortest that are judged; the pair 0.1, 0.05 mm leaves
+about 1e-4 mm in the bend."""
 COARSER = 3
-"""Pairs that are tried, each twice as coarse, where the finest one does not get through."""
+"""Number of pairs that are tried, each twice as coarse as the one before, where finer ones do not reach the depth."""
 SAMPLE_MM = 0.5
 """Arc step of the comparison: the same for every segment length, so that coarse chains are not flattered."""
 

@@ -1,4 +1,4 @@
-"""Are the segments that a study takes by itself short enough, and does it know? Held against much shorter ones."""
+"""Are the segments that a study chooses short enough, and does num_mm tell? Compared with much shorter ones."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -36,7 +36,7 @@ def study_of_resolution(seed: int, *, quick: bool = False) -> Callable[[], Itera
 
 
 def against_short_segments(seed: int, count: int | None = None) -> Iterator[Claim]:
-    """The insertion of a study, its segments chosen by itself. count : of each kind of scenes, None for all."""
+    """Claims about insertions with segments as a study chooses them. count : of each kind of scenes, None for all."""
     warm_up()
     for name, kind in zip(NAMES, (_catalogue(seed), _anatomies(), _random(seed)), strict=True):
         found = [_measured(scene) for scene in islice(kind, count)]
@@ -61,9 +61,10 @@ def _claims(name: str, found: list[tuple[Array, Array]]) -> Iterator[Claim]:
 
 
 def _measured(scene: BenchScene) -> tuple[Array, Array]:
-    """Depths (n, 4): distance from segments of FINEST_MM, mm, num_mm, 1 where uncertain, 1 where these were taken.
+    """What one scene shows: rows (depths, 4) and seconds (3,).
 
-    There the distance is from segments of half of that. And the seconds of the last length, of the last two, of all.
+    Rows: distance from segments of FINEST_MM, mm; num_mm; 1 where uncertain; 1 where FINEST_MM itself was chosen (there
+    the distance is from segments of half of that). Seconds: of the last length tried, of the last two, of all.
     """
     wall, seconds = scene.wall(), {}
 

@@ -19,7 +19,7 @@ Distance = Callable[[Array], Array]
 Vector = tuple[float, float, float]
 
 VOXEL_MM = 0.3
-"""Of the walls: the voxel of a rotational X-ray scan, and that of the figures in the literature."""
+"""Voxel size of the walls: that of a rotational X-ray scan, and of the figures in the literature."""
 RADIUS_MM, STIFFNESS = 0.18, 10.0
 WIRE = GuideWire(1.0, RADIUS_MM, STIFFNESS)
 COARSE = 4
@@ -31,8 +31,8 @@ NEAR_MM = 2.0
 class BenchScene:
     """A wire to be pushed to ``depth_mm`` in steps of ``step_mm`` through a wall, or bent by a dead tip load.
 
-    guide_wire : the wire; how long its segments are is asked of ``wire``.
-    distance : signed distance (n,) of points (n, 3), None without a wall.     box : its two corners, LPS mm.
+    guide_wire : the wire; ``wire`` gives it segments of a length.
+    distance : signed distance (n,) of points (n, 3), None without a wall.     box : corners of the sampled box, LPS mm.
     ready : the wall's grid where there is one already (a user's case), in place of ``distance``.
     """
 
@@ -142,7 +142,7 @@ def _willis_setup(seed: int) -> Setup:
 
 
 REACH_MM = np.array([[12.0, 34.0, 8.0], [24.0, 10.0, 62.0]])
-"""Of the box about the entry of the carotid, downwards and upwards along each axis: what 80 mm of wire can see."""
+"""The box around the entry of the carotid, downwards and upwards along each axis: what 80 mm of wire can see."""
 
 
 def of_setup(name: str, setup: Setup) -> BenchScene:

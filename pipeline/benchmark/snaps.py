@@ -1,4 +1,4 @@
-"""Do shorter steps lead elsewhere? Random insertions in the default's steps, held against steps of 0.05 mm."""
+"""Do shorter steps lead elsewhere? Random insertions in the default's steps, compared with steps of 0.05 mm."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -13,7 +13,7 @@ from pipeline.benchmark.stress.scene_run import build
 from solver import GuideWire, Insertion, Solution, VesselWall
 
 SHORT_MM, EQUAL_MM = 0.05, 0.01
-"""Steps of the reference, and how far a joint may lie from there."""
+"""Step of the reference, mm, and how far, mm, a joint may lie from its place there."""
 SCENES, QUICK_SCENES = 200, 40
 ROUNDS = 3
 Scene = tuple[ScenePlan, GuideWire, VesselWall | None]
@@ -43,11 +43,11 @@ def against_short_steps(seed: int, count: int, first: int = 0) -> Iterator[Claim
 
 
 def _claims(apart: np.ndarray, flagged: np.ndarray, before: np.ndarray, seconds: np.ndarray) -> Iterator[Claim]:
-    """seconds : (scenes, 2), with rough steps taken again, and without."""
+    """seconds : (scenes, 2), with rough steps repeated in shorter ones, and without."""
     name = f"{len(seconds)} random scenes, {len(apart)} depths: "
     silent, share = float(np.sum((apart > EQUAL_MM) & ~flagged)), float(np.mean(flagged))
     yield Claim(name + f"{EQUAL_MM:g} mm from steps of {SHORT_MM:g} mm, and not flagged", silent, "1", "0", silent == 0)
-    # a scene whose wire lies in doubt has all of its depths flagged: the share among 40 scenes says little
+    # a scene whose wire is uncertain has all of its depths flagged: the share among 40 scenes says little
     judged = share <= 0.05 if len(seconds) >= SCENES else None
     yield Claim(name + "flagged as uncertain", share, "1", f"at most 0.05 of {SCENES} scenes", judged)
     yield Claim(name + "off with rough steps taken again", float(np.sum(apart > EQUAL_MM)), "1")

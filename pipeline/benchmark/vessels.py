@@ -33,7 +33,7 @@ def bent_tube(points: Array) -> Array:
 
 
 def lumen_distance(kind: str, points: Array, radius: float) -> Array:
-    """A lumen of the stress study, by its kind; what has no case of its own is a straight tube."""
+    """A lumen of the stress study by its kind; every kind without a formula of its own is a straight tube."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     if kind == "bend":
         return _axis_distance(points, 10.0, 20.0) - radius

@@ -1,4 +1,4 @@
-"""A shaft that is turned in a curved tube: friction winds it up, and its tip is behind the hand."""
+"""A shaft that is turned in a curved tube: friction winds it up, and its tip lags behind the hand."""
 
 import math
 

@@ -1,6 +1,6 @@
-"""budget: how much of an error is what the inputs may be, the trace and the segments, and how much is the model's.
+"""budget: how much of an error the uncertainty of inputs, trace and segments explains, and how much is the model's.
 
-After ASME V&V 20: the insertion is replayed by an ensemble whose inputs are drawn from what they may be. Its spread,
+After ASME V&V 20: the insertion is replayed by an ensemble whose inputs are drawn from their uncertainties. Its spread,
 the trace's and the segments' make u_val; an error within 2 u_val says nothing of the model, one beyond it does.
 """
 

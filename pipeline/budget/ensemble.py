@@ -21,7 +21,7 @@ NARROWEST_MM = 1e-3
 class Scene:
     """What all members share.
 
-    solver : with the length of the segments.     wires : nominal ones, about which the lumen is looked at.
+    solver : with the length of the segments.     wires : nominal ones, around which the lumen is cropped.
     catheter_mm : of the tip of a catheter in each frame.     seed : of the lumens' surfaces.
     """
 
@@ -40,9 +40,9 @@ class Scene:
 
 
 def replayed(scene: Scene, members: Sequence[Member], arc_mm: Sequence[Array]) -> list[Array]:
-    """The wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that came to no rest.
+    """The wires of each frame (members, n, 3) at arc lengths (n,) from the entry; NaN for one that is not at rest.
 
-    Members that share a lumen go side by side; one lumen is held at a time.
+    Members that share a lumen are simulated side by side; one lumen is held at a time.
     """
     vessel = scene.vessel()
     found: list[list[Array]] = [[] for _ in arc_mm]
@@ -55,10 +55,10 @@ def replayed(scene: Scene, members: Sequence[Member], arc_mm: Sequence[Array]) -
 
 
 def _together(scene: Scene, vessel: VesselWall, members: Sequence[Member]) -> Iterator[list[Array | None]]:
-    """The joints (k, 3) of each member's wires."""
+    """For each member the joints (k, 3) of each frame's wire; None for one that did not come to rest."""
     insertions = []
     for one in members:
-        # where hull and wall meet, a lumen narrower by so much is a wire thicker by it
+        # for contact, a lumen that is narrower by some length is the same as a wire with a radius larger by it
         wire = replace(scene.wire, radius_mm=max(scene.wire.radius_mm + one.narrower_mm, NARROWEST_MM))
         own = wire, scene.wall, vessel, one.clamp, scene.solver, one.config, scene.catheter
         insertions.append(insertion_of(*own))

@@ -11,7 +11,7 @@ from pipeline.budget.verdict import ROUND, axes_across, judged, reach_mm
 from pipeline.model import Array
 
 FEWEST = 8
-"""Members at rest without which nothing is said."""
+"""Fewest members at rest for a frame to have a budget."""
 
 
 class Seen(NamedTuple):

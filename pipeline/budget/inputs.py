@@ -1,4 +1,4 @@
-"""What the inputs may be: one standard deviation of each, stated in the manifest or a default, and draws."""
+"""The uncertainty of the inputs: one standard deviation of each, stated in the manifest or a default, and draws."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,22 +10,24 @@ from pipeline.model import Array, Clamp, Wire
 from pipeline.simulate.config import SimulateConfig
 
 LUMEN_VOXELS, LUMEN_NOISE_VOXELS, LUMEN_BIAS_VOXELS = 0.07, 0.1, 0.05
-"""Standard deviation of the lumen's surface: place by place without noise (measured with 0.2 to 0.6 mm voxels), by
-noise where the lumen is no scan's, which says its own, and of what is common to all (measured: 0.03 at most)."""
+"""Standard deviations of the lumen's surface in voxels: place by place apart from noise (measured with 0.2 to 0.6 mm
+voxels); place by place by noise, where the lumen does not come from a scan, which states its own; and common to the
+whole surface (measured: 0.03 at most)."""
 INSERTION_MM = 0.5
-"""Of a depth that is read from a scale on the wire's shaft."""
+"""Standard deviation of a depth that is read from a scale on the wire's shaft."""
 TIP_VOXELS = 0.25
-"""Of a traced tip, along the wire, beyond what the trace states, as in ``simulate.clamp``."""
+"""Standard deviation of a traced tip along the wire, beyond what the trace states, as in ``simulate.clamp``."""
 ROLL_DEG = 5.0
 REST_CURVATURE, TAPER, WALL_STIFFNESS = 0.05, 0.1, 0.5
-"""Relative; of the last two the logarithm's."""
+"""Relative standard deviations; the last two are of the logarithm."""
 UNITS = {"roll_deg": " degrees", "lumen_mm": " mm", "lumen_bias_mm": " mm", "friction": ""}
 FRICTION = 0.3
 """Relative to the coefficient that is stated: where none is, none is drawn, and what friction does is model error."""
 
 LUMENS, SIDE_BY_SIDE = 50, 8
-"""Draws of the lumen's surface at least, one for each member where there are fewer: it is most of the spread, and 48
-members in 6 lumens told 0.11 mm of a frame's 0.27. Members in a lumen at most: as many as go side by side."""
+"""Fewest draws of the lumen's surface, or one for each member where there are fewer: it makes most of the spread, and
+48 members in 6 lumens showed 0.11 mm of a frame's 0.27. Then the most members that share a lumen: as many as are
+simulated side by side."""
 
 SOURCES = (
     *("clamp", "depth", "roll", "lumen", "lumen_bias"),
@@ -136,7 +138,7 @@ def members_per_lumen(count: int) -> int:
 def drawn(nominal: Nominal, sigmas: Sigmas, count: int, per_lumen: int, seed: int = 0) -> list[Member]:
     """Members of an ensemble. per_lumen : how many of them share one draw of the lumen's surface.
 
-    The first so many of a larger ensemble are those of a smaller one: every member has its own generator.
+    Every member has its own generator: a larger ensemble begins with the members of a smaller one.
     """
     members = []
     for number in range(count):
@@ -168,6 +170,6 @@ def _moved(clamp: Clamp, covariance: Array, rng: np.random.Generator) -> tuple[C
 
 
 def alone(sigmas: Sigmas, source: str) -> Sigmas:
-    """The standard deviations of one input, all others exact; the same draws of it are made."""
+    """The standard deviations with all inputs but one exact; draws of that one stay the same."""
     exact: dict[str, Any] = {name: 0.0 * getattr(sigmas, name) for name in SOURCES if name != source}
     return replace(sigmas, **exact)

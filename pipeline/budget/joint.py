@@ -1,9 +1,9 @@
-"""Whether a whole insertion is rarer than what the inputs may be explains: all frames' ends at once.
+"""Whether a whole insertion is rarer than the inputs' uncertainty explains, by all frames' wire ends together.
 
-A point's error is claimed where it is beyond its own 2u; an error that all frames share in small may be seen by their
-pattern alone. Each wire's end, across the traced one, becomes a few coefficients a frame; the real one's Mahalanobis
-distance is ranked among those of the ensemble's members, each judged by the others, with a trace's errors drawn on top.
-Were the model right the real one would be one of them: a rank in the last 5 % is claimed by chance in 5 % of studies.
+An error of a single point is claimed beyond its own 2u; a small error that all frames share shows only in their common
+pattern. Each wire's end, across the traced one, becomes a few coefficients per frame; the real one's Mahalanobis
+distance is ranked among those of the ensemble's members, each judged by the others, with random errors of a trace
+added. With a right model the real wire is like one of them: a rank in the last 5 % is then chance in 5 % of studies.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from pipeline.simulate.evidence import Sight, covariance_of_traces
 
 DISTAL_MM, DEGREE = 20.0, 3
 SHRUNK = 0.3
-"""Part of the covariance that is its diagonal alone: 48 members do not tell 48 variances and their correlations."""
+"""Weight of the diagonal in the shrunk covariance: 48 members do not determine 48 variances and their correlations."""
 NOTHING_MM2 = 1e-12
 
 
@@ -48,9 +48,10 @@ def coefficients(wires: Array, seen: Seen, sight: Sight, voxel_mm: float, rng: n
 
 
 def _squares(tried: Array, others: Array) -> Array:
-    """Squared Mahalanobis distances (t,) of coefficients (t, k) from 0, the nominal wire, by others (m, k).
+    """Squared Mahalanobis distances (t,) of coefficients (t, k) from 0, the nominal wire, by those of others (m, k).
 
-    Of the shrunk second moment S D + (1 - S) X'X / m, by Woodbury's identity: frames may be many, members are not.
+    The covariance is the shrunk second moment S D + (1 - S) X'X / m, inverted by Woodbury's identity: with many frames
+    there are more coefficients than members.
     """
     diagonal = np.mean(others**2, axis=0) + NOTHING_MM2
     x, y = others / np.sqrt(diagonal), tried / np.sqrt(diagonal)

@@ -1,6 +1,6 @@
-"""Frames at which a wire may have let go or not: the ensemble falls into two shapes.
+"""Frames at which a wire may have let go or not: there the ensemble falls into two shapes.
 
-Which of them is right hangs on small causes, so a simulator is asked for their probabilities, and scored by them: the
+Which of them is right depends on small causes, so a simulator is asked for their probabilities, and scored by them: the
 log score is -log2 of the probability that it gave to what came (0 perfect, 1 as good as a coin); the energy score, mm,
 mean |x - y| - mean |x - x'| / 2 over members x, is for all frames (Gneiting and Raftery, J. Am. Stat. Assoc. 102,
 2007).
@@ -15,20 +15,21 @@ from numpy.typing import NDArray
 from pipeline.model import Array
 
 DISTAL_MM = 20.0
-"""A tip lets go, not a whole wire: shapes are told apart by so much of its end."""
+"""Length of the wire's end by which shapes are told apart: a tip lets go, not a whole wire."""
 GAP_MM, GAP_SIGMAS = 0.1, 3.0
-"""Two shapes are those between which nothing lies: a gap along the main direction of the spread, of as much, and of as
-many standard deviations within the shapes."""
+"""Two shapes are told apart by a gap between members along the main direction of the spread: wider than this in mm, and
+than so many standard deviations within the shapes."""
 LEAST_SHARE, LEAST = 0.02, 2
-"""Of the members that a shape must have, and how many."""
+"""Least share of the members that a shape must have, and their least number."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Two shapes of a frame. first : (members,) which members have the first one.
+    """Two shapes of a frame.
 
-    simulated, real : the probabilities of the shapes that the nominal and the traced wire have; the latter is NaN
-    where nothing was traced.     same : whether they are the same.     with_simulated : (members,).
+    simulated, real : the probabilities of the shapes that the nominal and the traced wire have; the latter is NaN where
+    nothing was traced.     same : whether both have the same shape.     with_simulated : (members,) which members have
+    the nominal wire's shape.
     """
 
     simulated: float
@@ -79,8 +80,9 @@ def shapes_of(wires: Array, nominal: Array, real: Array | None, arc_mm: Array) -
 def releases(snapped: Sequence[bool], shapes: Sequence[Shapes | None]) -> list[str]:
     """Of each frame, in order, what became of a release since the one before: both, missed, spurious or nothing.
 
-    snapped : whether the simulated wire let go on the way to it.     The real one is seen in frames alone: where there
-    is one shape it lets go when the simulated one does. Until both have the same shape again, it is the same release.
+    snapped : whether the simulated wire let go on the way to it.     The real wire is seen in frames alone: where there
+    is one shape it is taken to let go when the simulated one does. Until both have the same shape again, it is the same
+    release.
     """
     told, apart = [], False
     for let_go, both in zip(snapped, shapes, strict=True):

@@ -1,4 +1,4 @@
-"""Lumens whose surface lies a little elsewhere: a smooth random field added to the distance."""
+"""Lumens whose surface is displaced at random: a smooth random field is added to the signed distance."""
 
 import numpy as np
 
@@ -6,16 +6,16 @@ from pipeline.model import Array
 from solver import Grid, VesselWall
 
 KNOT_VOXELS = 1.9
-"""Between the knots of the cubic splines that a field is made of: it is correlated as a Gaussian of 0.82 of that. A
-segmented carotid of 0.2 to 0.6 mm voxels is correlated as one of 1.4 to 1.8."""
+"""Distance in voxels between the knots of the cubic splines that a field is made of: it is correlated as by a Gaussian
+of 0.82 of that. A segmented carotid of 0.2 to 0.6 mm voxels is correlated as by one of 1.4 to 1.8 voxels."""
 MEAN_SQUARE = 151.0 / 315.0
-"""Of the weights of a cubic B-spline, summed over its knots, the mean over a cell; in space its third power."""
+"""Sum over the knots of the squared weights of a cubic B-spline, mean over a cell; in space its third power."""
 ROOM_MM = 6.0
-"""How far beyond the wires the lumen is looked at: a member that goes elsewhere may do so by that much."""
+"""Margin of the cropped lumen around the wires: a member may lie elsewhere by that much."""
 
 
 def around(distance: Grid, wires: list[Array]) -> Grid:
-    """The part of the distance around some wires (n, 3)."""
+    """The signed distance, cropped to the surroundings of some wires (n, 3)."""
     points = np.concatenate(wires)
     corners = np.array(np.meshgrid(*zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)))
     index = distance.to_index(corners.reshape(3, -1).T)
@@ -25,7 +25,7 @@ def around(distance: Grid, wires: list[Array]) -> Grid:
 
 
 def _weights(count: int, knot: float) -> Array:
-    """Cubic B-splines (count, knots), ``knot`` voxels apart, at each of ``count`` voxels."""
+    """Weights (count, knots) of cubic B-splines, ``knot`` voxels apart, at each of ``count`` voxels."""
     knots = int(np.ceil(count / knot)) + 3
     t = np.abs(np.arange(count)[:, None] / knot - (np.arange(knots)[None] - 1.0))
     return np.where(t < 1.0, 2.0 / 3.0 - t * t + 0.5 * t**3, np.maximum(2.0 - t, 0.0) ** 3 / 6.0)
@@ -43,7 +43,7 @@ def offset_field(grid: Grid, rng: np.random.Generator) -> Array:
 
 
 def displaced(wall: VesselWall, number: int, sigma_mm: float, seed: int) -> VesselWall:
-    """The wall with its surface drawn anew, the same for the same number."""
+    """The wall with its surface displaced at random, standard deviation ``sigma_mm``; the same for the same number."""
     if sigma_mm == 0.0:
         return wall
     rng = np.random.default_rng([seed, 1, number])

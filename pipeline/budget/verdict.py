@@ -1,8 +1,8 @@
-"""Whether an error is more than what is not known: each point's error over its uncertainty.
+"""Whether an error is larger than its uncertainty: each point's error over its u.
 
 Only what lies across the traced wire counts, as in the distance to it. There an error has two components, so that u is
-half the reach, in the error's own direction, of the ellipse that holds 95 %: of a right model 95 % of points lie within
-2u.
+half the radius, in the error's own direction, of the ellipse that holds 95 %: with a right model 95 % of points lie
+within 2u.
 """
 
 from typing import NamedTuple
@@ -38,14 +38,14 @@ def axes_across(curve_mm: Array, arc_mm: Array) -> Array:
 
 
 def widening(count: int) -> float:
-    """Squared reach of the ellipse in standard deviations, of a covariance from ``count`` members (Hotelling)."""
+    """Squared radius of the 95 % ellipse in standard deviations, of a covariance from ``count`` members (Hotelling)."""
     if count < 4:
         return float("nan")
     return float(2.0 * (count + 1) / (count - 1) * fisher.ppf(COVERED, 2, count - 1))
 
 
 def reach_mm(covariance_mm2: Array, axes: Array, count: int) -> Array:
-    """u (n,), mm, without a direction: of covariances (n, 3, 3) across axes (n, 2, 3), their mean variance taken."""
+    """u (n,), mm, regardless of direction: from the mean variance of covariances (n, 3, 3) along two axes (n, 2, 3)."""
     across = np.einsum("nai,nij,naj->n", axes, covariance_mm2, axes)
     return np.asarray(0.5 * np.sqrt(widening(count) * 0.5 * across))
 

@@ -18,7 +18,7 @@ from pipeline.simulate.clamp import Seen
 from pipeline.simulate.config import SolverConfig
 
 TRACE_VOXELS, TIP_VOXELS = 0.07, 0.2
-"""What traces of a plain study are off, across the wire per axis and at the tip (README)."""
+"""Standard deviation of a plain study's traces in voxels, across the wire per axis and at the tip (README)."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class Predicted:
 
     @property
     def seen(self) -> bool:
-        """It is small enough."""
+        """Whether it is small enough."""
         return self.sd <= self.unknown.enough
 
 
 def straight_to(trial: Trial, depths_mm: Sequence[float], rolls_deg: Sequence[float]) -> Trial:
-    """A trial whose traces are only as long as the planned depths: straight ones."""
+    """The trial with straight lines as traces: so far only their lengths, the planned depths, and the rolls matter."""
     seen = []
     for n, (depth, roll) in enumerate(zip(depths_mm, rolls_deg, strict=True)):
         points = trial.given.entry_mm + np.linspace(0.0, depth, 2)[:, None] * trial.given.direction

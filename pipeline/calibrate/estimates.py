@@ -18,16 +18,16 @@ from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
 OFFSETS = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
-"""Where profiles are looked at in standard deviations, beside those at which a parameter counts as seen."""
+"""Offsets, in standard deviations, at which profiles are evaluated, beside +- the unknown's ``enough``."""
 RISE = 1.0
 """Rise of the objective (minus twice the log-posterior) at one standard deviation."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter. value : as fitted; used : as it goes on, the prior where it is not seen.     sd : of the posterior.
+    """A parameter. value : as fitted; used : by runs, the prior where it is not seen.     sd : of the posterior.
 
-    profile : (value, rise of the objective with all others following).     why : where it is not seen.
+    profile : (value, rise of the objective with all others following).     why : the reason where it is not seen.
     """
 
     unknown: Unknown
@@ -55,7 +55,7 @@ class FrameError:
 class Calibration:
     """Parameters, their correlations (of those that were free at first), errors of each frame, and the fit.
 
-    scale : factor on the traces' covariance that the residuals ask for; where traces state none it is found so.
+    scale : factor on the traces' covariance that the residuals ask for; it sets their size where traces state none.
     """
 
     estimates: tuple[Estimate, ...]
@@ -66,7 +66,7 @@ class Calibration:
 
     @property
     def values(self) -> dict[str, float]:
-        """Parameters as they go on, by name."""
+        """Parameters by name as runs take them."""
         return self.fit.values
 
 
@@ -86,7 +86,7 @@ def calibrated(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: So
 
 
 def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]) -> Estimate:
-    """Whether a parameter is seen."""
+    """The estimate of a parameter, which says whether it is seen and, if not, why."""
     value, sd = fit.values[unknown.name], fit.sd[unknown.name]
     near = [(v, rise) for v, rise in profile if abs(abs(v - value) - unknown.enough) < 1e-6 * unknown.enough]
     flat = [v for v, rise in near if not rise >= RISE]
@@ -104,7 +104,8 @@ def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]
 def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:
     """For each free parameter the rise of the objective at values of it, all other numbers following.
 
-    They follow along the covariance, then once more by the residuals there with the derivatives of the minimum.
+    They follow along the covariance, then by one Gauss-Newton step with the residuals there and the minimum's
+    derivatives.
     """
     linear, problem, covariance = fit.linear, fit.problem, fit.linear.covariance
     asked: list[tuple[int, Array]] = []
@@ -126,7 +127,7 @@ def profiles_of(fit: Fit) -> list[tuple[tuple[float, float], ...]]:
 
 
 def _followed(problem: Problem, linear: Linear, fixed: int, x: Array, residual: Sequence[Array]) -> Array:
-    """The vector after one step with one entry fixed."""
+    """The vector after one Gauss-Newton step of all its entries but one."""
     means, sigmas = problem.prior
     inverse = np.where(sigmas > 0, 1.0 / np.where(sigmas > 0, sigmas, 1.0) ** 2, 1e12)
     right = inverse * (means - x)

@@ -1,6 +1,6 @@
-"""Levenberg and Marquardt over all insertions at once: shared parameters, and each insertion's clamp, wall and depths.
+"""Levenberg-Marquardt over all insertions at once: shared parameters, and each insertion's clamp, wall and depths.
 
-Derivatives are difference quotients of whole insertions, which go side by side.
+Derivatives are difference quotients of whole insertions, which are simulated side by side.
 """
 
 from collections.abc import Sequence
@@ -23,9 +23,10 @@ DAMPINGS = (1.0, 10.0)
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The problem about a vector x (p,): whitened derivatives of every insertion, weights, and their scale.
+    """The problem linearised at a vector x (p,): whitened derivatives of every insertion, weights, and their scale.
 
-    normal : (p, p) with the priors.     right : (p,), minus half the gradient.     value : of the objective.
+    normal : normal matrix (p, p) with the priors.     right : (p,), minus half the gradient.     value : of the
+    objective.
     """
 
     x: Array
@@ -38,7 +39,7 @@ class Linear:
 
     @property
     def covariance(self) -> Array:
-        """Of the posterior (p, p)."""
+        """Covariance (p, p) of the posterior."""
         return np.asarray(np.linalg.inv(self.normal))
 
 
@@ -56,11 +57,11 @@ class Problem:
 
     @property
     def stated(self) -> bool:
-        """All traces state how far they are off."""
+        """Whether every insertion has traces that state their standard deviations."""
         return all(one.stated for one in self.evidence)
 
     def parts(self) -> list[slice]:
-        """Where each insertion's own numbers stand."""
+        """The slice of a vector that holds each insertion's own numbers."""
         found, first = [], len(self.free)
         for one in self.evidence:
             found.append(slice(first, first + OWN + len(one.trial.seen)))
@@ -75,12 +76,12 @@ class Problem:
         return means, np.concatenate([[u.sd for u in self.free], own])
 
     def points(self, x: Array) -> list[Point]:
-        """A vector as each insertion takes it."""
+        """A vector as one Point per insertion: the shared parameters and the insertion's own numbers."""
         shared = self.held | {u.name: float(v) for u, v in zip(self.free, x, strict=False)}
         return [Point(shared, x[part]) for part in self.parts()]
 
     def clipped(self, x: Array) -> Array:
-        """A vector within the bounds."""
+        """A vector with its free unknowns clipped to their bounds."""
         n = len(self.free)
         inside = np.clip(x[:n], [u.low for u in self.free], [u.high for u in self.free])
         return np.concatenate([inside, x[n:]])
@@ -105,7 +106,7 @@ class Problem:
         return float(sum(r @ r for r in residual) + np.sum(((x - means)[free] / sigmas[free]) ** 2))
 
     def columns(self, index: int) -> dict[int, float]:
-        """Entries of a vector that move an insertion's wires, each with its step; depths, moved together, apart."""
+        """Entries of a vector that move an insertion's wires, each with its step; not the depths, moved all at once."""
         trial, part = self.evidence[index].trial, self.parts()[index]
         found = {k: u.step for k, u in enumerate(self.free) if self._concerns(u, index)}
         return found | {part.start + k: OWN_STEPS[k] for k in range(OWN) if trial.sigmas[k] > 0}
@@ -117,7 +118,7 @@ class Problem:
         return not unknown.name.startswith(WALL) or unknown.stated_N_mm2 == trial.wall.stiffness_N_mm2
 
     def linear(self, x: Array) -> Linear:
-        """The problem about a vector, all its difference quotients side by side."""
+        """The problem linearised at a vector, all its difference quotients simulated side by side."""
         here, pairs, steps = self.points(x), [], []
         for i, one in enumerate(self.evidence):
             part, columns = self.parts()[i], self.columns(i)
@@ -142,7 +143,7 @@ class Problem:
         return self._assembled(x, base, slopes)
 
     def _assembled(self, x: Array, base: Sequence[Rows], slopes: Sequence[tuple[Array, Array]]) -> Linear:
-        """Normal equations of what was looked at."""
+        """The normal equations from the residuals ``base`` and the derivatives ``slopes`` of each insertion."""
         surprise = [one.surprise(rows) for one, rows in zip(self.evidence, base, strict=True)]
         weights, scale = weights_of(surprise, stated=self.stated)
         means, sigmas = self.prior
@@ -158,7 +159,7 @@ class Problem:
         return Linear(x, jacobians, normal, right, self.value(x, residuals), weights, scale)
 
     def solved(self, x: Array, rounds: int = ROUNDS) -> Linear:
-        """The problem about the vector at which the objective is least, from a first one."""
+        """The problem linearised at the vector of least objective, found from the vector ``x``."""
         damping = 1e-3
         about = self.linear(self.clipped(x))
         for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""How far the solver's wires lie from the traces of an insertion, weighed by what traces and measured forces are off.
+"""How far the solver's wires lie from the traces of an insertion, weighted by the errors of traces and forces.
 
 A point of a trace is compared with the wire's point at the same distance from the tip, across the wire: a length that
 is a little off is taken up by the frame's own depth.
@@ -22,17 +22,18 @@ from solver import Solution
 FIRST_MM, LAST_MM, EVERY_MM = 0.5, 0.5, 1.5  # the trace's own ends are left out
 TANGENT_MM = 0.25
 WALL_VOXELS, WALL_BELL_MM = 0.1, 3.0
-"""How far a segmented wall is off from place to place, one standard deviation, and over what length."""
+"""Local error of a segmented wall: standard deviation in voxels, and the length (mm) over which it is correlated."""
 MODEL_VOXELS, MODEL_BELL_MM = 0.15, 6.0
-"""How far a wire may lie off in a frame of its own though all parameters are right: where it sticks by friction, and
-what a contact that opens or closes decides. The true rod and the solver are apart by 0.003 to 0.04 mm so."""
+"""Error of the model in each single frame though all parameters are right (where the wire sticks by friction, what a
+contact that opens or closes decides): standard deviation in voxels, and the length (mm) over which it is correlated.
+The true rod and the solver differ by 0.003 to 0.04 mm in this way."""
 LOST_MM = 1.0
-"""Stands for the distance of a wire that came to no rest: its frame says nothing, but is no better than others."""
+"""Distance that is taken for a wire that did not come to rest: its frame tells nothing, but looks no better for it."""
 FORCE_SHARE = 0.03
-"""Part of a push force that the model may be off by itself."""
+"""Relative error of the model in a push force, one standard deviation."""
 FARTHEST_MM, OUTLYING = 0.6, 4.0
-"""A wire that a difference quotient's step moves farther snaps: it tells no direction. A frame whose mean square is so
-many times that of the median frame is weighed down to it: a release must not decide."""
+"""A wire that moves farther (mm) in a difference quotient's step snaps: its derivative is taken as 0. A frame whose
+mean square is more than so many times that of the median frame is weighted down to that: a release must not decide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +47,14 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """An insertion's traces as what is fitted."""
+    """An insertion's traces as the data of a fit."""
 
     trial: Trial
     _roots: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def sights(self) -> list[Sight]:
-        """Points of every frame."""
+        """The points of every frame's trace that are fitted."""
         found = []
         for frame in self.trial.seen:
             arc = np.arange(FIRST_MM, max(frame.curve.length_mm - LAST_MM, FIRST_MM + 1e-6), EVERY_MM)
@@ -64,22 +65,22 @@ class Evidence:
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
-        """Points of every frame (frames,)."""
+        """Number of points of every frame (frames,)."""
         return np.array([len(sight.arc_mm) for sight in self.sights], dtype=np.int64)
 
     @cached_property
     def stated(self) -> bool:
-        """The traces state how far they are off."""
+        """Whether there is a trace that states its standard deviation at all points."""
         return any(bool(np.isfinite(sight.sigma_mm).all()) for sight in self.sights)
 
     @cached_property
     def traced(self) -> Array:
-        """Covariance (points, points) of one component by what the traces are off."""
+        """Covariance (points, points), mm^2, of one component: the errors of the traces."""
         return covariance_of_traces(self.sights, self.trial.voxel_mm)
 
     @cached_property
     def modelled(self) -> Array:
-        """Covariance (points, points) of one component by what wall and model are off, not the traces."""
+        """Covariance (points, points), mm^2, of one component: the errors of wall and model, without the traces'."""
         arc = np.concatenate([sight.arc_mm for sight in self.sights])
         bell = np.exp(-0.5 * ((arc[:, None] - arc[None, :]) / WALL_BELL_MM) ** 2)
         wall = (WALL_VOXELS * self.trial.voxel_mm) ** 2 * bell
@@ -97,7 +98,7 @@ class Evidence:
         return np.asarray(self._roots["root"])
 
     def rows(self, wires: Sequence[Solution], point: Point) -> Rows:
-        """Traces less wires, across the wires."""
+        """Residuals: traces minus wires, across the wires, and measured minus simulated push forces."""
         across, push, rests = [], [], np.zeros(len(wires), bool)
         depths = depths_at(self.trial, point)
         for i, (sight, wire, depth) in enumerate(zip(self.sights, wires, depths, strict=True)):
@@ -118,7 +119,7 @@ class Evidence:
     def slopes(
         self, wires: Sequence[Solution], moved: Sequence[Solution], points: tuple[Point, Point], step: float
     ) -> tuple[Array, Array]:
-        """Derivatives of wires (points, 3) and forces (frames,): 0 for a frame that snaps."""
+        """Derivatives of wires (points, 3) and forces (frames,): 0 for a frame that snaps or is not at rest."""
         depths = zip(depths_at(self.trial, points[0]), depths_at(self.trial, points[1]), strict=True)
         change, push = [], np.zeros(len(wires))
         for i, (a, b, (here, there)) in enumerate(zip(wires, moved, depths, strict=True)):

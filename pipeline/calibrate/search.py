@@ -1,4 +1,4 @@
-"""From nothing known of the roll to the least objective: rolls all around without friction, the best ones followed."""
+"""The search for the least objective while the roll is unknown: rolls all around without friction, the best refined."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ MOST_STARTS, FIRST_ROUNDS = 3, 4
 AS_GOOD = 4.0
 """Rise of the objective, minus twice the log-posterior, up to which another roll is as good."""
 FIRST_FRICTION = 0.03
-"""Where friction starts from 0, which is the end of its range, its derivative is one-sided."""
+"""Friction starts no lower than this: 0 is the end of its range, where its derivative is one-sided."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The problem and its solution.     starts : roll, degrees, and objective of each that was followed."""
+    """The problem and its solution.     starts : roll, degrees, and objective of each start that was followed."""
 
     problem: Problem
     linear: Linear
@@ -30,7 +30,7 @@ class Fit:
 
     @property
     def values(self) -> dict[str, float]:
-        """Shared parameters by name, those that are held with them."""
+        """Shared parameters by name, held ones included."""
         free = {u.name: float(v) for u, v in zip(self.problem.free, self.linear.x, strict=False)}
         return self.problem.held | free
 
@@ -46,7 +46,7 @@ def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: Solver
     slippery = tuple(u for u in free if u.name not in (FRICTION, BENDING))
     first = Problem(slippery, {FRICTION: 0.0}, tuple(evidence), solver)
     followed = [first.solved(x, FIRST_ROUNDS) for x in _starts(first)]
-    # objectives at scales of their own cannot be compared
+    # each solution has a scale of its own: their objectives are compared at a common one
     weights, scale = followed[0].weights, min(one.scale for one in followed)
     values = [
         first.value(one.x, r)
@@ -62,7 +62,7 @@ def fitted(free: Sequence[Unknown], evidence: Sequence[Evidence], solver: Solver
 
 
 def held_at_prior(fit: Fit, names: Sequence[str]) -> Fit:
-    """The fit again with some parameters as the manifest states them."""
+    """The fit again, with some parameters held at what the manifest states."""
     keep = [k for k, u in enumerate(fit.problem.free) if u.name not in names]
     held = {u.name: u.prior for u in fit.problem.free if u.name in names}
     problem = replace(fit.problem, free=tuple(fit.problem.free[k] for k in keep), held=fit.problem.held | held)
@@ -72,7 +72,7 @@ def held_at_prior(fit: Fit, names: Sequence[str]) -> Fit:
 
 @dataclass(frozen=True)
 class OwnRoll:
-    """The roll of one insertion, degrees, how well it is known, and others at which the wire lies as well."""
+    """The roll of one insertion, degrees, its standard deviation, and other rolls that fit as well."""
 
     roll_deg: float
     sd_deg: float
@@ -100,7 +100,7 @@ def own_roll(one: Evidence, friction: float, solver: SolverConfig) -> OwnRoll:
 
 
 def _valleys(values: Array) -> list[int]:
-    """The lowest of the places (n,) on a circle that are no higher than their neighbours."""
+    """Indices of the lowest local minima of values (n,) on a circle, the lowest first, at most MOST_STARTS."""
     low = [k for k in range(len(values)) if values[k] <= min(values[k - 1], values[(k + 1) % len(values)])]
     return sorted(low, key=lambda k: float(values[k]))[:MOST_STARTS]
 
@@ -110,7 +110,7 @@ def _even(weights: Sequence[Array]) -> list[Array]:
 
 
 def _starts(problem: Problem) -> list[Array]:
-    """Vectors to begin with: everything as stated, but the roll from where the objective has its lowest valleys."""
+    """Vectors to begin with: everything as stated, but rolls from where the objective has its lowest local minima."""
     means, _ = problem.prior
     if all(np.all(np.asarray(one.trial.wire.rest_curvature_per_mm) == 0.0) for one in problem.evidence):
         return [means]

@@ -14,20 +14,21 @@ from pipeline.simulate.resolution import lengths_mm
 from solver import Insertion, Insertions, Solution, VesselWall
 
 LUMEN_VOXELS = 0.15
-"""How far the wall may stand off where it was segmented, one standard deviation: it hides in the wall's stiffness."""
+"""Standard deviation, voxels, of the offset of the whole wall from where it was segmented: it is hard to tell from the
+wall's stiffness."""
 OWN = 7
 """Unknowns of an insertion itself: the clamp's place (3) and tilts (2), the wall's offset, its own roll."""
 OWN_STEPS = np.array([STEP_MM] * 3 + [STEP_RAD] * 2 + [0.02, 1.0])
 UNKNOWN_ROLL_DEG = 104.0
-"""Standard deviation of a roll of which nothing is known."""
+"""Standard deviation of a roll of which nothing is known: uniform over a whole turn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
     """An insertion with its traces. vessel : the wall at stiffness 1.     wall : as stated.     given, prior : clamp.
 
-    roll_free : the roll is not stated.     roll_shared : its offset is that of all insertions.     force_N : (frames,)
-    measured push, NaN where it is not; force_sigma_N : its standard deviation.
+    roll_free : the roll is not stated.     force_N : (frames,) measured push, NaN where it is not; force_sigma_N : its
+    standard deviation.
     """
 
     name: str
@@ -69,7 +70,7 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     """The insertion with other parameters, before its first push; ValueError where the solver refuses it."""
     stiffness = trial.wall.stiffness_N_mm2 * wall_factor(trial.wall.stiffness_N_mm2, point.shared)
     vessel = trial.vessel.like(stiffness_N_mm2=stiffness, friction=point.shared.get(FRICTION, trial.wall.friction))
-    # a wall that stands nearer by some length is a wire thicker by it
+    # a wall that is nearer by some length is the same as a wire with a radius larger by it
     wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
     length = lengths_mm(solver.segment_mm, wire.rest_curvature_per_mm)[0]
     settings = replace(solver, segment_mm=length, finest_mm=solver.step_mm)
@@ -83,7 +84,7 @@ def rolls_at(trial: Trial, point: Point) -> list[float]:
 
 
 def replayed(pairs: Sequence[tuple[Trial, Point]], solver: SolverConfig) -> list[list[Solution]]:
-    """The wires of many insertions, all at once: those with a catheter, which cannot be, one after the other."""
+    """The wires of many insertions, side by side; those with a catheter, which cannot be, one after the other."""
     ways = [
         (insertion_at(trial, point, solver), depths_at(trial, point), rolls_at(trial, point)) for trial, point in pairs
     ]

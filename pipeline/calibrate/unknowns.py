@@ -1,7 +1,7 @@
 """What is fitted: every parameter with its prior, its bounds and how well it must be known to count as seen.
 
-Stiffnesses of wire and wall only count in their ratio as long as nothing is weighed (``bending`` needs forces or a
-weight), and the plane of the rest curvature is the roll: neither is fitted twice.
+Only the ratio of the wire's and the wall's stiffness counts unless forces or a weight are known (then there is
+``bending``), and turning the plane of the rest curvature is the same as the roll: neither is fitted twice.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ class Unknown:
 
     @property
     def logarithmic(self) -> bool:
-        """It is the logarithm of a factor."""
+        """Whether it is the logarithm of a factor."""
         return self.name.split(":")[0] in (REST, TAPER, WALL, BENDING)
 
     def shown(self, value: float) -> float:
@@ -93,5 +93,5 @@ def bent(wire: Wire, values: Mapping[str, float]) -> Wire:
 
 
 def wall_factor(stated_N_mm2: float, values: Mapping[str, float]) -> float:
-    """Factor on a wall's stiffness: over that of the wire, times that of the wire."""
+    """Factor on a wall's stiffness: its factor relative to the wire, times the wire's own factor."""
     return float(np.exp(values.get(f"{WALL}:{stated_N_mm2:g}", 0.0) + values.get(BENDING, 0.0)))

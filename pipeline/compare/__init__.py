@@ -1,4 +1,4 @@
-"""compare: how far the simulated wire is from the real one, and from what anybody would guess."""
+"""compare: how far the simulated wire is from the real one, beside how far anybody's guess would be."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,8 @@
-"""Which branch of the vessel a point lies in: the lumen as a graph of slices at equal way from the entry.
+"""Which branch of the vessel a point lies in: the lumen as a graph of slices at equal path length from the entry.
 
 Slices that follow each other one by one are a branch; where a slice has two after it, or two before it, branches meet
-(the Reeb graph of the way). A dead end that is short against the vessel beside it (a bump, a flat sac) is part of it.
+(the Reeb graph of the path length). A dead end that is short against the vessel beside it (a bump, a flat sac) is part
+of that vessel.
 """
 
 from collections.abc import Mapping
@@ -25,7 +26,7 @@ Labels = NDArray[np.integer[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """inside_mm (n, 3) : the lumen's voxels.     names (n,) : of the branch of each.
+    """inside_mm (n, 3) : the lumen's voxels.     names (n,) : the number of the branch of each.
 
     meetings : where branches meet, middle (3,) mm, radius in mm, and the names of those that do.
     """
@@ -53,7 +54,7 @@ def branches_of(distance: Grid, entry_mm: Array) -> Branches:
     reached = np.isfinite(way)
     band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int32)
     slices, at = np.asarray(label(band, connectivity=3), dtype=np.int32), tuple(inside.T)
-    # what cannot be reached from the entry is no branch of this vessel: 0
+    # what cannot be reached from the entry is no branch of this vessel and has the number 0
     nodes, middle = slices[at], distance.to_mm(inside.astype(float))
     graph = _Graph(slices, band, depth, thick)
     names = graph.names()
@@ -68,7 +69,7 @@ class _Graph:
         count = int(slices.max()) + 1
         self.thick_mm, self.band, self.radius = thick_mm, np.zeros(count, dtype=np.int64), np.zeros(count)
         kept = slices > 0
-        self.band[slices[kept]] = band[kept]  # all voxels of a slice are of one
+        self.band[slices[kept]] = band[kept]  # all voxels of a slice are in one band
         np.maximum.at(self.radius, slices[kept], depth[kept])
         found = []
         for axis in range(3):
@@ -86,7 +87,7 @@ class _Graph:
         self.real = self._real_branches()
 
     def _real_branches(self) -> Mapping[int, set[int]]:
-        """Of each slice, those after it that lead on, or far: a short dead end beside another way is a bump."""
+        """For each slice, the next ones that lead far or to a junction; a short dead end beside them is a bump."""
         end: dict[int, int] = {}
         for node in reversed(self.order):
             end[node] = max([int(self.band[node]), *(end[one] for one in self.after[node])])

@@ -16,13 +16,13 @@ from scipy.stats import t as student
 from pipeline.model import Array
 
 FEWEST, WIDE_BELOW = 3, 6
-"""Insertions without which there is no interval, and below which it says itself that it is wide."""
+"""Fewest insertions for an interval, and the number below which its note calls it wide."""
 SMALLEST_MM = 1e-6
 SMALLEST_MM2 = SMALLEST_MM**2
-"""Stand for an error and a mean square of 0, whose logarithm there is none of: a nanometre is far below any scan."""
+"""Used in place of an error and a mean square of 0, which have no logarithm: a nanometre is far below any scan."""
 WIDEST = 2.0 * float(np.log(1e6))
-"""Of the logarithm of a mean square, or of a ratio of two. An end beyond it is none: insertions of which one has an
-error of nothing and another one of millimetres would put it anywhere up to 1e300."""
+"""Largest end of an interval of the logarithm of a mean square, or of a ratio of two; beyond it an end counts as not
+bounded. Insertions of which one has no error and another one millimetres would put it anywhere up to 1e300."""
 
 
 class Interval(NamedTuple):
@@ -36,7 +36,7 @@ WITHHELD = Interval(float("nan"), float("nan"))
 
 
 def note(insertions: int) -> str:
-    """What is to be said of an interval over so many insertions: whether there is one hangs on their number alone."""
+    """The note on an interval over so many insertions; whether there is an interval depends on their number alone."""
     what = f"{insertions} insertion{'s' * (insertions != 1)}"
     if insertions < FEWEST:
         return f"interval withheld: {what}, at least {FEWEST} needed"
@@ -44,7 +44,7 @@ def note(insertions: int) -> str:
 
 
 def in_words(low: float, high: float, said: str) -> str:
-    """Ends and what was said of them, for a line of text; an end that nothing bounds is none."""
+    """An interval and its note as text; an end that is not bounded is left out."""
     bounded = np.isfinite(low), np.isfinite(high)
     middle, below, above = f"{low:.3f} to {high:.3f}", f"up to {high:.3f}", f"{low:.3f} and more"
     ends = {(True, True): middle, (False, True): below, (True, False): above}.get(bounded)
@@ -52,22 +52,22 @@ def in_words(low: float, high: float, said: str) -> str:
 
 
 def fields(values: Mapping[str, Any], said: str = "") -> tuple[dict[str, Any], str]:
-    """Values as fields of a row, ends that nothing bounds empty, and what was said of the interval with their names."""
+    """Values as fields of a row, ends that are not bounded as NaN, and the interval's note, which names these ends."""
     names = [name for name, value in values.items() if isinstance(value, float) and np.isinf(value)]
     told = [said] * bool(said) + [f"not bounded: {', '.join(names)}"] * bool(names)
     return {**values, **dict.fromkeys(names, float("nan"))}, "; ".join(told)
 
 
 def holding(value: float, low: float, high: float) -> Interval:
-    """An interval that also holds its value, which may be pooled otherwise, or differ in the last digit."""
+    """The interval, widened to hold its value, which may be pooled otherwise or differ in the last digit."""
     return Interval(min(low, value), max(high, value))
 
 
 def of_log_ratio(over: Array, under: Array, points: Array) -> Interval:
-    """Of log(sum of ``over`` / sum of ``under``), each (insertions,), as are the numbers of ``points`` in them.
+    """Interval of log(sum of ``over`` / sum of ``under``), each (insertions,), as is ``points``, their point counts.
 
-    With the points themselves as ``under`` it is that of the log mean square. Cox's takes both per point, so that an
-    insertion's length is no part of how insertions differ.
+    With the points themselves as ``under`` it is that of the log mean square. Cox's takes both per point, so that
+    different lengths of insertions do not widen it.
     """
     count = len(points)
     if count < FEWEST:
@@ -90,19 +90,19 @@ def of_log_ratio(over: Array, under: Array, points: Array) -> Interval:
 
 
 def _log_of_totals(over: Array, under: Array) -> float:
-    """Of the sums as they are: infinite where one of them alone is 0, NaN where both are."""
+    """log(sum of ``over`` / sum of ``under``) without a lower limit: infinite with one sum of 0, NaN with two."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.log(over.sum()) - np.log(under.sum()))
 
 
 def _bounded(ends: Interval) -> Interval:
-    """Ends of a logarithm (of squares), those beyond WIDEST infinite."""
+    """The ends of an interval of a logarithm of squares, those beyond WIDEST as infinite."""
     inf = float("inf")
     return Interval(-inf if ends.low < -WIDEST else ends.low, inf if ends.high > WIDEST else ends.high)
 
 
 def of_medians(values: Sequence[Array]) -> Interval:
-    """Of a median over insertions, from each one's values (n,): Student's t on the logarithms of their medians."""
+    """Interval of a median over insertions, from the values (n,) of each: Student's t on the logs of their medians."""
     if len(values) < FEWEST:
         return WITHHELD
     logs = np.log([max(float(np.median(own)), SMALLEST_MM) for own in values])
@@ -112,10 +112,10 @@ def of_medians(values: Sequence[Array]) -> Interval:
 
 
 def effective_frames(values: Sequence[Array]) -> float:
-    """How many independent frames would tell as much: values (n,) of the frames of each insertion, in their order.
+    """Number of independent frames that would tell as much. values : (n,) of each insertion's frames, in their order.
 
-    Frames follow each other with one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), insertions have a
-    variance of their own. At least 1. NaN where nothing can be told: no insertion of four frames.
+    The model: successive frames have one correlation (pooled, corrected for its bias of -(1 + 3 r) / n), and insertions
+    have a variance of their own. At least 1; NaN where it cannot be known: no insertion of four frames.
     """
     own = [np.asarray(v, dtype=float) - np.mean(v) for v in values if len(v) > 3]
     if not own or not sum(float(v @ v) for v in own):

@@ -1,6 +1,6 @@
-"""The numbers of one frame: what each of them is of the simulated wire and the traced curve.
+"""The metrics of one frame: numbers that compare the simulated wire with the traced curve.
 
-A number is a function of a :class:`Pair` under the name of its column; ``reports.schema`` says what it means, its unit
+A metric is a function of a :class:`Pair` under the name of its column; ``reports.schema`` says what it means, its unit
 and how a case pools it. ``register`` adds one, with its column.
 """
 
@@ -21,9 +21,10 @@ Simulated = Solution | OtherWire
 COVERED_MM = 1.0
 """A point of the traced curve counts as covered where the simulated wire is no farther away."""
 TANGENT_MM = 1.0
-"""The vessel's direction at the tip is that of its axis from so much before the tip's foot to so much behind it."""
+"""The vessel's direction at the tip is that of its axis from this far before to this far behind the point nearest to
+the tip."""
 OFF_AXIS_MM = 0.1
-"""Nearer to the vessel's axis nobody knows on which side of it a wire lies: a third of a voxel."""
+"""Nearer to the vessel's axis than this the side on which a wire lies is not known: a third of a voxel."""
 PAIRS_AT_ONCE = 2_000_000  # point-segment pairs held in memory together: about 100 MB
 
 

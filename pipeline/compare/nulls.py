@@ -40,7 +40,7 @@ class Clues:
 
     @cached_property
     def room(self) -> Grid:
-        """The signed distance around the traced wires alone: a tenth of a circle of Willis, and of the memory."""
+        """The signed distance, cropped around the traced wires: for a circle of Willis a tenth of the memory."""
         grid, points = self.lumen.distance, np.vstack([self.clamp.entry_mm, self.deepest_mm])
         corners = zip(points.min(axis=0) - ROOM_MM, points.max(axis=0) + ROOM_MM, strict=True)
         index = grid.to_index(np.array(np.meshgrid(*corners)).reshape(3, -1).T)
@@ -73,17 +73,17 @@ class Clues:
         return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
     def known_ways(self) -> None:
-        """Find what all frames share, once, before they are shared out."""
+        """Compute once what all frames share, before these are shared among processes."""
         _ = self.way, self.shortest, self.hard_wall
 
     @cached_property
     def straight_wire(self) -> GuideWire:
-        """A wire that only wants to be straight."""
+        """A wire that is straight at rest."""
         return GuideWire(segment_mm=1.0, radius_mm=self.radius_mm, bending_stiffness_N_mm2=10.0)
 
     @cached_property
     def hard_wall(self) -> VesselWall:
-        """The wall around the traced wires, for a wire that only wants to be straight."""
+        """A hard wall around the traced wires, for ``straight_wire``."""
         return VesselWall(self.room, stiffness_N_mm2=HARD_WALL_N_MM2)
 
 

@@ -1,7 +1,7 @@
 """The curve of least bending between the clamp and a given tip.
 
-A force across the tip, and the length of the wire, are sought that bring it there: a wire that bends less than the real
-one is shorter, and no force on its tip could push it back.
+A force across the tip and the length of the wire are sought that bring the tip there. The length must be free: a wire
+that bends less than the real one is shorter, and no force on its tip could push it back.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from pipeline.model import Array, Clamp, arc_length
 from solver import GuideWire, VesselWall, relax
 
 FIRST_N = 0.002
-"""Forces that are tried to learn how the tip answers: they move the end of a wire of EI = 10 by about 0.1 mm."""
+"""Forces, N, that are tried to learn how the tip responds: they move the end of a wire of EI = 10 by about 0.1 mm."""
 MOST_MM = 1.0
-"""The tip is led there in steps no longer than this: further off, its answer is another one."""
+"""The tip is led there in steps no longer than this: over more, its response is not linear."""
 MOST_TRIES, NEAR_MM = 25, 0.1
 
 
 def pinned(wire: GuideWire, wall: VesselWall, clamp: Clamp, start_mm: Array, tip_mm: Array) -> Array | None:
-    """The wire (n, 3) whose tip lies within 0.1 mm of ``tip_mm``, from a relaxed one (m, 3) on; None without one."""
+    """The wire (n, 3) whose tip lies within 0.1 mm of ``tip_mm``, begun from a relaxed one (m, 3); None without one."""
 
     def pulled(force_N: Array, shape: Array) -> Array:
         """The wire of a shape's length, under a force on its tip."""
@@ -44,7 +44,7 @@ def pinned(wire: GuideWire, wall: VesselWall, clamp: Clamp, start_mm: Array, tip
         length = float(arc_length(shape)[-1]) + along
         if length < MOST_MM:
             return None
-        # along the wire the tip hardly answers to a force: that is left to the length
+        # along the wire the tip hardly responds to a force: there the length is changed instead
         more = np.linalg.lstsq(answer, step - along * tangent, rcond=0.02)[0]
         moved = pulled(force + more, to_length(shape, length))
         wrong = moved[-1] - shape[-1] - along * tangent - answer @ more

@@ -137,7 +137,7 @@ def _with_intervals(frames: Sequence[Scored], points: Array, values: Row) -> dic
 
 
 def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "skill") -> dict[str, float]:
-    """Skill against a predictor's sums of squares (frames,), with its interval; over the frames that it has a guess of.
+    """Skill, with its interval, against a predictor's sums of squares (frames,), over the frames that have one.
 
     name : of the column; those of the ends follow from it.
     """
@@ -154,15 +154,15 @@ def skill(frames: Sequence[Scored], squares: Array, nulls: Array, name: str = "s
 
 
 LEAST_SHARE = 0.5
-"""Of the points that a predictor must have a guess of to be the strongest, and that all of them must have together: the
-first frame has no previous one, and no path leads to some tips."""
+"""Share of the points for which a predictor must have a guess to take part, and all that take part must have one
+together: the first frame has no previous one, and no path leads to some tips."""
 
 
 def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[str, Any]:
-    """Skill against the predictor that leaves the least, of those that are told nothing of the frame; its name.
+    """Skill against the strongest predictor, the one with the least error of those that are told nothing of the frame.
 
-    All are judged on the same frames, ``strongest_frames`` of them: whoever has no guess of the hardest one would look
-    strong, or be beaten by much, for that alone.
+    Also its name. All are judged on the same frames, ``strongest_frames`` of them: a predictor without a guess for the
+    hardest one would look strong, or be beaten by much, for that alone.
     """
     depths = [
         numbers([f for f in frames if f.insertion == one], "insertion_mm") for one in {f.insertion for f in frames}
@@ -182,10 +182,10 @@ def strongest(frames: Sequence[Scored], squares: Array, points: Array) -> dict[s
 
 
 def judged(known: Mapping[str, NDArray[np.bool_]], points: Array) -> tuple[list[str], NDArray[np.bool_]]:
-    """The predictors that are held against each other, and the frames (frames,) of which all of them have a guess.
+    """The predictors that are compared with each other, and the frames (frames,) for which all of them have a guess.
 
-    known : by name, the frames of which it has one.     points : of each frame.     A predictor takes part that has
-    LEAST_SHARE of all points; while all together have less in common, the one goes that costs most of it.
+    known : by name, the frames for which it has one.     points : number in each frame.     A predictor takes part that
+    has LEAST_SHARE of all points; while all together have less in common, the one is dropped that costs most of it.
     """
 
     def share(names: Sequence[str]) -> float:

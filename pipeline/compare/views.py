@@ -16,11 +16,11 @@ from pipeline.compare.metrics import METRICS, Pair, Way, measured, point_to_curv
 from pipeline.model import Array, Lumen, arc_length
 
 FIT_FROM_MM, FIT_TO_MM = 40.0, 110.0
-"""Behind the tip: the part that a shift is fitted to; what lies nearer to the tip is scored."""
+"""Distances from the tip, mm, between which a shift is fitted; what lies nearer to the tip is scored."""
 LEAST_FIT_MM = 20.0
-"""A shorter part tells no shift."""
+"""Least length of wire for fitting a shift."""
 FREE_MM = 100.0
-"""Prior of the shift, as if one point were known so well: along a straight stretch it would else be anything."""
+"""Weak pull of the shift towards 0 (a ridge term): along a straight stretch it would otherwise be undetermined."""
 ROUNDS, STILL_MM = 50, 1e-6
 MOST_SCALED = 1.3
 """Most that errors may be scaled by an isocentre before or behind the wire: 200 mm off in a C-arm of 750 mm."""
@@ -124,7 +124,7 @@ def pair_in(screen: Screen, wire_mm: Array, fitted: bool, lumen: Lumen, way: Way
 
 
 def _apart(wire_mm: Array, curve_mm: Array) -> float:
-    """How far the ends of two curves lie from each other, together."""
+    """Sum of the distances between the first and between the last points of two curves, mm."""
     return float(np.linalg.norm(wire_mm[0] - curve_mm[0]) + np.linalg.norm(wire_mm[-1] - curve_mm[-1]))
 
 

@@ -1,6 +1,6 @@
-"""From the case folders found in OUT to the tables of the run and run.json: merging is copying folders together.
+"""The tables of a run and run.json from the case folders found in OUT: to merge runs, copy their folders together.
 
-And to a JUnit summary for CI: one test a frame, so that a build server shows which frame failed and why.
+Also a JUnit summary for CI: one test per frame, so that a build server shows which frame failed and why.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,8 +27,8 @@ from reports.verdict import unscored
 class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
-    unscored : why there are none.     mixed : whether it is that settings differ.     sweep_lost : cases that crashed
-    at a point of a sweep, none of ``cases``.
+    unscored : why there are no errors.     mixed : whether the reason is that settings differ.     sweep_lost : cases
+    that crashed at a point of a sweep; they are not counted in ``cases``.
     """
 
     cases: int
@@ -45,7 +45,7 @@ class Totals:
 
     @property
     def all_ok(self) -> bool:
-        """The one source of the exit code and of the printed counts."""
+        """Whether every case is ok: decides the exit code and the printed counts alike."""
         return self.cases > 0 and self.cases_ok == self.cases and not (self.mixed or self.sweep_lost)
 
 
@@ -85,9 +85,9 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
 
 
 def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
-    """timings.csv of the run, the row about the whole of each case, and the seconds that frames took to be simulated.
+    """The rows of the run's timings.csv, one for each whole case, and the seconds of simulation, summed over frames.
 
-    A file that is damaged costs its times alone.
+    A damaged file is skipped: only its times are missing.
     """
     parts, replayed_s = [], 0.0
     for result in found:
@@ -99,9 +99,9 @@ def _times(out: Path, found: Sequence[Result]) -> tuple[pd.DataFrame, float]:
 
 
 def write_tests(path: Path, found: Sequence[Result], gates: Mapping[str, str]) -> None:
-    """Write a JUnit summary: a suite a case, a test a frame (or one for a case without frames to show); one for gates.
+    """Write a JUnit summary: a suite per case, a test per frame (one test for a case without frames), a suite of gates.
 
-    gates : what was asked, and why it does not hold, empty where it does.
+    gates : each condition that was asked for, and why it failed, empty where it passed.
     """
     suites = [(result.case, [_outcome(frame) for frame in result.frames or [_whole(result)]]) for result in found]
     if gates:

@@ -1,6 +1,6 @@
-"""Another insertion at the same depth, as a predictor: whoever has pushed the wire in once knows how it lay then.
+"""The predictor ``another``: how the wire lay in other insertions into the same phantom at the nearest depth.
 
-It is known once all cases are done, so it is no part of a case: it stands in overall.csv alone.
+It needs the traces of all cases, so it is computed after them and stands in overall.csv alone.
 """
 
 import math
@@ -18,20 +18,20 @@ from pipeline.run.overall import Found
 from reports.frames_file import read_arrays
 
 SAME_ENTRY_MM = 2.0
-"""Insertions whose traces begin farther apart count their depths from different places."""
+"""Traces that begin farther apart count their depths from different places and are not compared."""
 STEP_MM = 0.5
 MOST_OTHERS = 24
-"""Insertions that a guess is the mean of, those that stopped nearest to the depth: with all of 500 cases in one phantom
-it would take ten minutes, and the mean of so many is known to a seventh of their spread."""
+"""Most traces in a guess, those of the nearest depths: with all of 500 cases in one phantom it would take ten minutes,
+and the root mean square over 24 is known to about a seventh of itself (1 / sqrt(48))."""
 NOTHING: Array = np.zeros(0)
 Trace = tuple[float, Array, float]
 """The depth in mm, the traced wire (n, 3) and the arc length in mm from which on it counts."""
 Traces = Mapping[int, Trace]
-"""By frame."""
+"""Traces by frame."""
 
 
 def with_another(out: Path, found: Sequence[Found]) -> list[Found]:
-    """The cases, their frames' rows with what the traces of other insertions into the same phantom leave."""
+    """The cases, with the predictor's error added to the frames' rows where other insertions share the phantom."""
     phantoms = [case.result.phantom for case in found]
     shared = [case for case in found if case.result.phantom and phantoms.count(case.result.phantom) > 1]
     traces = {case.result.case: _traces(out, case) for case in shared}
@@ -49,7 +49,7 @@ def _traces(out: Path, case: Found) -> Traces:
 
 
 def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Traces]) -> Found:
-    """The case; each frame's guess is the mean over other insertions of what theirs at the nearest depth leaves."""
+    """The case, with the RMS distance of other insertions' nearest traces to the frame's own trace in each row."""
     mine = {frame.insertion for frame in case.frames.values()}
     phantom = [c for c in shared if c.result.phantom == case.result.phantom]
     kin = [c for c in phantom if mine.isdisjoint(frame.insertion for frame in c.frames.values())]
@@ -65,14 +65,14 @@ def _with_another(case: Found, shared: Sequence[Found], traces: Mapping[str, Tra
 
 
 class Others:
-    """The traces of other insertions, each those of one, in a row."""
+    """The traces of other cases in one flat list, each with the number of its case."""
 
     def __init__(self, insertions: Sequence[Sequence[Trace]]) -> None:
         self.traces = [(owner, *trace) for owner, traces in enumerate(insertions) for trace in traces]
         self.depths_mm = np.array([depth for _, depth, _, _ in self.traces])
 
     def nearest(self, depth_mm: float, curve: Array) -> list[Array]:
-        """Of each other insertion the trace of the nearest depth, of those that begin where the curve does."""
+        """The trace of nearest depth of each other case, unless it begins elsewhere; at most MOST_OTHERS."""
         near: list[Array] = []
         seen: set[int] = set()
         for place in np.argsort(np.abs(self.depths_mm - depth_mm), kind="stable"):

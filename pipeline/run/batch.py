@@ -1,8 +1,8 @@
-"""Many jobs on one machine or on a cluster; whatever becomes of one of them, the others go on.
+"""Many jobs on one machine or on a cluster; whatever happens to one of them, the others go on.
 
-Every executor gives the same outcomes. A job that took its worker with it is run once more after all the others, alone;
-a second death names it. On a cluster a worker takes with it what had been handed to it and was not begun: there a death
-counts for a job that was alone.
+Every executor gives the same outcomes. A job whose worker died is run once more, alone, after all the others; if its
+worker dies again, the job is reported as lost. A dying worker of a cluster also loses jobs that it had received but not
+begun, so that there only deaths count in which the job was alone.
 """
 
 import sys
@@ -25,8 +25,8 @@ def run_all(
 ) -> Outcomes[J, R]:
     """Run ``work`` on every job, yielding outcomes as they come.
 
-    With one worker in this process, with more or with limits in as many processes, or on the dask cluster at
-    ``address``.
+    The jobs run on the dask cluster at ``address`` where one is given; else in worker processes where there are limits,
+    or several workers and jobs; else in this process.
     """
     if address:
         with _cluster(address) as executor:
@@ -48,7 +48,7 @@ def run_all(
 def _again(
     jobs: Sequence[J], run: Callable[[Sequence[J]], Outcomes[J, R]], alone: Callable[[Sequence[J]], Outcomes[J, R]]
 ) -> Outcomes[J, R]:
-    """All jobs; then those that were lost with their workers, each alone."""
+    """Run all jobs, then, each alone, those whose workers died; yields their outcomes."""
     lost = []
     with closing(run(jobs)) as outcomes:
         for outcome in outcomes:
@@ -64,7 +64,7 @@ def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -
     futures: dict[Future[Outcome[J, R]], J] = {executor.submit(guarded, work, job): job for job in jobs}
     try:
         for future in as_completed(futures):
-            # ``guarded`` raises nothing: what comes here is a worker's end, under the name that the cluster gives it
+            # ``guarded`` raises nothing: an exception here is the cluster's report that the worker died
             error = future.exception()
             lost = Outcome[J, R](futures[future], None, LOST, f"{LOST} ({error!r})", "worker_lost")
             yield future.result() if error is None else lost
@@ -87,5 +87,5 @@ def _cluster(address: str) -> Iterator[Executor]:
     with client:
         if not client.scheduler_info()["workers"]:
             sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")
-        # else the same job again would be answered with the error that it has ended with before
+        # pure: dask would answer a repeated job with its earlier error instead of running it again
         yield client.get_executor(pure=False)

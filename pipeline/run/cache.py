@@ -1,6 +1,6 @@
-"""The stage store on disk: one file a result, whole or not believed, the oldest used removed where it grows too large.
+"""The store of stage results on disk: one file per result, checked by its hash; the least recently used go first.
 
-A store that cannot be read or written costs a warning and the time to compute again, never a case.
+Where it cannot be read or written, there is a warning and results are computed again; no case fails.
 """
 
 import hashlib
@@ -26,18 +26,18 @@ from solver.grid import Grid, read_only
 DEFAULT_LIMIT = 20 * 2**30
 """Bytes: the lumens of about a thousand scans of 256^3 voxels."""
 ABANDONED_S = 86400.0
-"""Age from which a temporary file is nobody's any more."""
+"""Age in seconds from which a temporary file is taken to be left over from a run that was killed."""
 OURS = re.compile(r"[0-9a-f]{64}\.(result|npz)|\.tmp-.*\.result")
 """Names of files of the store; .npz is how it wrote them before they had a hash."""
 NOT_A_RESULT = (ValueError, KeyError, TypeError, EOFError, BadZipFile)
 
 _lumen: dict[Path, Lumen] = {}
-"""The one that this process read last: the next point of a sweep asks for it again, and for its wall, whose splines
-and hash belong to this very object. With 256^3 voxels that is two seconds a point."""
+"""The lumen that this process read last, by its file: the next point of a sweep asks for it and for its wall, whose
+splines and hash are kept with this very object. With 256^3 voxels that saves two seconds a point."""
 
 
 def forget_lumen() -> None:
-    """Read lumens anew: a run does not trust what an earlier one in the same process has read."""
+    """Drop the lumen in memory: a run does not trust what an earlier run in the same process has read."""
     _lumen.clear()
 
 
@@ -80,7 +80,7 @@ class Store:
         return result
 
     def put(self, stage: str, key: str, result: Lumen | Curve) -> None:
-        """Store a result. The first that cannot be written is the last that is tried."""
+        """Store a result. Once one could not be written, no more are stored."""
         if self.root is None or not self._writable:
             return
         try:
@@ -95,9 +95,9 @@ class Store:
         return root / stage / key[:2] / f"{key}.result"
 
     def entries(self) -> list[tuple[Path, int, float]]:
-        """Every result with its bytes and the time of its last use, and what was left half written; nothing else.
+        """Path, size in bytes and time of last use of every result and of every temporary file; no other files.
 
-        Whoever names a folder that holds other things as well loses none of them.
+        Files of the user's own in the same folder are thus never removed.
         """
         found = []
         for path in sorted(self.root.glob("*/??/*")) if self.root else ():
@@ -124,7 +124,10 @@ class Store:
             write_text(self.root / "limit", f"{size}\n")
 
     def trim(self, limit: int | None = None) -> tuple[int, int]:
-        """Remove what was not used for longest until the rest fits; returns how many files and how many bytes."""
+        """Remove abandoned temporary files and the least recently used results until the rest fits.
+
+        Returns how many files and how many bytes were removed.
+        """
         limit = self.limit if limit is None else limit
         entries = sorted(self.entries(), key=lambda entry: entry[2])
         abandoned = time.time() - ABANDONED_S
@@ -152,7 +155,7 @@ class Store:
 
 
 def encoded(key: str, result: Lumen | Curve) -> bytes:
-    """A result as bytes, behind the hash of key and content: neither may be changed without the other."""
+    """A result as bytes, preceded by a hash of key and content, so that a change of either is noticed."""
     named = vars(result.distance) if isinstance(result, Lumen) else vars(result)
     arrays: dict[str, Any] = {name: value for name, value in named.items() if isinstance(value, np.ndarray)}
     rest = {name: value for name, value in vars(result).items() if name not in (*arrays, "distance")}

@@ -1,4 +1,4 @@
-"""Cases of a study with the parameters that were calibrated, and a refusal of those that would score themselves."""
+"""Put calibrated parameters into the cases of a study, and refuse to score cases that were calibrated with."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from pipeline.study.parameters import Parameters, ParametersError, read_paramete
 
 
 def data_of(case: Case) -> tuple[str, ...]:
-    """SHA-256 of every frame and trace of a case, which tells it whatever it is called."""
+    """SHA-256 of every frame and trace of a case: identifies its data, whatever the case is called."""
     sources = [*case.frames, *case.traces]
     return tuple(f"{file_hash(s.path)}#{s.dataset}" for s in sources if s.path.exists())
 
@@ -19,8 +19,8 @@ def as_calibrated(
 ) -> tuple[tuple[Case, ...], tuple[str, ...]]:
     """The cases with their parameters, and sentences for the report; ParametersError lists every problem.
 
-    given : for all cases, before what the manifest names for each.     own : also score cases that were calibrated
-    with. Without it those of role calibration are left out, and one of role validation is a problem.
+    given : parameters for all cases, in place of those that the manifest names.     own : also score cases that were
+    calibrated with. Without it those of role calibration are left out, and one of role validation is a problem.
     """
     read: dict[Path, Parameters] = {}
     kept, notes, problems = [], [], []

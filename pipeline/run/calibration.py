@@ -1,4 +1,4 @@
-"""``wireval calibrate``: the cases of role calibration traced, the parameters fitted, and what came of it written."""
+"""``wireval calibrate``: trace the cases of role calibration and fit the parameters (files: ``calibration_files``)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
 SAME_MM = 0.5
-"""Standard deviation of one depth that is read off a scale, where there are too few to tell."""
+"""Standard deviation between insertions, mm, of the offset of stated depths, where one insertion alone states any."""
 LEAST_FRAMES = 3
 Say = Callable[[str], None]
 
@@ -36,9 +36,10 @@ class CalibrationError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """Calibration cases and their insertions; depth_mm : what each frame's manifest states, NaN where nothing.
+    """Calibration cases and their insertions.
 
-    left_out : cases that cannot be used, and why.     notes : what was assumed of all, and what was warned of.
+    stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     left_out : cases that
+    cannot be used, and why.     notes : assumptions and warnings of all cases.
     """
 
     cases: tuple[Case, ...]
@@ -49,7 +50,7 @@ class Gathered:
 
 
 def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
-    """The cases to calibrate with; CalibrationError where there is none, or wires of several kinds."""
+    """The cases to calibrate with; CalibrationError where there is none, where wires differ or parameters are given."""
     found = tuple(case for case in cases if case.role == "calibration")
     if not found:
         raise CalibrationError(['no case has role = "calibration"; mark the insertions to calibrate with so'])
@@ -65,7 +66,10 @@ def chosen(cases: Sequence[Case]) -> tuple[Case, ...]:
 
 
 def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> Gathered:
-    """Segment and trace the cases; one that shows no wire is left out with a note."""
+    """Segment and trace the cases; those with fewer than LEAST_FRAMES trusted traces are left out with a note.
+
+    CalibrationError where none is left.
+    """
     kept, trials, stated, left_out, notes = [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
@@ -89,7 +93,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
-    """What is fitted to these cases."""
+    """The parameters that are fitted to these cases."""
     weighed = any(case.push_force_N is not None or case.wire.weight_N_per_mm > 0 for case in cases)
     friction = float(np.mean([case.wall.friction for case in cases]))
     return unknowns([case.wall.stiffness_N_mm2 for case in cases], friction, weighed=weighed)
@@ -101,9 +105,9 @@ def calibrate(found: Gathered, config: Config) -> Calibration:
 
 
 def depth_offset(found: Gathered, fit: Calibration) -> tuple[float, float]:
-    """What is to be added to stated depths, mm, and its standard deviation; NaN where none is stated.
+    """Offset to add to stated depths, mm, and its standard deviation; NaN where none is stated.
 
-    The deviations of one insertion's depths are not independent, a scale is off for all of them: insertions count.
+    Depths of one insertion share the error of their scale, so the spread is taken between insertions.
     """
     points = fit.fit.problem.points(fit.fit.linear.x)
     means, spread = [], []
@@ -146,5 +150,5 @@ def used_by(found: Gathered) -> list[dict[str, Any]]:
 
 
 def file_in(out: Path) -> Path:
-    """Where the parameters go."""
+    """Path of the parameters file in an output folder."""
     return out / "parameters.toml"

@@ -1,4 +1,4 @@
-"""What a calibration leaves: parameters.toml for runs, calibration.json for its page."""
+"""The files of a calibration: parameters.toml for runs, calibration.json for its page, design.json for a plan."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ ADVICE = {
     BENDING: "push_force_N of every frame, or a sag scan: a free overhang of a wire with weight_N_per_mm",
     DEPTH: "insertion_mm of every frame, in three insertions or more",
 }
-"""What would show a parameter, by its name."""
+"""What to measure so that a parameter is seen, by its name."""
 
 
 def estimates_of(found: Gathered, fit: Calibration) -> list[dict[str, Any]]:
@@ -49,7 +49,7 @@ def _row(e: Estimate) -> dict[str, Any]:
 
 
 def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameters:
-    """Write parameters.toml, and read it back: what runs take from it, and no file that they cannot read."""
+    """Write parameters.toml, then read it back as a run does: a file that a run cannot read is an error here."""
     rows, values, first = estimates_of(found, fit), fit.values, found.cases[0]
     wire, by_name = bent(first.wire, values), {row["name"]: row for row in rows}
     walls = sorted({case.wall.stiffness_N_mm2 for case in found.cases})
@@ -79,7 +79,7 @@ def write_parameters(path: Path, found: Gathered, fit: Calibration) -> Parameter
 
 
 def _text(value: Any) -> str:
-    """A value of TOML, which writes numbers, texts and nested lists as JSON does; six digits are enough."""
+    """A value as TOML, which writes numbers, texts and nested lists as JSON does; floats have six digits."""
     if isinstance(value, float):
         return json.dumps(float(f"{value:.6g}"))
     if isinstance(value, (list, tuple)):
@@ -88,7 +88,7 @@ def _text(value: Any) -> str:
 
 
 def misfit(fit: Calibration) -> list[str]:
-    """A warning where the wires lie farther from the traces than these are off: then something else is wrong."""
+    """A warning where the wires lie farther from the traces than these are uncertain: something else is wrong."""
     times = float(np.sqrt(fit.scale))
     if times < MISFIT:
         return []
@@ -104,7 +104,7 @@ FLATTENING_VOXELS = 0.9
 
 
 def flattened(found: Gathered) -> list[str]:
-    """A warning where traces make the tip's curve too small by more than standard deviations say.
+    """A warning where a thin wire's curved tip is traced too flat, by more than standard deviations say.
 
     Measured on bends of three seeds each (docs/howto/calibrate.md): by 9 % with a diameter of 0.48 voxels, 2 % with
     0.72, less than 1 % with 0.96.

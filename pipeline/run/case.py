@@ -34,7 +34,7 @@ from solver._compile import hash_of
 
 @dataclass(frozen=True)
 class Job:
-    """Everything that a worker needs for one case. simulator : whose wires they are, where there are several."""
+    """Everything that a worker needs for one case. simulator : who made the wires, where several are compared."""
 
     case: Case
     settings: Resolved
@@ -51,7 +51,7 @@ class Job:
 
     @property
     def label(self) -> str:
-        """What lines of progress call it."""
+        """The case's name in lines of progress."""
         return f"{self.simulator}: {self.case.id}" if self.simulator else self.case.id
 
     @property
@@ -73,17 +73,17 @@ class Job:
 
     @property
     def key(self) -> str:
-        """What the result depends on: the case, its files' contents, the settings, the code, what is registered."""
+        """Cache key of what the result depends on: case, contents of files, settings, code, what is registered."""
         code = (package_version(), hash_of(Path(__file__)))
-        # who registers a metric or a predictor gives its column
+        # what is registered also adds its column to ERRORS
         registered = [*map(code_of, METRICS.values()), *map(code_of, NULLS.values())]
         given = self.settings.calibrated and self.settings.calibrated[0]
-        named = (self.simulator,) if self.simulator else ()  # the page says whose wires they are
+        named = (self.simulator,) if self.simulator else ()  # the page names the simulator
         return digest((self.case, self.settings.config, given, self.until, code, ERRORS.columns, registered, *named))
 
 
 def clear(folder: Path) -> None:
-    """Make a case's folder, and take out of it what an earlier run wrote: it belongs to another result."""
+    """Create a case's folder, or remove from it the files of an earlier result."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name in (ledger.FILE, *ledger.DATA, *ledger.PAGES):
@@ -95,12 +95,12 @@ def clear(folder: Path) -> None:
 
 
 def finished(job: Job, key: str) -> bool:
-    """Whether the result on disk is ok, made from the same, and whole but for its pages."""
+    """Whether the result on disk is ok, has this key, and its data files are unchanged; pages may be missing."""
     return _why_again(job, key) is None
 
 
 def _why_again(job: Job, key: str) -> str | None:
-    """Why a case has to be computed: None where it has not, empty where that needs no words."""
+    """Why a case must be computed: None where it need not be, empty where the reason needs no words."""
     known = None if job.fresh else ledger.read(job.folder)
     if known is None or known.key != key:
         return ""
@@ -111,7 +111,7 @@ def _why_again(job: Job, key: str) -> str | None:
 
 
 def run_case(job: Job) -> None:
-    """Run one case. Whatever happens to it is in its folder, never an exception (but bugs, and a full disk)."""
+    """Run one case. Failures are recorded in its folder; only a bug or a full disk raises an exception."""
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
     with hashing(_files(job.case), job.cores) as hashed, held(job.folder, progress.warn):
         again: str | None = ""
@@ -129,7 +129,7 @@ def run_case(job: Job) -> None:
 
 
 def _files(case: Case) -> list[Path]:
-    """Those whose hashes the results are kept by."""
+    """Paths of the case's scans, whose hashes are part of the cache keys."""
     sources = (case.reference, *case.frames)
     return list(dict.fromkeys(s.path for s in sources if s is not None and s.path.exists()))
 
@@ -164,7 +164,7 @@ def _heal(job: Job, progress: CaseProgress) -> None:
 
 
 def each_on(cores: int) -> Each:
-    """Who draws the figures of a page."""
+    """A function ``(work, count)`` that shares ``count`` calls of ``work`` among cores; pages draw figures with it."""
     return lambda work, count: shared(lambda number, _: work(number), count, cores)
 
 
@@ -176,7 +176,7 @@ def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
 
 
 def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
-    """Every file of the case but its pages; the ledger last, since it says that they are complete."""
+    """Write every file of the case but its pages; the ledger last, since it says that they are complete."""
     errors = [outputs.error_row(frame) for frame in known.frames]
     summary = outputs.summary_row(job.case, known, errors)
     tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
@@ -208,7 +208,7 @@ def _kernels_loaded() -> float:
 
 
 def load_kernels(progress: CaseProgress) -> None:
-    """Compile or load the solver's kernels before anything is timed; the first run says so, with -q and a bar, too."""
+    """Compile or load the solver's kernels before anything is timed; compiling is announced even with -q or a bar."""
     cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
     if not cached:
         progress.warn("compiling the solver, once per installation: half a minute to two")

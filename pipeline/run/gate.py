@@ -1,4 +1,4 @@
-"""A gate for CI: ``run --fail-if "rms_mm>0.5"`` holds one value of the whole run against a limit."""
+"""A gate for CI: ``run --fail-if "rms_mm>0.5"`` fails where one value of the whole run is beyond a limit."""
 
 import math
 import operator
@@ -17,7 +17,7 @@ WRITTEN = re.compile(rf"\s*(\w+)\s*({'|'.join(RELATIONS)})\s*(\S+)\s*")
 
 @dataclass(frozen=True)
 class Gate:
-    """Closes where a column of overall.csv stands in this relation to a limit, or has no value."""
+    """A condition on a column of overall.csv; the gate closes where it holds, or where the column has no value."""
 
     column: str
     relation: str
@@ -25,7 +25,7 @@ class Gate:
 
     @property
     def asked(self) -> str:
-        """What was typed."""
+        """The option as it was typed."""
         return f"--fail-if {self.column}{self.relation}{self.limit:g}"
 
     def closed(self, overall: Mapping[str, Any]) -> str:
@@ -42,7 +42,7 @@ class Gate:
 
 
 def gate(text: str) -> Gate:
-    """``column>number`` as typed; UsageError where it is none, or no number of overall.csv."""
+    """Parse ``column>number``; UsageError where it is malformed, or where the column is no number of overall.csv."""
     found = WRITTEN.fullmatch(text)
     try:
         column, relation, limit = found.groups() if found else ("", "", "")

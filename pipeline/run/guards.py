@@ -16,7 +16,7 @@ from reports.origin import ABSENT, settings_of
 
 
 def guard_apart(out: Path, folders: Iterable[Path]) -> None:
-    """Refuse an output folder that is one of the inputs': results would lie among the scans, --fresh clear there."""
+    """Refuse an output folder that holds inputs: results would lie among the scans, and --fresh would delete there."""
     if out.resolve() in {folder.resolve() for folder in folders}:
         beside = out.resolve().with_name(f"{out.resolve().name}-out").name
         raise UsageError([f"-o {out}: this is the folder of the inputs; name another one for the results, as {beside}"])
@@ -46,11 +46,11 @@ def guard_out(out: Path, manifest: Path, settings: Resolved) -> None:
 
 
 def guard_kept(out: Path, others: Container[str], settings: Resolved) -> None:
-    """Refuse settings that cases which this run leaves as they are do not have: one folder's cases are pooled.
+    """Refuse settings that differ from those of cases which this run keeps: all cases of a folder are pooled.
 
-    others : ids of the manifest's other cases.
+    others : ids of the manifest's cases that this run does not compute.
     """
-    with suppress(ValueError):  # what cannot be read is pooled with nothing
+    with suppress(ValueError):  # an unreadable result is not pooled
         for folder in find_cases(out):
             changed = folder.name in others and _changed(read_json(folder / "result.json"), settings)
             if changed:
@@ -59,15 +59,15 @@ def guard_kept(out: Path, others: Container[str], settings: Resolved) -> None:
 
 
 def _changed(known: Mapping[str, Any], settings: Resolved) -> str:
-    """What is set otherwise than in a run.json or result.json, where that says anything."""
+    """The settings that differ from those in a run.json or result.json, in words; empty where it has no settings."""
     old, new = settings_of(known), settings_of({"config": jsonable(settings.as_dict())})
     pairs = {name: (old.get(name, ABSENT), new.get(name, ABSENT)) for name in dict.fromkeys([*old, *new]) if old}
     return ", ".join(f"{name} {before} before, {now} now" for name, (before, now) in pairs.items() if before != now)
 
 
 def guard_stages(out: Path, until: Stage) -> None:
-    """Refuse to put results of fewer stages in the place of finished ones."""
-    with suppress(ValueError):  # a damaged file is for guard_out to say
+    """Refuse to replace finished results by results of fewer stages."""
+    with suppress(ValueError):  # guard_out reports a damaged file
         ends = [read_json(path).get("until", STAGES[-1]) for path in out.glob("run*.json")]
         later = [end for end in ends if end in STAGES and STAGES.index(end) > STAGES.index(until)]
         if later and any(out.glob("cases/*/result.json")):

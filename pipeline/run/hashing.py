@@ -1,4 +1,4 @@
-"""What a file holds, as a key: SHA-256, each file read once a process, and with several cores beside other things."""
+"""SHA-256 of files' contents, for cache keys: each file is read once per process, with several cores in parallel."""
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
@@ -12,14 +12,13 @@ from pipeline.load import parts_of
 from pipeline.run.helpers import forked, nothing
 
 _hashes: dict[tuple[Path, int, int], str] = {}
-"""By path, size and time of change: the resume check, the stages and every point of a sweep ask for the same gigabyte.
+"""Hashes by path, size and modification time, since resume check, stages and sweep points ask for the same gigabyte.
 
-Size and time only say whether it is still the same file here; the hash is of its content alone.
-"""
+Size and time only tell whether the file is still the same; the hash is of its content alone."""
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content, with that of files which hold its voxels; of a folder, of its files in order."""
+    """SHA-256 of a file's content and of the files that hold its voxels; of a folder, of its files in order."""
     if path.is_dir():
         hasher = hashlib.sha256()
         for item in sorted(p for p in path.rglob("*") if p.is_file()):
@@ -30,7 +29,7 @@ def file_hash(path: Path) -> str:
 
 
 def _content_hash(path: Path) -> str:
-    """Of one file."""
+    """SHA-256 of one file."""
     stat = path.stat()
     same = path, stat.st_size, stat.st_mtime_ns
     if same not in _hashes:
@@ -41,9 +40,9 @@ def _content_hash(path: Path) -> str:
 
 @contextmanager
 def hashing(paths: Sequence[Path], cores: int) -> Iterator[Callable[[], None]]:
-    """Hash files, with several cores in other processes while this one goes on; yields what waits for the end.
+    """Hash files, with several cores in other processes while this one goes on; yields a function that waits for them.
 
-    A thread would ask for the interpreter for every quarter of a megabyte, and kernels keep it for tenths of seconds:
+    A thread would need the interpreter lock for every quarter of a megabyte, and kernels hold it for tenths of seconds:
     0.75 s of hashing took 7 s, most of the time that there was to hide it in.
     """
     if cores == 1:
@@ -54,7 +53,7 @@ def hashing(paths: Sequence[Path], cores: int) -> Iterator[Callable[[], None]]:
     others = [_begun(paths[i::count]) for i in range(count)]
 
     def wait() -> None:
-        """Hear of all; a process that ended without a word leaves its files, and what is wrong with them, to this."""
+        """Receive all hashes; files of a process that sent none are hashed here, which raises their errors."""
         while others:
             receiver, process = others.pop()
             with suppress(EOFError), receiver:
@@ -77,7 +76,7 @@ def _hash_all(paths: Sequence[Path]) -> None:
 
 
 def _begun(paths: Sequence[Path]) -> tuple[Connection, ForkProcess]:
-    """A process that hashes files, and what it is heard through."""
+    """The connection through which a new process sends the hashes of files, and the process."""
     receiver, sender = Pipe(duplex=False)
     with sender:
         return receiver, forked(lambda: _tell(paths, sender))

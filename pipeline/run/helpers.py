@@ -1,8 +1,8 @@
-"""One case on several cores: parts of it are done by this process and by others that are forked from it.
+"""One case on several cores: its parts are shared between this process and helpers, which are forked from it.
 
-What a fork inherits need not be sent: the lumen, the scan without wire, compiled kernels. Helpers save time and do
-nothing else: what they do not bring, since one of them died or met an error, is done here, where the error belongs.
-Results do not depend on how many there are.
+A fork inherits the lumen, the scan without wire and the compiled kernels, so that they need not be sent. Helpers only
+save time: a part that they do not deliver, because one of them died or met an error, is done again in this process,
+which then raises that error. Results do not depend on how many helpers there are.
 """
 
 import multiprocessing
@@ -25,12 +25,12 @@ from pipeline.run.workers import end_with_parent
 
 R = TypeVar("R")
 Earlier = Callable[[int], R]
-"""The result of a part before this one; waited for where it is not there yet."""
+"""Returns the result of an earlier part by its number; waits for it where it is not there yet."""
 Work = Callable[[int, Earlier[R]], R]
 ERROR = "error"
-"""The file in which a helper says what it has met."""
+"""The file in which a helper writes the exception that it met."""
 LOOK_S = 0.002
-"""How often is looked whether a part has come that is waited for."""
+"""Seconds between checks for a part that is waited for."""
 
 
 class _LostError(Exception):
@@ -38,11 +38,11 @@ class _LostError(Exception):
 
 
 def nothing() -> None:
-    """What is to be done first where nothing is."""
+    """Do nothing: the default of a callback."""
 
 
 def forked(work: Callable[[], object]) -> ForkProcess:
-    """A process that does this and no more; it ends with this one."""
+    """Start a forked process that calls ``work`` and no more; it ends with this one."""
 
     def begin() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; this one is ended by its parent
@@ -51,14 +51,14 @@ def forked(work: Callable[[], object]) -> ForkProcess:
         work()
 
     process = multiprocessing.get_context("fork").Process(target=begin)
-    with warnings.catch_warnings():  # Python 3.12 warns of threads; no lock of theirs is taken by a helper
+    with warnings.catch_warnings():  # Python 3.12 warns of forking beside threads; a helper takes none of their locks
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     return process
 
 
 def said(text: str) -> None:
-    """Tell the reader."""
+    """Write a line to stderr."""
     sys.stderr.write(text + "\n")
 
 
@@ -70,11 +70,11 @@ def shared(
     inherited: Sequence[object] = (),
     told: Callable[[str], object] = said,
 ) -> list[R]:
-    """``[work(i, earlier) for i in range(count)]``, shared out in this order; no result may be None.
+    """``[work(i, earlier) for i in range(count)]``, parts begun in this order on several cores; no result may be None.
 
-    A part may ask for the results of earlier ones. first : done by this process before it takes part, and only where
-    there are helpers.     inherited : large objects that results refer to, which every fork has: they are not sent.
-    told : who hears what kept helpers from helping, and how much had to be done without them.
+    A part may ask for the results of earlier ones. first : called by this process before it takes part, and only where
+    there are helpers.     inherited : large objects that results refer to; every fork has them, so they are not sent.
+    told : called with a sentence where helpers failed: why, and how many parts were done without them.
     """
     parts = _Parts(work, count, inherited)
     if min(cores, count) > 1:
@@ -86,39 +86,39 @@ def shared(
         except OSError as error:
             parts.hindrance = str(error)
     left = count - len(parts.own)
-    done = parts.in_order()  # an error that belongs to a part is met again, and says itself what it is
+    done = parts.in_order()  # a part that failed in a helper is done again and raises its own error
     if parts.hindrance:
         told(f"{parts.hindrance}: {left} of {count} parts were done without help")
     return done
 
 
 class _Packer(pickle.Pickler):
-    """Pickles with a number in place of what the other side has itself."""
+    """A pickler that writes a number in place of each inherited object, which the receiver has itself."""
 
     def __init__(self, file: IO[bytes], inherited: Sequence[object]) -> None:
-        # read-only arrays come back read-only from the newest protocol alone
+        # only the newest protocol brings read-only arrays back as read-only
         super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
         self.numbers = {id(item): number for number, item in enumerate(inherited)}
 
     def persistent_id(self, item: object) -> int | None:
-        """The place of an inherited object; None for all others, which are packed."""
+        """The position of an inherited object in their list; None for all others, which are pickled."""
         return self.numbers.get(id(item))
 
 
 class _Unpacker(pickle.Unpickler):
-    """The reverse."""
+    """The unpickler for what ``_Packer`` wrote."""
 
     def __init__(self, file: IO[bytes], inherited: Sequence[object]) -> None:
         super().__init__(file)
         self.inherited = inherited
 
     def persistent_load(self, number: int) -> object:
-        """The object of this process that stands at this place."""
+        """This process's own object at that position of the list."""
         return self.inherited[number]
 
 
 class _Parts(Generic[R]):
-    """The parts of a job, each taken once; their results, here or as files that every process sees."""
+    """The parts of a job, each taken by one process; their results are kept here and as files in ``folder``."""
 
     folder: Path
     hindrance = ""
@@ -129,8 +129,8 @@ class _Parts(Generic[R]):
         self.helpers: list[ForkProcess] = []
 
     def share_out(self, helpers: int, first: Callable[[], object]) -> None:
-        """Do all parts with so many helpers; what a lost one leaves is left out."""
-        # all read their next number from one open file, whose place they share
+        """Do all parts with this many helpers; where a helper is lost, some parts stay undone."""
+        # all processes read their next number from one open file, whose read position they share
         turns = os.memfd_create("turns")
         os.write(turns, np.arange(self.count, dtype=np.int32).tobytes())
         os.lseek(turns, 0, os.SEEK_SET)
@@ -145,7 +145,7 @@ class _Parts(Generic[R]):
         except _LostError as error:
             self.hindrance = str(error)
         except Exception as error:
-            # a part's own: going through them in their order shows the first one
+            # an error of a part itself: ``in_order`` repeats the parts in order and so raises the first one
             self.hindrance = f"a part ended with {error!r}"
         finally:
             os.close(turns)
@@ -154,12 +154,12 @@ class _Parts(Generic[R]):
                 helper.join()
 
     def collect(self) -> None:
-        """Read what others have brought."""
+        """Read the results that helpers have written."""
         for number in range(self.count):
             self._known(number)
 
     def in_order(self) -> list[R]:
-        """All results; a part that nobody has brought is done now."""
+        """All results, in order; a part that is still missing is done now."""
         done: list[R] = []
         for number in range(self.count):
             known = self.own.get(number)
@@ -167,7 +167,7 @@ class _Parts(Generic[R]):
         return done
 
     def result(self, number: int) -> R:
-        """The result of a part, once it is there."""
+        """The result of a part, waited for; _LostError where a helper has failed meanwhile."""
         while (known := self._known(number)) is None:
             for helper in self.helpers:
                 if helper.exitcode:
@@ -190,7 +190,7 @@ class _Parts(Generic[R]):
         temporary.rename(self.folder / str(number))
 
     def _help(self, turns: int) -> None:
-        """Do parts in a process of its own, until none is left or one fails."""
+        """Do parts in a helper process until none is left or one fails; its exception goes into the file ERROR."""
         self.helpers = []
         try:
             while taken := os.read(turns, 4):
@@ -201,7 +201,7 @@ class _Parts(Generic[R]):
             sys.exit(1)
 
     def _wait(self) -> None:
-        """Wait for the helpers; _LostError as soon as one of them fails: another may wait for its part."""
+        """Wait for the helpers; _LostError as soon as one of them fails, since others may wait for its part."""
         waiting: dict[object, ForkProcess] = {helper.sentinel: helper for helper in self.helpers}
         while waiting:
             for sentinel in connection.wait([helper.sentinel for helper in waiting.values()]):
@@ -211,7 +211,7 @@ class _Parts(Generic[R]):
                     raise self._lost(helper.exitcode)
 
     def _lost(self, code: int) -> _LostError:
-        """What ended a helper, in words."""
+        """The error that says in words what ended a helper, by its exit code."""
         if code < 0:
             return _LostError(f"a process that helped was ended by {signal.Signals(-code).name} (out of memory?)")
         error = self.folder / ERROR

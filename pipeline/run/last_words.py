@@ -23,7 +23,7 @@ from reports.verdict import in_short, next_command, typed
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
     """What went wrong, a line each (frames, cases, crashed points of a sweep), and what comes next.
 
-    then : that, where it is not the run's own command for these cases.
+    then : what comes next, where it is not the run's own command for these cases.
     """
     found, cases = found_results(plan.out), []
     lines = [*filter(None, [mixed_settings(plan.out)]), *shared_scans(found)]
@@ -48,7 +48,7 @@ def _failure(row: Mapping[str, Any]) -> str:
 
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:
-    """What to do about failures: where the manifest was inferred there is none yet to correct."""
+    """What to do about failures; where the manifest was inferred, it must first be written to be corrected."""
     again = next_command(cases, typed(plan.out))
     if plan.inferred_from is None:
         return f"do what the message says, then {again}"

@@ -45,9 +45,10 @@ class UsageError(InputError):
 class Plan:
     """What to run and how. template : settings and output of every case; workers, address : where it runs.
 
-    limits : what a case may take.
+    limits : the most time and memory that a case may take.
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
-    left_out : ids of the manifest's cases that --only does not name.     inferred_from : folder of scans without one.
+    left_out : ids of the manifest's cases that --only does not name.
+    inferred_from : the folder of scans that the manifest was inferred from; None where there is a manifest.
     """
 
     manifest: Manifest
@@ -69,14 +70,14 @@ class Plan:
 
     @property
     def jobs(self) -> list[Job]:
-        """One per case, the longest first, so that no long case is left for the end."""
+        """One per case; with several workers the longest first, so that no long case is left for the end."""
         several = self.workers > 1 or self.address
         longest = sorted(self.cases, key=lambda case: -case.frame_count) if several else self.cases
         return [replace(self.template, case=case) for case in longest]
 
     @property
     def sweep_jobs(self) -> list[Job]:
-        """The same at every point of the sweep; they come last, when the store knows lumen and traces.
+        """The jobs of every point of the sweep; they come last, when lumen and traces are in the store.
 
         All points of a case follow each other: a worker then reads its lumen and prepares its wall once.
         """
@@ -108,10 +109,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def launch(plan: Plan) -> tuple[Totals, Path]:
-    """Run everything and write what is about the whole; the totals and the path of the page.
-
-    Raises UsageError where nothing can be written to begin with, WriteError where that shows later.
-    """
+    """Run all cases and write the files about the whole run; returns the totals and the path of its page."""
     out, settings, manifest = plan.out, plan.template.settings, plan.manifest.path
     info: dict[str, Any] = {"manifest": str(manifest), "manifest_sha256": file_hash(manifest)}
     heads = heads_of(settings, plan.cases, plan.points)
@@ -128,7 +126,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
-    write_sweep(out, found_heads(out))  # what other shards have done so far is among them
+    write_sweep(out, found_heads(out))  # points of other shards so far included
     (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()
@@ -137,7 +135,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
 
 
 def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
-    """Of what this run leaves out, the cases that the one which wrote ``info`` before was not to compute either."""
+    """Those of ``left_out`` that the earlier run, which wrote ``info``, was not asked to compute either."""
     before: Mapping[str, Any] = {}
     with suppress(ValueError):  # damaged: it tells nothing, and is written anew
         before = read_json(info)
@@ -148,7 +146,7 @@ def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:
 def _remove_others(out: Path, manifest: str) -> None:
     """Remove what runs of other manifests have left in an output folder: their records, and cases that they alone had.
 
-    manifest : SHA-256 of the one whose runs stay.
+    manifest : SHA-256 of the manifest whose runs stay.
     """
     for path in out.glob("run*.json"):
         with suppress(ValueError):
@@ -163,9 +161,9 @@ def _remove_others(out: Path, manifest: str) -> None:
 
 
 def cores_each(plan: Plan, jobs: int) -> int:
-    """How many cores a case may take: cases first, and what is left over is shared among them.
+    """How many cores each case may use: one each, and where there are fewer cases than cores the others are shared.
 
-    A limit of memory is that of one process, and a cluster's workers have a core each.
+    Always one with a limit of memory, which is checked for a single process, and on a cluster.
     """
     one = plan.address or plan.limits.memory_mib < math.inf
     return 1 if one else max(1, plan.workers // max(1, jobs))
@@ -188,7 +186,10 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
 
 
 def _write_lost(outcome: Outcome[Job, None]) -> None:
-    """A result for a job that could not be finished; files of an earlier run, which belong to another one, go."""
+    """Write a result for a job that could not be finished, and remove files of an earlier result.
+
+    A case that another run is at work on is left alone; a line on stderr says so.
+    """
     job, log = outcome.job, outcome.job.folder / "log.txt"
     owner = owner_of(job.folder)
     if owner:

@@ -1,7 +1,7 @@
 """ledger.json: every file of a case's result with its size and hash, written last.
 
-A case is finished when its ledger stands and all that it names is there and whole. The tables, curves and views are the
-data; the pages are drawn from them, so that they are made again by themselves.
+A case is finished when its ledger exists and every file that it names is there and unchanged. The tables, curves and
+views are the data; the pages are drawn from them, so they can be drawn again without computing the case.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 FILE = "ledger.json"
 RESULT, FRAMES, PROVENANCE = "result.json", "frames.h5", "provenance.json"
 TABLES = (RESULT, ERRORS.file, POINTS.file)
-"""What numbers over many cases are made of."""
+"""The files that numbers over many cases are computed from."""
 DATA = (*TABLES, BUDGET.file, ENTRIES.file, TIMINGS.file, PROVENANCE, FRAMES)
 PAGES = ("report.html",)
 Pages = Literal["", "linked", "embedded"]
@@ -35,7 +35,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Ledger:
-    """What was written of a case. key : of everything that the result depends on.     files : by name."""
+    """The files of a case. key : cache key of everything that the result depends on.     files : by name."""
 
     key: str
     files: dict[str, Entry]
@@ -71,7 +71,7 @@ LEDGER = TypeAdapter(Ledger)
 
 
 def is_page(name: str) -> bool:
-    """Whether a file is drawn from others."""
+    """Whether a file is a page or belongs to one: it is drawn from the data files."""
     return name in PAGES or name.startswith("figures/")
 
 
@@ -95,7 +95,7 @@ def write(folder: Path, key: str) -> None:
 
 
 def record_pages(folder: Path, pages: Pages) -> None:
-    """Record the pages that were drawn; a folder without a ledger stays without."""
+    """Record the pages that were drawn; a folder without a ledger gets none."""
     ledger = read(folder)
     if ledger is not None:
         drawn = {name: entry_of(folder / name) for name in _found(folder) if is_page(name)}

@@ -25,9 +25,9 @@ Progress = Callable[[str, int, int, str], None]
 
 @dataclass
 class Log:
-    """Times and numbers by stage. seconds : of the case; frame_seconds : of (frame, stage).     chosen : and why.
+    """Times and numbers by stage. seconds : of the whole case; frame_seconds : by (frame, stage).
 
-    reused : results by stage that came from the store.
+    chosen : what was chosen automatically, and why.     reused : number of results by stage that came from the store.
     """
 
     progress: Progress
@@ -88,7 +88,7 @@ class Log:
                 self._levels[stage].setdefault(name, []).extend(values)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but who is told of progress: that is the same one on the other side."""
+        """Everything but the progress callback: a log is pickled to be added to another one, which has its own."""
         return vars(self) | {"progress": None}
 
     @property
@@ -108,7 +108,7 @@ def _spread(levels: dict[str, list[float]]) -> dict[str, dict[str, float]]:
 
 
 def last_stage(log: Path) -> str:
-    """The stage that the last line of a case's log that names one is about; empty without."""
+    """The last stage that a case's log names; empty where it names none."""
     try:
         lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -133,7 +133,7 @@ class CaseProgress:
     _start: float = field(default_factory=perf_counter)
 
     def start(self) -> None:
-        """Begin the log anew."""
+        """Empty the log file."""
         with writing(self.log):
             self.log.write_text("", encoding="utf-8")
 
@@ -146,12 +146,12 @@ class CaseProgress:
             self.stream.flush()
 
     def warn(self, text: str) -> None:
-        """A line that every reader has to see."""
+        """Write a line to the log and, even with ``quiet``, to the stream."""
         self.write(text)
         self.stream.write(f"[{self.case}] {text}\n")
         self.stream.flush()
 
     def write(self, line: str) -> None:
-        """A line for the log alone."""
+        """Write a line to the log alone, with the seconds since the start."""
         with writing(self.log), self.log.open("a", encoding="utf-8") as handle:
             handle.write(f"{perf_counter() - self._start:8.2f} s  {line}\n")

@@ -1,4 +1,4 @@
-"""Two runs in one folder: a case is held by the one that works on it; the other says by whom, and waits."""
+"""Two runs in one folder: a run locks the case that it works on; another run says who holds it, and waits."""
 
 import fcntl
 import os
@@ -16,9 +16,9 @@ FILE = ".at-work"
 
 @contextmanager
 def held(folder: Path, say: Callable[[str], None]) -> Iterator[None]:
-    """Hold a case's folder; where another run does, say so and wait until it lets go or is no more.
+    """Lock a case's folder for a block; where another run holds it, say so and wait until that lets go or has ended.
 
-    The system forgets the lock of a process that has died, however it died.
+    The operating system releases the lock of a process that has died, however it died.
     """
     with writing(folder / FILE):
         folder.mkdir(parents=True, exist_ok=True)
@@ -42,7 +42,7 @@ def owner_of(folder: Path) -> str:
 
 
 def _locked(path: Path, say: Callable[[str], None]) -> TextIO:
-    """The locked file; one that was removed by who held it before is no lock any more."""
+    """The locked file; tried again where the run that held it before has removed the file meanwhile."""
     while True:
         file = path.open("a+", encoding="utf-8")
         if not _lock(file, fcntl.LOCK_NB):
@@ -56,7 +56,7 @@ def _locked(path: Path, say: Callable[[str], None]) -> TextIO:
 
 
 def _lock(file: TextIO, how: int) -> bool:
-    """Whether the lock was taken. A disk that knows no locks is used without: files are replaced whole in any case."""
+    """Whether the lock was taken. True, too, on a disk without locks: files are always replaced whole anyway."""
     try:
         fcntl.flock(file, fcntl.LOCK_EX | how)
     except BlockingIOError:

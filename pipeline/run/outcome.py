@@ -1,4 +1,4 @@
-"""What may become of a job, wherever it runs."""
+"""The outcome of a job, the same wherever it runs."""
 
 import traceback
 from collections.abc import Callable
@@ -16,8 +16,8 @@ LOST = "the worker process was killed twice (out of memory?); run this case alon
 class Outcome(Generic[J, R]):
     """A result, or an error with its traceback or the like in ``log``.
 
-    status : ``crashed``, ``worker_lost``, ``over_limit``, or ``unwritable`` where nothing can be written any more, so
-    that going on makes no sense.
+    status : ``ok``, ``crashed``, ``worker_lost``, ``over_limit``, or ``unwritable`` where nothing can be written any
+    more, so that going on makes no sense.
     """
 
     job: J
@@ -28,12 +28,12 @@ class Outcome(Generic[J, R]):
 
     @property
     def lost(self) -> bool:
-        """Its worker has died."""
+        """Whether its worker has died."""
         return self.status == "worker_lost"
 
 
 def guarded(work: Callable[[J], R], job: J) -> Outcome[J, R]:
-    """Run one job; an error becomes its outcome, since it must not take the batch along."""
+    """Run one job; an exception becomes its outcome, so that it does not end the whole batch."""
     try:
         return Outcome(job, work(job))
     except WriteError as error:

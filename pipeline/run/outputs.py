@@ -1,4 +1,4 @@
-"""What is written of a case beside result.json.
+"""The files of a case beside result.json.
 
 A frame as a row of errors.csv, its points as points.csv.gz, the case as a row of summary.csv; frames.h5. LPS mm.
 """
@@ -25,7 +25,7 @@ from reports import frames_file
 from solver import Solution
 
 BEYOND = 2.0
-"""Times u, beyond which an error is the model's."""
+"""An error of more than this many u is attributed to the model."""
 
 
 def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def summary_row(case: Case, known: Known, errors: Sequence[Row]) -> dict[str, An
 
 
 def timing_rows(case: str, log: Log, **whole: float) -> list[dict[str, Any]]:
-    """timings.csv: the case with what is known of the ``whole``, then its frames."""
+    """Rows of timings.csv: the case, with its values ``whole`` (total time, peak memory), then its frames."""
     rows = {frame: {"case": case, "frame": frame} for frame in sorted({index for index, _ in log.frame_seconds})}
     for (index, stage), seconds in log.frame_seconds.items():
         rows[index] |= {f"{stage}_s": seconds}
@@ -145,7 +145,7 @@ def _over_u(frame: Frame, count: int) -> dict[str, NDArray[Any]]:
 
 
 def message_of(frame: Frame, known: Known) -> str:
-    """What went wrong with a frame, and in which scan: its number alone sends nobody to the file."""
+    """What went wrong with a frame, and the name of its scan: the frame's number alone does not tell the file."""
     if not frame.message or known.scans is None or frame.index >= len(known.scans.frames):
         return frame.message
     source = known.scans.frames[frame.index].source
@@ -169,7 +169,7 @@ def failure_rows(case: str, known: Known) -> list[dict[str, Any]]:
 
 
 def write_frames(path: Path, known: Known) -> None:
-    """frames.h5: curves of every frame, projections of its scan, and the lumen's outline, or the scan without one."""
+    """Write frames.h5: each frame's curves and projections; the lumen's outline, without one the scan at the entry."""
     scan = known.at_entry
     if known.lumen is not None:
         grid = known.lumen.distance

@@ -32,20 +32,20 @@ class Found:
 
 
 def found_cases(out: Path) -> list[Found]:
-    """Every case below an output folder; one whose tables cannot be read is damaged, and hides no other."""
+    """Every case below an output folder; one whose tables cannot be read counts as damaged and hides no other."""
     results = found_results(out)
     insertions = insertions_of(results)
     return [_found(out, result, insertions[result.case]) for result in results]
 
 
 def golden_cases(out: Path) -> list[Found]:
-    """Every case of a folder of tables alone, as a baseline is kept: errors.csv, points.csv.gz and no result."""
+    """Every case of a baseline folder, which keeps errors.csv and points.csv.gz alone and no result."""
     folders = [f for f in find_cases(out) if (f / POINTS.file).exists() and not (f / ledger.RESULT).exists()]
     return [_found(out, untold(folder.name), folder.name) for folder in folders]
 
 
 def insertions_of(results: Iterable[Result]) -> dict[str, str]:
-    """The insertion of each case: that of its group; cases with a scan in common are one, whatever they state."""
+    """The insertion of each case: its group, else itself; cases that share a scan are one, whatever they state."""
     found: dict[str, str] = {}
     seen: dict[str, str] = {}
     for result in results:
@@ -58,7 +58,7 @@ def insertions_of(results: Iterable[Result]) -> dict[str, str]:
 
 
 def shared_scans(results: Sequence[Result]) -> list[str]:
-    """Sentences on cases that state several insertions and show the same scans."""
+    """Sentences on cases that state different insertions but have scans in common."""
     insertions, stated = insertions_of(results), dict[str, dict[str, str]]()
     for result in results:
         stated.setdefault(insertions[result.case], {})[result.case] = result.group or result.case
@@ -70,12 +70,12 @@ def shared_scans(results: Sequence[Result]) -> list[str]:
 
 
 def damaged(found: Sequence[Found]) -> dict[str, str]:
-    """The cases whose files are not as they were written, and which one and why."""
+    """The damaged cases, each with the message that says which file is wrong and why."""
     return {c.result.case: str(c.result.failures[0]["message"]) for c in found if c.result.status == "damaged"}
 
 
 def _found(out: Path, result: Result, insertion: str) -> Found:
-    if result.status == "damaged":  # it says why; altered tables are no numbers
+    if result.status == "damaged":  # its message says why; altered tables are not read
         return Found(result, {})
     folder = out / "cases" / result.case
     try:
@@ -127,7 +127,7 @@ def overall(found: Sequence[Found]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Ratio:
-    """Pooled rms of one run over that of another, on the frames that count in both; note : as of an interval."""
+    """Pooled rms of one run over that of another, on the frames that count in both; note : see ``intervals.note``."""
 
     value: float
     low: float
@@ -144,7 +144,7 @@ class Ratio:
     def verdict(self, allowed: float = 1.0, caveat: str = "") -> str:
         """The sentence, and what may be concluded from it.
 
-        allowed : the ratio up to which nobody calls it worse.     caveat : why nothing may be.
+        allowed : the ratio up to which the second run is not called worse.     caveat : why nothing may be concluded.
         """
         if caveat:
             meaning = f"says nothing, since {caveat}"
@@ -175,13 +175,13 @@ def pairs(before: Sequence[Found], after: Sequence[Found]) -> list[tuple[Scored,
 
 
 def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
-    """How many times the error of ``before`` that of ``after`` is; None where they have no frame in common."""
+    """Pooled rms of ``after`` over that of ``before``, on the frames that count in both; None where there are none."""
     both = pairs(before, after)
     if not both:
         return None
     first, second = [a for a, _ in both], [b for _, b in both]
     points = np.array([float(len(frame.error_mm)) for frame in second])
-    # a wire of another length has other points: the squares are per point, times the points of one of the runs
+    # wires of other lengths have other numbers of points: both runs' mean squares are weighted by those of ``after``
     each = [squares_of(frames) / [len(f.error_mm) for f in frames] * points for frames in (first, second)]
     under, over, weights = by_insertion(second, *each, points)
     low, high = np.exp(0.5 * np.array(intervals.of_log_ratio(over, under, weights)))
@@ -191,9 +191,9 @@ def ratio(before: Sequence[Found], after: Sequence[Found]) -> Ratio | None:
 
 
 def skill_beside(before: Sequence[Found], after: Sequence[Found], null: str) -> dict[str, float]:
-    """Skill of ``after``, with its interval, against what a predictor left in ``before``: one rival for all points.
+    """Skill of ``after``, with its interval, against a predictor's errors in ``before``, the same for all points.
 
-    Nothing without a predictor, or without a frame that counts in both.
+    Empty without a predictor, or without a frame that counts in both.
     """
     both = pairs(before, after) if null else []
     if not both:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pipeline.model import Array, Volume
 
 SLAB_MM = 3.0
-"""To either side of a point: a vessel of the head, not its neighbours."""
+"""Half the thickness of a slab, mm: a vessel of the head fits in, its neighbours do not."""
 
 
 def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np.uint8], ...]:
@@ -20,7 +20,7 @@ def projections(volume: Volume, window: tuple[float, float]) -> tuple[NDArray[np
 def slabs(volume: Volume, point_mm: Array) -> tuple[NDArray[np.uint8], ...]:
     """Maximum-intensity projections of what lies within ``SLAB_MM`` of a point (3,) along each array axis, 8 bit.
 
-    Of a point outside the scan they show its nearest faces.
+    A point outside the scan is moved to its nearest voxel.
     """
     index = np.clip(np.rint(volume.to_index(point_mm)), 0, np.array(volume.values.shape) - 1).astype(int)
     half = np.maximum(1, np.rint(SLAB_MM / volume.spacing_mm)).astype(int)

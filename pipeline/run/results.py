@@ -1,4 +1,4 @@
-"""result.json: what became of a case, written last, so that its presence says that the case is complete."""
+"""result.json: the outcome of a case, written after its other data files and before its ledger."""
 
 import json
 import math
@@ -33,10 +33,10 @@ LOST = {
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "damaged": "a result file cannot be read; run the case again with --fresh",
 }
-"""What may have become of a case that has no result of its own, and the sentences that say so."""
+"""Statuses of a case that has no result of its own, each with its sentence."""
 
 COMPLETE = (ledger.RESULT, ledger.FILE)
-"""Either says that a case is no more at work; the second without the first, that this was taken away since."""
+"""Either file says that a run of the case has ended; a ledger without a result: result.json was removed since."""
 
 Row = dict[str, Any]
 
@@ -79,7 +79,7 @@ class Result:
 
     @property
     def ok(self) -> bool:
-        """Every frame is."""
+        """Whether every frame is ok, or simulated where there is nothing to compare with."""
         return self.status in GOOD
 
     def write(self, folder: Path) -> None:
@@ -97,7 +97,7 @@ def read_result(path: Path) -> Result:
 
 
 def found_results(out: Path) -> list[Result]:
-    """The result of every case below an output folder, by id; one that is damaged says so and hides no other."""
+    """The result of every case below an output folder, by id; a damaged one is reported and hides no other."""
     return [_found(folder) for folder in find_cases(out) if any((folder / name).exists() for name in COMPLETE)]
 
 
@@ -111,7 +111,7 @@ def _found(folder: Path) -> Result:
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         return lost(folder.name, "damaged", f"{path}: {why}")
-    # a case that went through the stages has a key; its ledger comes last, after who is at work hashed all its files
+    # a case that went through the stages has a key; while a run is still at work on it, its ledger may be missing
     if written is None and result.key and not owner_of(folder):
         return lost(folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again")
     return result
@@ -135,7 +135,7 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
 
 
 def untold(name: str) -> Result:
-    """The result of a case of which the tables alone are there, as of a baseline."""
+    """A stand-in for the result of a case of which only the tables are kept, as in a baseline."""
     return Result(name, "validation", "", "ok", "", [], [], {"case": name, "frames": 0, "frames_ok": 0, "status": "ok"})
 
 
@@ -172,7 +172,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
 
 
 def _events(frame: Frame) -> dict[str, Any]:
-    """Where the simulated wire gave way since the frame before, and the hand's work that is not in wire and wall."""
+    """Snaps of the simulated wire since the frame before, and the work that was dissipated, N mm."""
     wire = frame.solved
     if wire is None:
         return {}
@@ -196,13 +196,13 @@ def _geometry(scans: Scans | None) -> dict[str, Any]:
 
 
 def _inputs(case: Case) -> list[dict[str, Any]]:
-    """Every file that a case was made of, once: its key in the manifest, path, hash and size."""
+    """Every input file of a case, once: its key in the manifest, path, hash and size."""
     named = {path: key for key, path in reversed(_files(case).items()) if path.exists()}
     return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
 
 
 def _files(case: Case) -> dict[str, Path]:
-    """Those that it names, another simulator's wires, and those of the case whose clamp it borrows."""
+    """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows."""
     others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
     return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
 

@@ -1,8 +1,8 @@
-"""Several simulators of one study side by side: pooled errors, ratios of all pairs, and who is nearer where.
+"""Several simulators of one study side by side: pooled errors, ratios of all pairs, and which one is nearer where.
 
-Each has an output folder of its own, as of any run. Ratios are over the frames that count in both; along the wire and
-over depth, over those that count in all. A simulator's failed frames stand beside them: leaving out the hard ones helps
-none of its shares of the planned frames.
+Each has an output folder of its own, like any run. Ratios are over the frames that count in both; along the wire and
+over depth, over those that count in all. Failed frames are reported, too, and shares are of the planned frames: a
+simulator gains nothing by failing in the hard ones.
 """
 
 from collections.abc import Iterator, Mapping, Sequence, Set
@@ -37,7 +37,7 @@ class Piece(NamedTuple):
 
 
 def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
-    """simulators.csv and where.csv from the output folders of simulators by name; sentences for the terminal."""
+    """Write simulators.csv and where.csv from the output folders by simulator; returns sentences for the terminal."""
     studies = {name: with_another(folder, found_cases(folder)) for name, folder in folders.items()}
     mixed = mixed_settings(*folders.values())
     pairs = [(one, other) for one in studies for other in studies if one != other and not mixed]
@@ -58,7 +58,7 @@ def write_comparison(out: Path, folders: Mapping[str, Path]) -> list[str]:
 
 
 def write_failures(out: Path, folders: Mapping[str, Path]) -> None:
-    """failures.csv of ``out``, and the same below simulators/: what failed of every simulator, and whose it is."""
+    """Write failures.csv into ``out`` and ``out``/simulators: the failures of every simulator, with its name."""
     rows = [
         {key: row[key] for key in row.keys() & FAILURES.names}
         | {"simulator": name, "log": (folder / row.get("log", "")).relative_to(out).as_posix()}
@@ -71,9 +71,9 @@ def write_failures(out: Path, folders: Mapping[str, Path]) -> None:
 
 
 def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[str]:
-    """Everything about several simulators, from the results in their folders; sentences for the terminal.
+    """Write everything that compares simulators, from the results in their folders; returns sentences for the terminal.
 
-    folders : by name, the first one ``out`` itself.
+    folders : by simulator, the first one ``out`` itself.
     """
     write_failures(out, folders)
     said = write_comparison(out, folders)
@@ -82,7 +82,7 @@ def side_by_side(out: Path, folders: Mapping[str, Path], embed: bool) -> list[st
 
 
 def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
-    """What a simulator's own overall.csv says; one without a frame that counts has its planned frames."""
+    """A simulator's numbers as in its own overall.csv; where no frame counts, its planned frames with none ok."""
     used = validation(found)
     planned = {"frames": sum(case.result.summary["frames"] for case in used), "frames_ok": 0, "within_1mm": 0.0}
     row = planned | overall(found)
@@ -92,7 +92,7 @@ def _alone(name: str, found: Sequence[Found]) -> dict[str, Any]:
 def _where(folders: Mapping[str, Path], studies: Studies, off: Set[str]) -> Iterator[dict[str, Any]]:
     """For each bin of the distance from the tip and of the depth, every simulator's error and who is nearest.
 
-    off : those whose tips lie off: distances to the traced wire do not see that, so that they win nothing.
+    off : simulators whose tips lie off. Distances to the traced wire do not show that, so these are never the nearest.
     """
     kept = [{(c.result.case, n) for c in validation(found) for n in c.frames} for found in studies.values()]
     common = set.intersection(*kept)
@@ -110,7 +110,7 @@ def _where(folders: Mapping[str, Path], studies: Studies, off: Set[str]) -> Iter
 
 
 Part = tuple[str, Array, Array, Array]
-"""Of a frame: insertion, distances from the tip (n,), depth as often (n,), errors (n,); mm."""
+"""One frame: its insertion, distances from the tip (n,), its depth n times (n,), errors (n,); mm."""
 
 
 def _points(folder: Path, found: Sequence[Found], common: set[tuple[str, int]]) -> Iterator[Part]:
@@ -137,7 +137,7 @@ def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[
 
 
 def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Set[str]) -> Iterator[dict[str, Any]]:
-    """A row for each simulator in a bin; that of the nearest which is not ``off`` says by how much, and how sure."""
+    """A row for each simulator in a bin; the nearest one that is not ``off`` also gets its lead and how sure it is."""
     mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
     order = sorted(mean.keys() - off, key=lambda name: mean[name])
     for name in found:

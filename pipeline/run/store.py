@@ -31,7 +31,7 @@ def key_of(stage: Callable[..., Any], *inputs: Any) -> str:
 
 def code_of(function: Callable[..., Any]) -> str:
     """SHA-256 of the sources behind a function; of its own byte code where it stands in no file, as in a notebook."""
-    function = inspect.unwrap(getattr(function, "func", function))  # a partial is what it calls
+    function = inspect.unwrap(getattr(function, "func", function))  # a partial stands for what it calls
     code = getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
     if code is None:  # a function of C
         return repr(function)
@@ -51,7 +51,7 @@ def digest(value: Any) -> str:
     if isinstance(value, (str, bytes, int, float, bool, type(None))):
         return f"{type(value).__name__} {value!r}"
     if is_dataclass(value) and value.__hash__ is object.__hash__:
-        # compared by identity, its arrays read-only: one lumen stands in the keys of all frames
+        # an object that is never changed: its digest is kept, since one lumen is in the keys of all frames
         if value not in _known:
             _known[value] = _digest_of_parts(value)
         return _known[value]
@@ -70,7 +70,7 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, BaseModel):
         yield from value
     elif is_dataclass(value):
-        # what a volume was read from says more cheaply what its values are
+        # a volume's source stands for its values: its key is cheaper to make
         left_out = {"values"} if isinstance(value, Volume) and value.made_of is not None else set()
         yield from ((f.name, getattr(value, f.name)) for f in fields(value) if f.name not in left_out)
     elif isinstance(value, Mapping):

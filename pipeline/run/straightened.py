@@ -10,13 +10,13 @@ from reports.frames_file import Straightened
 STEP_VOXELS = 0.75  # of the smallest side of a voxel: finer shows nothing more
 ACROSS = 25  # samples, 9 voxels to either side: the vessel around the wire
 MOST_PLANES = 300  # 190 kB a frame, as much as its projections
-_AHEAD_MM = 0.5  # tangents are taken from so far behind to so far ahead: the trace's noise would tilt the planes
+_AHEAD_MM = 0.5  # tangents run from this far behind to this far ahead: noise of the trace would tilt the planes
 
 
 def straightened(volume: Volume, curve_mm: Array, window: tuple[float, float]) -> Straightened:
-    """Planes across a curve (n, 3), LPS mm, one after the other, 8 bit within the grey-value ``window``.
+    """The scan on planes across a curve (n, 3), LPS mm; 8 bit within the grey-value ``window``.
 
-    Axes: along the curve, then two directions at right angles that are carried along it without turning.
+    Axes: along the curve, then two directions across it, which follow it without twist.
     """
     length = float(arc_length(curve_mm)[-1])
     across = STEP_VOXELS * float(np.min(volume.spacing_mm))
@@ -40,7 +40,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _carried(tangents: Array) -> Array:
-    """A direction at right angles to each tangent (n, 3), taken from one to the next without turning about it."""
+    """A unit vector across each tangent (n, 3), carried along the curve without twist (parallel transport)."""
     normals = np.zeros_like(tangents)
     normal: Array = np.eye(3)[np.argmin(np.abs(tangents[0]))]
     for i, tangent in enumerate(tangents):

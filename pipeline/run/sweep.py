@@ -34,7 +34,7 @@ class SweepPoint:
 
     @property
     def cheap(self) -> Resolved:
-        """The settings without predictors that are simulations and without a budget: those of the plain run stand."""
+        """The settings without simulated predictors and without a budget, which the plain run alone computes."""
         config = self.settings.config
         compare, budget = replace(config.compare, simulated_nulls=False), replace(config.budget, members=0)
         return replace(self.settings, config=replace(config, compare=compare, budget=budget))
@@ -84,21 +84,21 @@ def found_heads(out: Path) -> list[Head]:
 
 
 def _at(out: Path, head: Head) -> list[Found]:
-    """The cases at a point that the plain run has."""
+    """Those cases at a sweep point that the plain run has, too."""
     named = {folder.name for folder in find_cases(out)}
     return [case for case in found_cases(out / _folder(head)) if case.result.case in named]
 
 
 def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
-    """Cases of which a sweep has no result, and at which point."""
+    """Cases that a sweep has lost (crashed, killed, damaged), each with the folder of its point."""
     return [(_folder(h), case.result) for h in heads for case in _at(out, h) if case.result.status in LOST]
 
 
 def write_sweep(out: Path, heads: Sequence[Head]) -> None:
-    """sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
+    """Write sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
 
-    There is none of cases that were run with different settings, nor where the last run had no points: an older table
-    belongs to an older result.
+    It is removed where cases were run with different settings, or where the runs name no points: an older table belongs
+    to an older result.
     """
     if not heads or mixed_settings(out):
         (out / SWEEP.file).unlink(missing_ok=True)
@@ -112,7 +112,7 @@ def write_sweep(out: Path, heads: Sequence[Head]) -> None:
 
 
 def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:
-    """A setting's value in the plain run; of one that takes the manifest's place, the manifest's."""
+    """A setting's value in the plain run as text; for a friction that is not set, the manifest's if all cases agree."""
     table, _, key = parameter.partition(".")
     value = getattr(getattr(plain.config, table), key)
     if value is None and parameter == "simulate.friction":
@@ -132,8 +132,9 @@ def _rows(head: Head, before: Sequence[Found], after: Sequence[Found], null: str
 def _row(
     head: Head, summary: dict[str, Any], before: Sequence[Found], after: Sequence[Found], null: str
 ) -> dict[str, Any]:
-    """A row of sweep.csv; no ratio of the plain result to itself. null : the predictor that all rows are held against,
-    the plain run's strongest.
+    """A row of sweep.csv; the plain result has no ratio.
+
+    null : the predictor that skill is measured against in all rows, the strongest one of the plain run.
     """
     row = {name: summary.get(name) for name in SWEEP.names} | head | {"case": summary["case"]}
     found = None if head["parameter"] == PLAIN else ratio(before, after)

@@ -1,4 +1,4 @@
-"""What a case leaves for 3D Slicer and ParaView in its folder ``view``; LPS mm.
+"""The files of a case for 3D Slicer and ParaView, in its folder ``view``; LPS mm.
 
 The lumen, closed, as surface and label map; every frame's wires as lines with arrays and as curves; collections over
 the frames, and a scene that opens everything.
@@ -21,13 +21,13 @@ from reports import colours, export
 from solver import Grid
 
 _LEAST = 1e-3
-"""Least distance, in voxels, of a voxel's centre from the surface beyond the grid's edge: no triangle without area."""
+"""Least distance, in voxels, from the padding voxels' centres to the surface: no triangle has zero area."""
 
 
 def write_view(folder: Path, known: Known, cores: int = 1, beside: Callable[[], object] = nothing) -> None:
-    """The lumen and every frame's wires, each in a file; then what opens them together.
+    """Write the lumen and every frame's wires, each into a file; then the collections and the scene that open them.
 
-    beside : writes what stands elsewhere, and shares the cores.
+    beside : writes other files, as one more part that shares the cores.
     """
 
     def one(number: int, _earlier: object) -> bool:
@@ -51,9 +51,10 @@ _SLICER = (".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz")
 
 
 def _scans_of(known: Known, shown: int) -> tuple[dict[str, Path], str]:
-    """The reference and the shown frame, by name, as far as 3D Slicer reads them as they were read here; what is not.
+    """Paths of the reference and of the shown frame, by name, where 3D Slicer reads them as they were read here.
 
-    Not all frames: a scene is opened whole, and a hundred scans take more memory than a computer has.
+    Also why others are left out. Not all frames: a scene is opened whole, and a hundred scans take more memory than a
+    computer has.
     """
     if known.scans is None:
         return {}, ""
@@ -86,7 +87,7 @@ def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
     if frame.solved is None:
         return np.full(len(arc_mm), np.nan)
     arc = arc_length(frame.solved.joints_mm)
-    # what lies before the first of them, in the clamp's reach, is none of theirs
+    # joints before the first arc length, in the clamp's reach, are left out
     there = arc > arc_mm[0] - 0.5 * (arc_mm[1] - arc_mm[0]) if len(arc_mm) > 1 else np.ones(len(arc), bool)
     force = np.zeros((len(arc_mm), 3))
     nearest = np.abs(arc_mm[None, :] - arc[there, None]).argmin(axis=1)
@@ -95,9 +96,10 @@ def contact_at(frame: Frame, arc_mm: Array) -> NDArray[np.float64]:
 
 
 def closed_surface(grid: Grid) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices (n, 3), LPS mm, and triangles (t, 3) of where a distance is 0; closed where the inside meets the edge.
+    """Vertices (n, 3), LPS mm, and triangles (t, 3) of the surface where a distance is 0, closed at the grid's edge.
 
-    One more voxel on every side mirrors the distance there, so that a cut vessel ends on its last voxels' outer faces.
+    The grid is padded by one voxel, outside by as much as the edge is inside: a cut vessel ends on the outer faces of
+    its last voxels.
     """
     step = float(np.min(grid.spacing_mm))
     values = np.pad(np.asarray(grid.values, dtype=np.float32), 1, mode="edge")
@@ -141,7 +143,10 @@ def _write_wires(folder: Path, frame: Frame) -> None:
 
 
 def _compared(frame: Frame) -> tuple[Array, dict[str, Any]]:
-    """The clamp's reach as joints, then the compared samples with their errors; u_mm: of the trace at their feet."""
+    """Points and arrays of a compared wire: joints in the clamp's reach, then the compared samples with their errors.
+
+    u_mm : standard deviation of the trace at the nearest points.
+    """
     errors, joints = frame.comparison, frame.simulated.joints_mm if frame.simulated is not None else np.zeros((0, 3))
     assert errors is not None
     assert frame.curve is not None
@@ -161,7 +166,7 @@ def _compared(frame: Frame) -> tuple[Array, dict[str, Any]]:
 def _write_wire(
     folder: Path, kind: str, frame: Frame, points: Array, arrays: Mapping[str, Any], curve: Array | None = None
 ) -> None:
-    """One wire as a line with arrays and as a curve of 3D Slicer with its numbers; curve: its points, where others."""
+    """Write a wire as a line with arrays and as a curve of 3D Slicer with numbers; curve : its points, if others."""
     name = f"wire_{kind}_{frame.index:03d}"
     export.write_polyline_vtp(folder / f"{name}.vtp", points, arrays)
     known = {"rms_mm": "rms distance to the traced wire", "tip_mm": "distance of the tips"}

@@ -1,6 +1,6 @@
-"""What the reader sees of a batch: on a terminal one bar over all cases and points of a sweep, elsewhere lines.
+"""The progress of a batch: on a terminal one bar over all cases and points of a sweep, elsewhere lines of text.
 
-The bar reads the logs that cases write in any case: workers need send nothing, wherever they run.
+The bar reads the logs that cases write anyway, so that workers need not send anything, wherever they run.
 """
 
 import re
@@ -23,7 +23,7 @@ from pipeline.run.log import STAGES
 EVERY_S = 0.3
 STEP = re.compile(rf"\] ({'|'.join(STAGES)}) (\d+)/(\d+)  ")
 WORK: dict[str, float] = dict(zip(STAGES, (0.05, 0.05, 0.5, 0.1, 0.2, 0.1), strict=True))
-"""Rough shares of the stages in a case's time: what the estimate of the rest goes by."""
+"""Rough shares of the stages in a case's time, for the estimate of the time left."""
 
 
 def share_done(log: str) -> float:
@@ -35,7 +35,10 @@ def share_done(log: str) -> float:
 
 @dataclass
 class Watch:
-    """Follows the jobs of a batch. silent : say nothing; lines : no bar, even on a terminal.     stream : where to."""
+    """Follows the jobs of a batch.
+
+    silent : say nothing.     lines : no bar, even on a terminal.     stream : where bar and lines are written.
+    """
 
     jobs: Sequence[Job]
     silent: bool = False
@@ -87,7 +90,7 @@ class Watch:
             progress.update(task, completed=done, description=f"{len(self._finished)}/{len(self.jobs)} {heard}")
 
     def now(self) -> tuple[float, str]:
-        """Jobs done, with fractions of those under way, and the last that was heard of one of these."""
+        """Number of jobs done, with fractions for those that are running, and the latest log text of one of these."""
         done, heard = float(len(self._finished)), ""
         for log in (job.folder / "log.txt" for job in self.jobs if job.folder not in self._finished):
             if log.exists() and log.stat().st_mtime >= self._start:

@@ -1,6 +1,6 @@
-"""Worker processes of this machine: each takes one job at a time, dies alone, keeps to limits and ends with the run.
+"""Worker processes of this machine: each does one job at a time, within limits; if one dies, the others go on.
 
-However this process ends, by a signal or without any chance to say so, its workers end with it.
+However this process ends, even without a chance to clean up, its workers end with it.
 """
 
 import fcntl
@@ -26,22 +26,22 @@ R = TypeVar("R")
 PRELOADED = "pipeline.run.case"
 """Imported once (1.5 s) by the server that workers are forked from."""
 LOOK_S = 0.1
-"""How often a worker under limits is looked at: what it takes in between is what it may take too much."""
+"""Seconds between checks of a worker against its limits: for that long it may exceed them."""
 
 
 class Limits(NamedTuple):
-    """What a job may take."""
+    """The most time and memory that a job may take."""
 
     seconds: float = math.inf
     memory_mib: float = math.inf
 
     @property
     def any(self) -> bool:
-        """There is one."""
+        """Whether there is a limit at all."""
         return min(self) < math.inf
 
     def broken(self, seconds: float, peak_mib: float) -> str:
-        """A sentence on the limit that is broken; empty where none is."""
+        """A sentence on the limit that is exceeded; empty where none is."""
         if seconds > self.seconds:
             return f"took longer than the {self.seconds:g} s of --case-timeout (peak memory {peak_mib:.0f} MiB)"
         if peak_mib > self.memory_mib:
@@ -53,7 +53,7 @@ NO_LIMITS = Limits()
 
 
 class Worker(Generic[J, R]):
-    """A process that does jobs, and the job that it is at."""
+    """A worker process and the job that it is doing."""
 
     def __init__(self, work: Callable[[J], R]) -> None:
         context = multiprocessing.get_context("forkserver")
@@ -65,13 +65,13 @@ class Worker(Generic[J, R]):
         self._since, self._peak_mib = 0.0, 0.0
 
     def give(self, job: J) -> None:
-        """Begin a job. That the process has died in between shows where its outcome is asked for."""
+        """Send a job to the process. Should that have died meanwhile, ``outcome`` tells."""
         self._job, self._since, self._peak_mib = [job], time.monotonic(), 0.0
         with suppress(OSError):
             self.pipe.send(job)
 
     def outcome(self, ready: bool, limits: Limits) -> Outcome[J, R] | None:
-        """What became of its job; None as long as it is at it. ready : the process has sent something, or died."""
+        """The outcome of its job; None while it is still running. ready : the process has sent something, or died."""
         (job,) = self._job
         if ready:
             try:
@@ -88,7 +88,7 @@ class Worker(Generic[J, R]):
         return Outcome(job, None, broken, broken, "over_limit")
 
     def end(self) -> None:
-        """End the process at once. Whatever it was writing has a temporary name."""
+        """Kill the process at once. No result is left half written: files get their names when they are complete."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
@@ -97,7 +97,10 @@ class Worker(Generic[J, R]):
 def in_processes(
     jobs: Sequence[J], work: Callable[[J], R], count: int, limits: Limits = NO_LIMITS
 ) -> Generator[Outcome[J, R], None, None]:
-    """The outcomes of jobs as they come; one whose worker has died says so. Ends the workers, however it is left."""
+    """Run jobs in ``count`` processes; yields outcomes as they come, ``worker_lost`` for a job whose worker died.
+
+    The workers are ended however the generator is left.
+    """
     _start_server()
     waiting, idle, busy = deque(jobs), list[Worker[J, R]](), list[Worker[J, R]]()
     try:
@@ -120,7 +123,7 @@ def in_processes(
 
 
 def resident_mib(process: int | None) -> float:
-    """Memory of a process that lies in RAM, MiB; 0 where it is no more."""
+    """Resident memory of a process, MiB; 0 where the process has ended."""
     try:
         pages = Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1]
     except (OSError, IndexError):
@@ -129,7 +132,7 @@ def resident_mib(process: int | None) -> float:
 
 
 def _start_server() -> None:
-    """Start the process that workers are forked from. They take one core each: N times N threads slow each other."""
+    """Start the server that workers are forked from, with one thread each: N times N threads slow each other down."""
     before = {name: os.environ.get(name) for name in THREADS}
     one_thread()
     try:
@@ -153,9 +156,9 @@ def _serve(pipe: Any, work: Callable[[J], R]) -> None:
 
 
 def end_with_parent() -> None:
-    """Let the system end this process as soon as its parent is no more.
+    """Let the operating system end this process as soon as its parent has ended.
 
-    A thread that watches would wait for the interpreter while a kernel or a reader keeps it for seconds.
+    A watching thread would have to wait for the interpreter lock, which a kernel or a reader may hold for seconds.
     """
     parent = multiprocessing.parent_process()
     assert parent is not None

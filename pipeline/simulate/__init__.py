@@ -99,7 +99,7 @@ def insertion_of(
 ) -> Insertion:
     """A wire clamped at the entry of a lumen, before its first push; ValueError where the solver refuses it.
 
-    lumen : or its wall, whose stiffness and friction do not count.
+    lumen : or its wall, whose own stiffness and friction are replaced.
     """
     vessel = lumen if isinstance(lumen, VesselWall) else wall_of(lumen.distance, solver.hull)
     stiffness = wall.stiffness_N_mm2 * config.wall_scale
@@ -116,7 +116,7 @@ def inserted(
     bending_scale: float = 1.0,
     catheter: OverWire | None = None,
 ) -> Insertion:
-    """A wire clamped at the entry of a vessel whose wall is there already, before its first push."""
+    """A wire clamped at the entry of a vessel with a wall that is made already, before its first push."""
     return Insertion(
         guide_wire(wire, solver.segment_mm, bending_scale),
         vessel,

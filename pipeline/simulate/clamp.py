@@ -3,8 +3,8 @@
 A clamp turned by 2 degrees puts a free wire 0.35 mm off after 10 mm, more than everything else in the pipeline, and a
 hand-picked entry is no better. The wire's first millimetres show the clamp, bent by what the wire does farther on: so
 the solver's wire, with its stiffness, rest curvature and wall, is what is fitted. The manifest's statement is the
-prior, with the uncertainty that it states. Unknown are the clamp's place (3) and two tilts of its direction; Gauss and
-Newton find them, with derivatives from insertions from clamps a little off.
+prior, with the uncertainty that it states. The unknowns are the clamp's place (3), two tilts of its direction and an
+offset of each frame's depth; Gauss-Newton finds them, with difference quotients from clamps that are a little off.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,15 +26,15 @@ MOST_FRAMES = 12
 that more of them tell hardly more."""
 STEP_MM, STEP_RAD, STEP_DEPTH_MM = 0.05, np.radians(0.5), 0.1
 ROUNDS, WHOLE_STEPS, SETTLED = 6, 2, 0.1
-"""Most steps of Gauss and Newton; from the third on they are halved, since contacts may make them go to and fro. It
-ends where a step is smaller than this part of the standard deviations."""
+"""Most Gauss-Newton steps; how many of them are whole, before they are halved, since contacts may make them oscillate;
+and the part of the standard deviations below which a step is the last one."""
 TIP_VOXELS = 0.25
 """What a traced tip may be off along the wire beyond its own standard deviation. It matters where rest curvature ends
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
 TANGENT_MM = 0.25
 SNAPS = 3.0
-"""A derivative so many times that of a rigid wire is a wire that snaps: its frame says nothing in this round."""
+"""A derivative of more than this many times a rigid wire's is a snap: that frame is not used in this round."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Prior:
 
 
 Replay = Callable[[Sequence[Clamp], Sequence[Seen], Sequence[Sequence[float]]], Sequence[Sequence[Solution]]]
-"""Insertions from several clamps: the wire of every frame, at depths for each clamp and frame."""
+"""Called with clamps, frames and depths (clamps, frames): the wire of every frame from each clamp."""
 
 
 def depth_from(clamp: Clamp, curve: Curve) -> float:
@@ -97,7 +97,7 @@ def sights(seen: Sequence[Seen]) -> list[Sight]:
 
 
 def _feet(sight: Sight, curve: Array) -> tuple[Array, Array]:
-    """Where the points' feet on a curve are: arc lengths (n,), not below 0, and tangents (n, 3) there."""
+    """The nearest points of a curve to a trace's points: arc lengths (n,), not below 0, and tangents (n, 3) there."""
     foot = sight.arc_mm
     for _ in range(3):
         tangent = at_arc(curve, foot + TANGENT_MM) - at_arc(curve, np.maximum(foot - TANGENT_MM, 0.0))
@@ -109,7 +109,8 @@ def _feet(sight: Sight, curve: Array) -> tuple[Array, Array]:
 def _linear(wires: Sequence[Solution], sight: Sight, steps: Array) -> tuple[Array, Array, bool]:
     """Residuals (n, 3) of a trace across the wire, their derivatives (n, 3, 6), and whether the frame can be used.
 
-    wires : of the clamp itself, of the clamp moved by each of the first steps (6,), and of a depth more by the last.
+    wires : from the clamp itself, from the clamp moved by each of the first five ``steps`` (6,), and pushed deeper by
+    the last of them.
     """
     n = len(sight.points_mm)
     if n == 0 or not all(wire.converged and len(wire.joints_mm) > 1 for wire in wires):
@@ -128,7 +129,7 @@ def _linear(wires: Sequence[Solution], sight: Sight, steps: Array) -> tuple[Arra
 
 @dataclass(frozen=True)
 class _Fit:
-    """What does not change from step to step."""
+    """What stays the same from step to step."""
 
     seen: Sequence[Seen]
     sights: Sequence[Sight]

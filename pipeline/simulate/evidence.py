@@ -9,30 +9,33 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 from pipeline.model import Array
 
 CORRELATED_KNOTS = 0.43
-"""Standard deviation of the bell by which a trace's errors are correlated along it, in distances of the spline's knots:
-measured against the truth at contrasts of 16, 8 and 4 (1.13, 1.4 and 1.5 mm)."""
-KNOT_MM = 3.0  # where it is not known
+"""Correlation length of a trace's errors along it (standard deviation of a Gaussian), in distances of the spline's
+knots: measured against the truth at contrasts of 16, 8 and 4 (1.13, 1.4 and 1.5 mm)."""
+KNOT_MM = 3.0  # distance of the knots where it is not known
 OWN = 0.05
-"""Part of a trace's variance that is each point's own."""
+"""Share of a trace's variance that is independent from point to point."""
 SHARED, SHARED_MM, SHARED_FARTHER = 0.45, 1.5, 0.15
-"""Correlation between frames: each is a scan less the one reference scan, whose noise is in all of them where the wires
-coincide. At the entry they do; measured 0.4 to 0.5 there, 0.1 to 0.2 from 2 mm on."""
+"""Correlation between frames: at the entry, the length (mm) over which it falls, and farther on. The same reference
+scan is subtracted from all frames, so its noise is in all of them where the wires coincide. At the entry they do;
+measured 0.4 to 0.5 there, 0.1 to 0.2 from 2 mm on."""
 START = 1.0
-"""Excess of a trace's variance at its beginning, over half a knot: measured 0.2 to 1.5 at contrasts of 16 to 4."""
+"""Relative excess of a trace's variance at its start, over half a knot: measured 0.2 to 1.5 at contrasts of 16 to 4."""
 UNKNOWN_VOXELS = 0.15
 """Standard deviation of a trace that states none, as a user's own."""
 MODEL_VOXELS, MODEL_MM = 0.1, 8.0
-"""How far the simulated wire may be off at a distance from the clamp, by what is wrong farther on: the lumen's wall."""
+"""How far (voxels) the simulated wire may be off at this distance (mm) from the clamp, through errors farther on, such
+as the lumen's wall."""
 MODEL_SHARED = 0.5
 SURPRISING = 5.0
-"""A frame disagrees where its sum of squares is so many of its standard deviations above what is expected."""
+"""A frame disagrees where its sum of squares is this many standard deviations above its expected value."""
 
 
 @dataclass(frozen=True)
 class Sight:
     """The points of a frame's trace that are fitted.
 
-    arc_mm (n,), points_mm (n, 3).     sigma_mm : (n,) across the wire, NaN where unknown.     knot_mm : as sigma_mm.
+    arc_mm (n,), points_mm (n, 3).     sigma_mm : (n,) across the wire, NaN where unknown.     knot_mm : distance of the
+    spline's knots, NaN where unknown.
     """
 
     index: int
@@ -43,13 +46,13 @@ class Sight:
 
 
 def _modes(sight: Sight, voxel_mm: float) -> Array:
-    """Shapes (n, 2) by which a clamped wire is off where forces farther on are wrong: its shear and its bending."""
+    """Shapes (n, 2), mm, in which a clamped wire deviates through wrong moments and forces farther on: s^2 and s^3."""
     s = sight.arc_mm[:, None] / MODEL_MM
     return np.asarray(MODEL_VOXELS * voxel_mm * np.concatenate([s**2, s**3], axis=1))
 
 
 def _sigma(sight: Sight, voxel_mm: float) -> Array:
-    """Standard deviation (n,) of each point across the wire, its beginning's excess with it."""
+    """Standard deviation (n,), mm, of each point across the wire, with the excess at the beginning of the trace."""
     sigma = np.where(np.isfinite(sight.sigma_mm), sight.sigma_mm, UNKNOWN_VOXELS * voxel_mm)
     return np.asarray(sigma * np.sqrt(1.0 + START * np.exp(-2.0 * (sight.arc_mm / _knot(sight)) ** 2)))
 
@@ -59,13 +62,13 @@ def _knot(sight: Sight) -> float:
 
 
 def _bell(a: Sight, b: Sight) -> Array:
-    """How errors are correlated (n, m) along the traces of two frames."""
+    """Correlation (n, m) of errors along the traces of two frames."""
     length = CORRELATED_KNOTS * 0.5 * (_knot(a) + _knot(b))
     return np.asarray(np.exp(-0.5 * ((a.arc_mm[:, None] - b.arc_mm[None, :]) / length) ** 2))
 
 
 def covariance_of(sights: Sequence[Sight], voxel_mm: float) -> Array:
-    """Covariance of one component of all points of all frames: of the traces, and of what the wire may be off."""
+    """Covariance, mm^2, of one component at all points of all frames: the errors of the traces and of the model."""
     noise = covariance_of_traces(sights, voxel_mm)
     modes = [_modes(sight, voxel_mm) for sight in sights]
     all_modes, own_modes = np.concatenate(modes), block_diag(*modes)
@@ -74,7 +77,7 @@ def covariance_of(sights: Sequence[Sight], voxel_mm: float) -> Array:
 
 
 def covariance_of_traces(sights: Sequence[Sight], voxel_mm: float) -> Array:
-    """Covariance of one component of all points of all frames by what the traces are off."""
+    """Covariance, mm^2, of one component at all points of all frames: the errors of the traces alone."""
     arc = np.concatenate([sight.arc_mm for sight in sights])
     sigma = np.concatenate([_sigma(sight, voxel_mm) for sight in sights])
     all_bells, own_bells = np.block([[_bell(a, b) for b in sights] for a in sights]), [_bell(a, a) for a in sights]
@@ -105,7 +108,7 @@ def posterior(residual: Array, jacobian: Array, noise: Array, sigmas: Array, at:
 
 
 def disagreeing(left: Array, sights: Sequence[Sight], voxel_mm: float) -> int | None:
-    """Which frame's residuals are the most surprising, where they are beyond chance."""
+    """Position in ``sights`` of the frame with the most surprising residuals; None where chance explains them."""
     surprise, first = [], 0
     for sight in sights:
         n = len(sight.arc_mm)

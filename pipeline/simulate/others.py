@@ -1,6 +1,6 @@
-"""A wire that another simulator made, taken over: where it passes the entry, and what tells that it is something else.
+"""Wires that another simulator made: cut at the entry, and checked for wrong order, coordinates or units.
 
-Its depth is counted as the solver's: along the wire, from the plane through the clamp across its direction.
+Their depth is counted as the solver's: along the wire, from the plane through the clamp across its direction.
 """
 
 from collections.abc import Iterator
@@ -12,17 +12,17 @@ from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, arc_length
 
 AT_ENTRY_MM = 5.0
-"""Farther from the manifest's entry no wire is taken to begin there: more than the radius of any vessel that a guide
-wire of 0.4 mm is used in blindly."""
+"""Largest distance, mm, from the manifest's entry at which a wire may begin: more than the radius of any vessel that a
+guide wire of 0.4 mm is used in blindly."""
 LARGEST_TURN_DEG = 60.0
-"""Of a wire's first 2 mm from the entry's direction."""
+"""Largest angle between a wire's first 2 mm and the entry's direction."""
 OVER_MM = 2.0
 STEP_BACK_MM, BACK = 0.05, -0.5
-"""A step so long that makes an angle with this cosine with the one before: no wire turns by 120 degrees at a point."""
+"""A step longer than this (mm) whose cosine to the one before is below this: no wire turns by 120 degrees there."""
 ROUNDING_MM = 1e-3
 UNITS = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 SAME = 0.15
-"""Of a unit's factor: how far the ratio of depth and length may be from it."""
+"""How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
 MIRROR = np.array([-1.0, -1.0, 1.0])
 
 
@@ -43,7 +43,7 @@ def begun(points_mm: Array, entry_mm: Array, direction: Array) -> Array:
 
 
 def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
-    """Why a wire cannot be the one that was pushed in at this entry, with what would make it so; empty where it can."""
+    """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can."""
     back = _turned_back(points_mm)
     if back:
         return f"it turns straight back at point {back}: are its points in order?"
@@ -78,7 +78,7 @@ def _misplaced(points_mm: Array, entry_mm: Array, direction: Array) -> str:
 
 
 def _readings(points_mm: Array) -> Iterator[tuple[str, Array]]:
-    """What else the numbers might be, with the points that they would then mean; fewest changes first."""
+    """Other readings of the numbers (point order, RAS, units), each with the resulting points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.ones(3), "RAS": MIRROR}
     units = {"": 1.0} | {f"in {name}": factor for name, factor in UNITS.items()}
@@ -89,7 +89,7 @@ def _readings(points_mm: Array) -> Iterator[tuple[str, Array]]:
 
 
 def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float) -> str:
-    """Why a wire is not one of this depth; empty where it is."""
+    """Why a wire does not have this depth, with a guess at its unit; empty where it does."""
     if abs(length_mm - depth_mm) <= tolerance_mm:
         return ""
     unit = next((n for n, f in UNITS.items() if abs(np.log(depth_mm / max(length_mm, 1e-9) / f)) < SAME), "")

@@ -20,7 +20,7 @@ FINEST_MM = 0.0625
 FIRST_TURN_RAD = 0.1
 """Most that a joint of the first length may turn at rest: a wire that is coarser says nothing about the finer one."""
 AGREED_MM = 0.06
-"""Segments are short enough where halving them moved no wire by more: a third of it, 0.02 mm, is then left."""
+"""Segments are short enough where halving them moved no wire by more, mm: a third of it, 0.02 mm, is then left."""
 SMALLEST_MM = 0.001
 """Below it contacts that open and close on the voxels of the wall hide the order of convergence."""
 
@@ -28,7 +28,8 @@ LARGEST_JOINT_TURN_DEG = 30.0
 """Beyond it the chain's bending energy, quadratic in the angle, is off by 2 % and more."""
 
 Insert = Callable[[float, bool], Sequence[Solution]]
-"""The insertion with segments of a length, mm: the wire at every depth. Whether rough steps are taken again."""
+"""Called with the segments' length, mm, and whether rough steps are repeated with shorter ones; returns the wire at
+every depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,10 @@ class Resolved:
 
 
 def lengths_mm(asked: Segment, rest_curvature_per_mm: ArrayLike) -> list[float]:
-    """Segment lengths in the order in which they are tried, each half of the one before. rest_... : as of a wire."""
+    """Segment lengths, mm, in the order in which they are tried, each half of the one before.
+
+    rest_curvature_per_mm : a number or a profile, as of a wire.
+    """
     rest = np.asarray(rest_curvature_per_mm, dtype=float)
     curvature = float(np.abs(rest if rest.ndim == 0 else rest[:, 1]).max())
     if asked != "auto":
@@ -64,7 +68,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
 
     A length that loses depths which a longer one reached is not taken; a shorter one may reach them again.
     """
-    # the first length is there to be compared with: where it snaps aside, the next pair of lengths is needed, too
+    # the first length only serves for comparison: where it snaps aside, the next pair of lengths is needed, too
     segment, wires, num = lengths[0], insert(lengths[0], len(lengths) == 1), np.full(0, np.nan)
     reason, before = "no coarser segments can follow the wire's rest curvature: no estimate of their error", wires
     for shorter in lengths[1:]:
@@ -74,7 +78,7 @@ def resolve(insert: Insert, lengths: Sequence[float]) -> Resolved:
         if len(lengths) > 2 and _reached(finer) < _reached(wires):
             reason = "with shorter ones fewer depths are reached"
             continue
-        # a wire that is about to snap goes one way or the other by a trifle, with segments of any length
+        # a wire that is about to snap goes one way or the other for tiny causes, with segments of any length
         away = ~(moved <= AGREED_MM) & np.array([not wire.uncertain for wire in finer], dtype=bool)
         segment, wires, num = shorter, finer, moved
         if not away.any():

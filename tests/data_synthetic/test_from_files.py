@@ -11,8 +11,8 @@ import SimpleITK as sitk
 from scipy.ndimage import gaussian_filter
 
 from data_synthetic.anatomy import shapes
-from data_synthetic.anatomy.centrelines import read_tree
-from data_synthetic.anatomy.from_tree import smooth_tube, way_through
+from data_synthetic.anatomy.centrelines import Tree, read_tree
+from data_synthetic.anatomy.from_tree import smooth_tube, way_through, widest_path
 from data_synthetic.anatomy.iso_wall import iso_wall
 from data_synthetic.anatomy.tubes import Anatomy, ball
 from data_synthetic.anatomy.vessel_in_scan import find_vessel, find_way
@@ -205,3 +205,10 @@ def test_a_background_that_is_none_is_refused(tmp_path: Path, name: str) -> None
         sitk.WriteImage(sitk.Image([4 if name == "tiny.mha" else 20] * 3, sitk.sitkInt16), str(path))
     with pytest.raises(ValueError, match=rf"{name}: .*allowed"):
         background_scene(path)
+
+
+def test_a_tree_too_wide_everywhere_has_no_way() -> None:
+    """Its whole path was kept: an aorta holds no guide wire in place."""
+    edges = np.column_stack([np.arange(len(TRUNK) - 1), np.arange(1, len(TRUNK))])
+    with pytest.raises(ValueError, match="no path with radii from 3.0 down to 0.7 mm"):
+        widest_path(Tree(TRUNK, np.full(len(TRUNK), 4.0), edges))

@@ -18,9 +18,9 @@ RADIUS_MM = scenes.RADIUS_MM
 MOMENT_MM4 = 0.25 * np.pi * RADIUS_MM**4
 """Second moment of area of the round section."""
 EA_N = 4.0 * EI / RADIUS_MM**2
-"""Of a round wire of one material: with 1.2 kN, 1 mN stretch it by 1e-6, as good as the chain's not at all."""
+"""Axial stiffness of a round wire of one material, 1.2 kN: 1 mN stretches it by 1e-6, practically not at all."""
 GJ = EI / 1.3
-"""Of the same material with a Poisson number of 0.3."""
+"""Torsional stiffness of the same material with a Poisson number of 0.3, N mm^2."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class RivalWire(ABC):
     note = ""
 
     def __init__(self, task: Task) -> None:
-        """Take down what all need."""
+        """Compute what all rivals need."""
         scene, wall = task.set_up, task.set_up.wall()
         self.task, self.length_mm, self.steps = task, scene.depth_mm, 0
         self.segment_mm = scene.depth_mm / (task.n - self.before_clamp)
         self.wall, self.wall_seconds = wall, 0.0
-        # of the wall at a node inside, N/mm; the tip stands for half a segment of wire, the clamp for none
+        # the wall's stiffness at an inner node, N/mm; the tip stands for half a segment of wire, the clamp for none
         self.wall_N_mm = 0.0 if wall is None else wall.stiffness_N_mm2 * self.segment_mm
         self.nodal_N_mm = np.full(task.n + 1, self.wall_N_mm)
         self.nodal_N_mm[[0, -1]] *= (0.0, 0.5)
@@ -100,7 +100,7 @@ class RivalWire(ABC):
         return force, matrix
 
     def rest(self, advance: Callable[[], Array], still_mm: float, most: int) -> None:
-        """Call ``advance`` until no node that it returns is further than this from where it was one call before."""
+        """Call ``advance`` until no coordinate of a node changes by ``still_mm``; RuntimeError after ``most`` calls."""
         before = self.points()
         for _ in range(most):
             now = advance()
@@ -111,7 +111,7 @@ class RivalWire(ABC):
 
     @abstractmethod
     def push(self, depth_mm: float) -> None:
-        """Bring the wire to rest with so much of it beyond the entry."""
+        """Bring the wire to rest with ``depth_mm`` of it beyond the entry."""
 
     @abstractmethod
     def points(self) -> Array:
@@ -119,7 +119,7 @@ class RivalWire(ABC):
 
 
 def pushed(rival: type[RivalWire], task: Task, most: int | None = None) -> tuple[RivalWire, list[float]]:
-    """Build a rival's wire and push it in, all the way or so often; seconds of processor time of each push."""
+    """Build a rival's wire and push it in, all the way or ``most`` times; also each push's processor time, s."""
     wire, seconds = rival(task), []
     for depth in task.depths()[:most]:
         start = process_time()

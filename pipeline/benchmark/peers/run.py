@@ -45,7 +45,7 @@ def sentences(rows: pd.DataFrame) -> Iterator[str]:
 
 
 def _scene_a(rows: pd.DataFrame) -> Iterator[str]:
-    """The least time of each to a tip error of 1e-4 of the length."""
+    """For each rival the least time in which its tip error is within 1e-4 of the length."""
     good = rows[rows["relative_tip_error"] <= TARGET_A]
     best = good.loc[good.groupby("method")["ms_per_step"].idxmin()].set_index("method")
     if OUR_METHOD not in best.index:
@@ -105,10 +105,10 @@ def measure_peers(out: Path, say: Callable[[str], None], *, quick: bool) -> None
 
 
 def _work(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, int, Task]]:
-    """Of this solver and of all that the extra [peers] pins, in its order: file, number of the rival in it, task.
+    """The tasks of this solver and of all that the extra [peers] pins, in its order.
 
-    A rival's file has the name of its distribution in small letters. What it is asked is said by the file, which only
-    a process of its own imports.
+    Each is a file, the number of the rival in it and its task. A rival's file is named after its distribution, in lower
+    case. The file itself says what it is asked, and only a separate process imports it.
     """
     pinned = [line for line in requires(OURS) or () if re.search(r"extra == .peers", line)]
     for name in (OURS, *(re.split(r"[^\w.-]", line)[0] for line in pinned)):
@@ -125,7 +125,7 @@ def _work(quick: bool, say: Callable[[str], None]) -> Iterator[tuple[str, int, T
 
 
 def ask(module: str, number: int, task: Task) -> dict[str, Any] | Lost:
-    """The row of a rival, which a process of its own makes."""
+    """The row of a rival, made in a process of its own; Lost where that gives no answer."""
     return alone("spawn", partial(_row, module, number, task, reference(task.set_up)), LIMIT_S)
 
 
@@ -153,7 +153,7 @@ def _tasks(module: str, quick: bool) -> list[tuple[int, Task]]:
 def _row(module: str, number: int, task: Task, limit: Reference) -> dict[str, Any]:
     """A row with the columns of the benchmark's table and what the peers' own table adds.
 
-    What a rival has to load and compile is on nobody's clock.
+    A short insertion runs first, so that loading and compiling are not timed.
     """
     rival, length = _rivals(module)[number], limit.arcs_mm[-1]
     pushed(rival, Task(task.scene, WARM_SEGMENTS), 2)

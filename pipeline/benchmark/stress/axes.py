@@ -81,7 +81,7 @@ def _bending_range(plan: ScenePlan, rng: Rng) -> Changes:
 
 
 def _segment_length(plan: ScenePlan, rng: Rng) -> Changes:
-    """Segments from 0.1 to 5 mm, longer than the lumen is wide."""
+    """Segments from 0.1 mm to 5 mm, which is longer than most lumens are wide."""
     segment = _log_uniform(rng, 0.1, 5.0)
     return {"segment_mm": segment, "joints": int(np.clip(round(plan.length_mm / segment), 1, 600))}
 
@@ -94,7 +94,7 @@ def _joints(plan: ScenePlan, rng: Rng) -> Changes:
 
 
 def _rest_curvature(plan: ScenePlan, rng: Rng) -> Changes:
-    """Up to 1/(2 segment), whole wire or tip."""
+    """Rest curvature up to 1 / (2 segment), either way, of the whole wire or its tip."""
     curvature = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0)) * 0.5 / plan.segment_mm
     where = rng.uniform(2.0, 15.0)
     tip = [[where, curvature], [where, 0.0]] if rng.random() < 0.6 else []
@@ -118,13 +118,13 @@ def _kinks(plan: ScenePlan, rng: Rng) -> Changes:
 
 
 def _narrow_lumen(_: ScenePlan, rng: Rng) -> Changes:
-    """Narrower than the wire."""
+    """A lumen that is narrower than the wire."""
     radius = rng.uniform(0.3, 1.5)
     return {"radius_mm": radius, "lumen_mm": radius * rng.uniform(0.2, 1.0)}
 
 
 def _zero_step(plan: ScenePlan, rng: Rng) -> Changes:
-    """No step, a step of rounding, no wire at all."""
+    """Depths that differ by nothing or by rounding, and no wire at all."""
     end = plan.length_mm * rng.uniform(0.3, 1.0)
     choices = [0.0, end, end, end + 1e-13, end * (1 + 1e-9), 1e-12, end]
     return {"way": "insertion", "depths": [choices[i] for i in rng.permutation(len(choices))]}
@@ -189,7 +189,7 @@ AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     # the entry lies beside the vessel's axis, often outside the vessel
     "entry_outside": lambda plan, rng: {"offset_mm": plan.lumen_mm * rng.uniform(0.5, 3.0)},
     "zero_step": _zero_step,
-    # all the way at once, and back
+    # all the way in one step, back, and in again
     "huge_step": lambda plan, rng: {
         "way": "insertion",
         "step_mm": 1e6,
@@ -199,7 +199,7 @@ AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     "roll": lambda _, rng: {"rolls": rng.uniform(-3600.0, 3600.0, int(rng.integers(1, 4))).tolist()},
     # NaN or inf in the grid, at one voxel or at all
     "bad_grid": lambda _, rng: {"defect": str(rng.choice(["nan", "inf", "-inf", "all nan"]))},
-    # the grid ends on the way
+    # the grid ends before the wire's last depth
     "grid_edge": lambda _, rng: {"crop": rng.uniform(0.15, 0.8)},
     # a lumen of one voxel, or a chain of single voxels
     "single_voxel": lambda _, rng: {"lumen": str(rng.choice(["voxel", "thread"]))},
@@ -219,9 +219,9 @@ AXES: dict[str, Callable[[ScenePlan, Rng], Changes]] = {
     # a field that is no distance: noise of up to a voxel on every node
     "noisy_wall": lambda plan, rng: {"noise_mm": float(max(plan.voxel_mm)) * rng.uniform(0.05, 1.0)},
     "loads": _loads,
-    # a finite one, over six decades
+    # finite torsional stiffness, over six decades
     "torsion": lambda _, rng: {"torsion": _log_uniform(rng, 1e-3, 1e3)},
-    # Coulomb's, up to 1
+    # Coulomb's coefficient, from 0.001 to 1
     "friction": lambda _, rng: {"way": "insertion", "friction": _log_uniform(rng, 1e-3, 1.0)},
     # a wire without thickness, or thicker than a segment is long
     "radius": lambda plan, rng: {"radius_mm": float(rng.choice([0.0, 1e-6, plan.segment_mm * 2]))},

@@ -1,6 +1,6 @@
-"""Scenes whose vessels come close to each other; and which of them a wire is in, asked of their closed form.
+"""Vessels that come close to each other, and which of them a wire is in: both from their closed form.
 
-The vessel of a place in the wall is the nearest one. No grid, no gradient and nothing of the solver has a say in that.
+A place in the wall belongs to the nearest vessel. No grid, no gradient and nothing of the solver takes part in that.
 """
 
 import numpy as np
@@ -36,8 +36,8 @@ def near_vessels(kind: str, points: Array, radius: float, septum: float) -> Arra
 def changes_vessel(kind: str, joints: Array, distances: Array, voxel: float) -> str:
     """A sentence where a wire passes from one vessel to the other through the wall between them, from joint to joint.
 
-    joints : (k + 1, 3) mm in the scene's own place.     distances : (2, k + 1), see ``near_vessels``.
-    voxel : mm; a place that is as near to both vessels within that belongs to the last one known.
+    joints : (k + 1, 3) mm in the scene's own frame.     distances : (2, k + 1), see ``near_vessels``.
+    voxel : mm; joints that are as near to both vessels, to within that, are skipped.
     """
     nearer = distances[0] - distances[1]
     sure = np.flatnonzero(np.abs(nearer) > PAST_VOXELS * voxel)

@@ -1,4 +1,4 @@
-"""The plan of one random scene, and the wall and the entry that it makes: at the origin, the vessel along +z."""
+"""The plan of one random scene, and the wall and entry made from it: the entry at the origin, the vessel along +z."""
 
 import math
 from dataclasses import dataclass, field
@@ -114,7 +114,7 @@ def lumen_grid(plan: ScenePlan) -> Grid:
 
 
 def placement(plan: ScenePlan) -> tuple[Array, Array]:
-    """Rotation (3, 3) and shift (3,) that take the scene to where it lies."""
+    """Rotation (3, 3) and shift (3,), mm, from the scene's own frame to where it lies."""
     rng = np.random.default_rng([plan.seed, plan.index, 2])
     turn = Rotation.random(rng=rng).as_matrix() if plan.turned else np.eye(3)
     return turn, plan.far_mm * rng.uniform(-1.0, 1.0, 3)
@@ -126,7 +126,7 @@ def side_angle(plan: ScenePlan) -> float:
 
 
 def entry(plan: ScenePlan) -> tuple[Array, Array, Array]:
-    """Entry point, direction and material axis of the plan, in the scene's place."""
+    """Entry point, direction and material axis of the plan, where the scene lies."""
     turn, shift = placement(plan)
     about = side_angle(plan)
     side = np.array([np.cos(about), np.sin(about), 0.0])

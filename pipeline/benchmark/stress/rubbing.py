@@ -11,18 +11,18 @@ from solver import Solution
 RUBBING_MM = 0.25 * np.arange(8.0)
 """Depths on the way in, beyond the first one; the way out is the same."""
 SETTLED = 2e-3
-"""Beyond Coulomb's bound, over the largest contact force: loads are settled to 1e-4, the normals that they turn to
-less, and a stiff wall's last place is lost in a second look-up."""
+"""Tolerance beyond Coulomb's bound, over the largest contact force: loads are settled to 1e-4, the normals that they
+turn to less well, and a stiff wall's last place is lost in a second look-up."""
 MADE = 0.02
-"""Energy that may come from nowhere, over the hand's work, beside the error of the trapezium rule."""
+"""Tolerated energy from nowhere, over the hand's work, beside the error of the trapezium rule."""
 SPRING_MM = 1e-3
-"""A spring that holds a point keeps energy of its load over half of this."""
+"""Slip of the springs by which friction holds a point: such a spring stores the work of its load over half of this."""
 
 
 def rubbed(plan: ScenePlan, chain: StaticChain, solution: Solution) -> tuple[str, Array]:
-    """Where friction breaks its law, in words, and the places (k + 1, 3), mm, at which the wall holds the wire.
+    """A sentence where friction breaks its law, and the places (k + 1, 3), mm, at which the wall holds the wire.
 
-    A contact is a radius from the axis, along the wall's normal. Valid for a smooth hull looked up at the joints.
+    Each place is a radius from the axis, along the wall's normal. Valid for a smooth hull looked up at the joints.
     """
     nodes, contact = np.asarray(solution.joints_mm), np.asarray(solution.contact_force_N)
     pressed = chain.contact(nodes, np.asarray(solution.frames))[0]
@@ -43,9 +43,9 @@ def rubbed(plan: ScenePlan, chain: StaticChain, solution: Solution) -> tuple[str
 def made_energy(plan: ScenePlan, solutions: Sequence[Solution]) -> str:
     """A sentence where the wire and friction got more energy than the hand gave on a way in and out again.
 
-    Work is the trapezium rule over the published push forces; its error is what every second one would make of it.
-    Out and back the leaps cancel that come with a new joint and with a jump of the wire's profile at the entry. The
-    turn is left out, where the force leaps.
+    Work is the trapezium rule over the published push forces; its error is estimated from every second one. The jumps
+    that come with a new joint, or where the wire's profile jumps at the entry, cancel on the way in and out. The turn
+    is left out: there the force jumps.
     """
     count = len(RUBBING_MM)
     if plan.friction == 0.0 or len(plan.depths) != 2 * count - 1 or len(set(plan.rolls)) > 1:

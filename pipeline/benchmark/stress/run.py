@@ -21,9 +21,9 @@ from solver._compile import hash_of
 SCENES_CSV, STRESS_CSV = "stress_scenes.csv", "stress.csv"
 SCENES, QUICK_SCENES = 5000, 200
 LIMIT_S = 60.0
-"""Processor time beyond which a scene hangs: the work of a depth is limited, the slowest scene takes some 15 s."""
+"""Processor time beyond which a scene hangs: work per depth is limited, the slowest scene takes some 15 s."""
 BUSY = 10.0
-"""A busy machine gives a process a tenth of a core; one that is silent for longer waits for something."""
+"""Limit of wall-clock over processor time: a busy machine gives a process a tenth of a core; beyond, it is stuck."""
 
 
 def run_isolated(seed: int, indices: Sequence[int], jobs: int = 1, limit_s: float = LIMIT_S) -> Iterator[SceneOutcome]:
@@ -90,11 +90,11 @@ COLUMNS = list(_row(0, SceneOutcome(0, ("",), "")))
 def _rows_at(path: Path, seed: int, indices: Sequence[int]) -> list[dict[str, Any]]:
     """Rows of this seed and version in a table; others are left out, and so is a last line that was cut off."""
     text = path.read_text(encoding="utf-8") if path.exists() else ""
-    # the version is the last column: behind the last one there is no whole line
+    # the version is the last column: what follows its last occurrence is no whole line
     whole, last, _ = text.rpartition(end := f",{version()}\n")
     if not last:
         return []
-    # an empty text is a text
+    # an empty text stays a text, not NaN
     numbers = {"residual": ["", "nan"], "stretch": ["", "nan"]}
     table = pd.read_csv(io.StringIO(whole + end), dtype={"version": str}, keep_default_na=False, na_values=numbers)
     mine = table[(table["seed"] == seed) & (table["version"] == version()) & table["index"].isin(indices)]

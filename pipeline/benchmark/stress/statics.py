@@ -133,9 +133,9 @@ def assemble(
 
 
 def _integral(at: Array, value: Array, low: Array, high: Array, mean: Callable[[Array, Array], Array]) -> Array:
-    """Integral (k,) over [low, high] of what has this mean where a piecewise linear function goes from p to q.
+    """Integral (k,) over [low, high] of a function whose mean is ``mean(p, q)`` where a profile goes from p to q.
 
-    The function is constant beyond its ends; two equal places make a jump.
+    The profile is piecewise linear and constant beyond its ends; two equal places make a jump.
     """
     cuts = np.concatenate([[min(at[0], low.min()) - 1.0], at, [max(at[-1], high.max()) + 1.0]])
     ends = np.concatenate([[value[0]], value, [value[-1]]])

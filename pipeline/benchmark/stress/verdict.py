@@ -12,28 +12,28 @@ from pipeline.benchmark.stress.statics import Array, StaticChain, assemble
 from solver import GuideWire, Solution, VesselWall
 
 STRETCH = 1e-12
-"""Largest change of a segment's length, relative to the larger of the segment and its distance from the origin."""
+"""Largest change of a segment's length, relative to the larger of the segment and the wire's largest coordinate."""
 RESIDUAL = 1e-4
 """Largest moment left at a joint of a wire called converged, relative to the largest moment in it: ten times
 what the solver itself asks for, because the last place of a stiff wall is lost in a second assembly."""
 RUBBED, SETTLED = 1e-2, 5e-4
-"""The same with friction; and the share of the largest contact force, with the whole wire as its lever, that loads
-settled to 1e-4 and their directions leave."""
+"""RESIDUAL with friction; and the share of the largest contact force, with the whole wire as its lever, that may be
+unbalanced, since loads and their directions are settled to 1e-4."""
 TURNED = 0.01
 """Share of mu N, per mm of the wire's radius, that contacts which still stick may be off, with the same lever: settled
 directions may have turned by 1e-4 rad, and a spring slips at 1e-3 mm, so one alone may be off by ten times as much."""
 ENERGY_PLACE = 1e-12
-"""Fraction of the energy that nobody can lower: a residual is nothing if even a wire free of wall would gain less."""
+"""Fraction of the energy: a residual does not count where following it would gain less, even without the wall."""
 MOMENT_FLOOR_RAD = 1e-6
-"""Joint angle whose moment is called nothing: where the rest shape is the answer there is no moment to compare with."""
+"""Joint angle whose moment counts as none: where the rest shape is the answer there is no moment to compare with."""
 ROSE = 1e-9
-"""Largest rise of the energy over the start, relative."""
+"""Largest rise of the energy over that of the start, relative."""
 SADDLE = 1e-3
 """Curvature below minus this fraction of the softest joint's stiffness may be a way down: no minimum."""
 AWAY_RAD = (1e-5, 1e-4, 1e-3)
 """How far a suspected way down is followed. Differences across a contact that opens are no proof by themselves."""
 FALL = 1e-11
-"""Fall of the energy, relative, averaged over both ways (which cancels the gradient), that proves a way down."""
+"""Relative fall of the energy, averaged over both ways (which cancels the gradient), that proves a way down."""
 HESSIAN_DOFS = 120
 """Largest number of joint angles whose Hessian is formed by differences."""
 PUBLISHED = (
@@ -88,8 +88,8 @@ def judge(
 def _strays(plan: ScenePlan, solution: Solution) -> str:
     """A sentence where the wire is in a vessel that it never entered.
 
-    Not asked of a relaxation that failed, which lies where it stopped, nor where noise makes and breaks walls. A wall
-    of less than two voxels is not on the grid.
+    Not checked for a relaxation that failed, which lies where it stopped, nor where noise makes and breaks walls. A
+    wall of less than two voxels is not on the grid.
     """
     voxel = float(max(plan.voxel_mm))
     known = solution.converged or plan.way == "insertion"
@@ -138,7 +138,7 @@ def _at_rest(chain: StaticChain, solution: Solution, at_joints: bool, deep: bool
 
 
 def _noise(chain: StaticChain, solution: Solution) -> float:
-    """Moment that the last place of the coordinates makes through the wall's stiffness, N mm."""
+    """Moment, N mm, that rounding of the coordinates causes through the wall's stiffness."""
     if chain.wall is None:
         return 0.0
     touching = int(np.count_nonzero(np.any(solution.contact_force_N != 0.0, axis=1)))

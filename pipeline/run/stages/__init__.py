@@ -27,7 +27,7 @@ STEPS: dict[Stage, Callable[[Context, Known], Known]] = {
 
 
 def run_stages(run: Context, until: Stage = "report") -> Known:
-    """Run the stages up to one of them; what goes wrong with the whole case ends the way and is part of the result."""
+    """Run the stages up to ``until``; a StageError, which is of the whole case, ends them and becomes the failure."""
     known = Known()
     for stage, step in STEPS.items():
         if STAGES.index(stage) > STAGES.index(until):

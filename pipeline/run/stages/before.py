@@ -1,4 +1,4 @@
-"""The curve of the frame before, for a frame that may not need it: waited for where it is asked for."""
+"""The curve of the frame before, waited for only when the tracing of a frame asks for it."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -8,20 +8,20 @@ import numpy as np
 from pipeline.model import Curve
 
 NOTHING = Curve(np.zeros((0, 3)), np.zeros(0))
-"""The curve of no frame."""
+"""An empty curve: stands for the previous one where there is none."""
 ASKS = Curve(np.zeros((0, 3)), np.zeros(0), note="depends on the curve of the frame before")
-"""Stands in the store under the inputs of a frame that does not follow from these alone."""
+"""Stored under a frame's own inputs where its trace also depends on the frame before."""
 
 
 def is_asks(kept: object) -> bool:
-    """Whether what the store has is ``ASKS``."""
+    """Whether a stored result is ``ASKS``."""
     return isinstance(kept, Curve) and kept.note == ASKS.note and len(kept.points_mm) == 0
 
 
 class Before:
-    """Stands for the curve before, as ``trace`` takes it; has everything that a curve has.
+    """Stands for the previous frame's curve in a call of ``trace``, with all its attributes; asked : it was used.
 
-    Most frames are traced without it: these wait for no other, and do not depend on any.
+    Most frames are traced without it: these wait for no other frame, and do not depend on any.
     """
 
     def __init__(self, find: Callable[[], Curve]) -> None:

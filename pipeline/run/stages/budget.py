@@ -35,11 +35,11 @@ from pipeline.simulate.resolution import lengths_mm
 
 AT_REST, RARE = 0.9, 0.05
 DISTAL = 20
-"""Points of a wire's end, at the usual 0.5 mm its last 10 mm."""
+"""Number of points at a wire's end that count as distal: at the usual step of 0.5 mm its last 10 mm."""
 
 
 def budgeted(run: Context, known: Known) -> Known:
-    """The case with what its inputs may be: of every frame, and by source."""
+    """The case with the uncertainty budget of every frame and by source; unchanged where there can be none."""
     frames = [f for f in known.frames if f.ok and f.simulated is not None and len(f.simulated.joints_mm) > 1]
     settings = run.config.budget
     if not settings.members or not frames or known.clamp is None or not np.isfinite(known.segment_mm):
@@ -62,7 +62,7 @@ def budgeted(run: Context, known: Known) -> Known:
 
 
 def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
-    """A warning where much of the ensemble came to no rest: its spread is that of the rest."""
+    """A warning where many members of the ensemble did not come to rest: the spread is then that of the others."""
     few = [n for n, budget in found.items() if budget is None or budget.members < AT_REST * count]
     if not few:
         return []
@@ -75,7 +75,7 @@ def _lost(found: Mapping[int, Budget | None], count: int) -> list[str]:
 
 
 def _rare(rank: float, count: int) -> list[str]:
-    """A warning where hardly an insertion of the ensemble lies as the real one does."""
+    """A warning where hardly any member of the ensemble lies as far off as the real insertion."""
     if not rank <= RARE:
         return []
     return [
@@ -86,7 +86,7 @@ def _rare(rank: float, count: int) -> list[str]:
 
 
 def _with_releases(frames: Sequence[Frame], budgets: Sequence[Budget | None]) -> list[Budget | None]:
-    """The budgets with what became of releases."""
+    """The budgets, each with what became of a release (``budget.shapes.releases``)."""
     snapped = [frame.solved is not None and bool(frame.solved.snaps) for frame in frames]
     told = releases(snapped, [None if budget is None else budget.shapes for budget in budgets])
     return [None if b is None else replace(b, released=word) for b, word in zip(budgets, told, strict=True)]
@@ -111,7 +111,7 @@ class Work:
         self.seen = [self._seen(frame) for frame in frames]
         wires = [frame.simulated.joints_mm for frame in frames if frame.simulated is not None]
         traces = [frame.curve.points_mm for frame in frames if frame.curve is not None and frame.traced]
-        # the coarsest of them will do: what segments make is common to all members, and stands in num_mm
+        # the longest segments will do: their error is common to all members, and num_mm has it
         lengths = lengths_mm(config.solver.segment_mm, altered(case.wire, config.simulate).rest_curvature_per_mm)
         segment = lengths[0] if config.solver.segment_mm == "auto" else known.segment_mm
         solver = replace(config.solver, segment_mm=segment, finest_mm=config.solver.step_mm)
@@ -120,7 +120,7 @@ class Work:
         self.scene = Scene(*shared, case.catheter, tips, config.budget.seed)
 
     def _depth_sigmas(self) -> Array:
-        """How well each frame's depth is known, mm."""
+        """Standard deviation (frames,) of each frame's depth, mm."""
         if not self.nominal.traced:
             stated = self.run.case.insertion_sigma_mm
             return np.full(len(self.frames), INSERTION_MM if stated is None else stated)
@@ -146,7 +146,7 @@ class Work:
         return np.where(np.isfinite(sigma), sigma, UNKNOWN_VOXELS * self.voxel)
 
     def _segments_mm(self, frame: Frame) -> float:
-        """The same of the segments: num_mm is a bound, two standard deviations."""
+        """Standard deviation that the segments' length causes, mm: num_mm is a bound, two standard deviations."""
         return 0.5 * float(np.nan_to_num(frame.num_mm))
 
     def said(self) -> str:
@@ -160,7 +160,7 @@ class Work:
         return [frame_budget(wires, seen) for wires, seen in zip(ensemble, self.seen, strict=True)]
 
     def rank(self, ensemble: Sequence[Array], budgets: Sequence[Budget | None]) -> float:
-        """That of the real insertion among the ensemble's, by the frames in which this has one shape."""
+        """Rank of the real insertion among the members, by the frames in which the ensemble has one shape."""
         rng = np.random.default_rng(self.run.config.budget.seed)
         each = zip(self.frames, self.seen, ensemble, budgets, strict=True)
         calm = [(frame, seen, wires) for frame, seen, wires, b in each if b is not None and b.shapes is None]
@@ -168,7 +168,7 @@ class Work:
         return rank_of_ends([one for one in ends if one is not None])
 
     def sight(self, frame: Frame, seen: Seen) -> Sight:
-        """The trace's error where a frame was compared."""
+        """The trace's uncertainty at the points at which a frame was compared."""
         knot = np.nan if frame.curve is None else frame.curve.levels.get("knot_mm", np.nan)
         return Sight(frame.index, seen.arc_mm, seen.nominal_mm, self.trace_mm(frame), knot)
 

@@ -1,4 +1,4 @@
-"""simulate, its beginning: where the wire is held, by the manifest or by the scans."""
+"""The beginning of simulate: where the wire is held, by the manifest or by the scans."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -33,7 +33,7 @@ def clamp_of(run: Context, known: Known) -> Clamp:
 
 
 def _of_another(run: Context, other: Case, given: Clamp) -> Clamp:
-    """The clamp that another insertion of the same fixation shows: nothing of this case's own scans is in it."""
+    """The clamp estimated from another insertion with the same fixation; this case's own scans are not used."""
     silent = Context(other, run.config, run.store, Log(lambda *_: None))
     known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
     clamp = clamp_of(silent, known)

@@ -37,9 +37,9 @@ def compare_frames(run: Context, known: Known) -> Known:
 def _simulated_otherwise(
     run: Context, known: Known, first: Callable[[], object]
 ) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
-    """The wires from four entries, and by frame those of simulators that lack something.
+    """The wires from four entries (``entries``), and by frame those of the simulated predictors (``rivals``).
 
-    first : what can be done while helpers simulate.
+    first : what this process can do while helpers simulate.
     """
     ways = rival_ways(run, known)
 
@@ -53,7 +53,7 @@ def _simulated_otherwise(
 def _all_compared(
     run: Context, known: Known, clues: Clues | None, simulated: Mapping[int, Mapping[str, Array]]
 ) -> tuple[Frame, ...]:
-    """The frames with their errors. simulated : by frame, the wires of simulators that lack something."""
+    """The frames with their errors. simulated : by frame, the wires of the simulated predictors."""
     before = [*_trusted_before(known.frames)]
     after = [*_trusted_before(known.frames[::-1])][::-1]
 

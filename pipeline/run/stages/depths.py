@@ -1,6 +1,6 @@
-"""What the frames' traced lengths say of each other: a trace that was cut or led astray is out of step.
+"""Whether the frames' traced lengths agree: a trace that was cut short or led astray is out of step.
 
-Stated depths are off by what the hand's scale and the entry are, the same in neighbouring frames.
+Stated depths are off by the errors of the hand's scale and of the entry, which neighbouring frames share.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,15 @@ from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 
 AROUND = 5
-"""Frames over which the usual difference of traced length and stated depth is taken."""
+"""Number of neighbouring frames whose median difference of traced length and stated depth is the usual one."""
 FEWEST = 4
-"""Frames below which there is none."""
+"""Fewest frames for a check."""
 SURE = 5.0
-"""Standard deviations of these differences, about the usual one, from which a length is out of step."""
+"""First limit on how far a difference may be off the usual one: so many standard deviations of all frames."""
 SURE_TIP = 4.0
-"""The same in those of the frame's own tip."""
+"""Second limit: so many standard deviations of the frame's own tip."""
 LEAST_VOXELS = 3.0
-"""and the least difference."""
+"""Third limit, voxels: a length is out of step beyond all three. Also the least shrinking that gets a warning."""
 
 
 def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:

@@ -12,14 +12,13 @@ from pipeline.trace import DIM_FROM_TIP, cleared
 FEWEST = 3
 """Frames that must agree."""
 AGREE_VOXELS = 3.0
-"""How much their dim ends may differ in length: where a step is told from a dim end it is 1 voxel off, the tip 1.75."""
+"""How much the lengths of their dim ends may differ: the step in brightness is located to 1 voxel, the tip to 1.75."""
 MOVED_MM = 5.0
 """By how much the wire must have been pushed between the first and the last of them."""
 
 
 def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
-    """The frames, without the doubt that their dim end may be a catheter's where they all have one; and what was
-    assumed.
+    """The frames, cleared of the doubt about a dim end where they agree on it; and what was assumed.
 
     A catheter that stays where it is shows less of itself the further the wire is pushed.
     """

@@ -1,6 +1,6 @@
-"""The wires held and pushed otherwise: clamp from the scans or the manifest, depth from the traces or the manifest.
+"""Four entries: the clamp from the scans or the manifest, each with depths from the traces or the manifest.
 
-Four rows beside each other say how much of an error was in what the user stated, and how much was taken from the scans.
+Side by side their errors tell how much of an error was in what the user stated, and how much was taken from the scans.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ Entry = tuple[Clamp, str]
 
 
 def _frames(known: Known) -> list[Frame]:
-    """Those that are to be compared."""
+    """The frames that are compared: ok, traced and simulated."""
     return [f for f in known.frames if f.ok and f.traced and f.simulated is not None and len(f.simulated.joints_mm) > 1]
 
 
 def _entries(run: Context, known: Known) -> dict[tuple[str, str], Entry]:
-    """By their names; none where there are not four."""
+    """The four entries by the names of clamp and depth; empty where one of them cannot be had or none is asked for."""
     stated = run.case.insertion_mm is not None and run.case.frames and run.config.compare.simulated_nulls
     if not _frames(known) or not stated or known.clamp is None or run.config.simulate.entry == "manifest":
         return {}

@@ -1,4 +1,4 @@
-"""What an insertion is fitted from: the clamp as the manifest has it, and the traces that are to be believed."""
+"""Inputs of every fit to an insertion: the clamp as the manifest has it, and the traces that can be trusted."""
 
 from collections.abc import Sequence
 
@@ -12,11 +12,11 @@ from pipeline.status import FrameStatus
 from solver import VesselWall
 
 ENTRY_SIGMA_VOXELS = 0.5
-"""How well a point of a scan can be pointed at."""
+"""Standard deviation, voxels, of an entry point picked in a scan, where the manifest states none."""
 
 
 def seen_in(frames: Sequence[Frame]) -> list[Seen]:
-    """The frames whose beginning is to be believed."""
+    """The frames whose traces can be trusted near the entry."""
     return [
         Seen(frame.index, curve, frame.roll_deg, frame.catheter_mm)
         for frame in frames
@@ -42,7 +42,7 @@ def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
 
 
 def trial_of(run: Context, known: Known, frames: Sequence[Frame], *, roll_free: bool) -> Trial:
-    """The insertion as calibration takes it: the whole length of trusted traces of these frames."""
+    """The insertion as calibration takes it: the trusted traces of these frames, along their whole length."""
     case = run.case
     assert known.lumen is not None
     given, prior, voxel_mm = manifest_clamp(run, known)

@@ -1,4 +1,4 @@
-"""What the steps of a case work with, and what they have found out."""
+"""The data of a case: what the steps work with (``Context``) and what they have found (``Known``, ``Frame``)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -64,13 +64,13 @@ class Frame:
 
     @property
     def ok(self) -> bool:
-        """Traced, simulated to its depth, converged and compared (or simulated, or what the roll was fitted on)."""
+        """Whether it was traced, simulated to its depth and compared, or only simulated, or used to fit the roll."""
         good = FrameStatus.OK, FrameStatus.SIMULATED, FrameStatus.ROLL_FITTED
         return self.status in (status.identifier for status in good)
 
     @property
     def traced(self) -> bool:
-        """There is a curve to compare with, whether or not it is to be trusted."""
+        """Whether there is a curve to compare with, trusted or not."""
         return self.curve is not None and len(self.curve.points_mm) > 1
 
     @property
@@ -90,7 +90,7 @@ class Frame:
 
     @property
     def uncertain(self) -> bool:
-        """The simulated wire was about to snap, or segments of twice the length lead elsewhere."""
+        """Whether the simulated wire was about to snap, or segments of twice the length lead elsewhere."""
         return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
@@ -111,7 +111,7 @@ class Known:
 
     clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
     ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
-    failure : why the case went no further.     at_entry : what the scan shows there, where no lumen was found.
+    failure : why the case went no further.     at_entry : the scan around the entry, where no lumen was found.
     """
 
     scans: Scans | None = None
@@ -131,8 +131,8 @@ class Known:
 class Context:
     """A case, its settings, the store of earlier results and the log.
 
-    cores : that the case may take.     simulates : it will be simulated after it is traced.
-    hashed : waits until the files are hashed, so that processes that are forked from this one need not.
+    cores : that the case may use.     simulates : it will be simulated after it is traced.
+    hashed : waits until the files are hashed, so that forked processes inherit the hashes.
     """
 
     case: Case
@@ -155,7 +155,7 @@ class Context:
         first: Callable[[], object] = nothing,
         inherited: Sequence[object] = (),
     ) -> list[R]:
-        """``helpers.shared`` on the cores of the case; what kept helpers from helping stands in its log, too."""
+        """``helpers.shared`` on the cores of the case; where helpers failed, the reason is also logged."""
 
         def told(text: str) -> None:
             said(f"{self.case.id}: {text}")
@@ -181,10 +181,10 @@ class Context:
         previous: Before | None = None,
         **named: object,
     ) -> Result:
-        """``function(*inputs, **named)``, or what the store has of it: its key is made from the very inputs.
+        """``function(*inputs, **named)``, or its stored result; the cache key is made from these very inputs.
 
-        A crop among the inputs stands for its volume, which is read only where it is needed. previous : an input that
-        belongs to the key only where the function has asked for it.
+        A crop among the inputs stands for its volume, which is read only where nothing is stored. previous : an input
+        that belongs to the key only where the function has asked for it.
         """
         key = key_of(function, inputs, named) if self.store.root else ""
         kept = self.store.get(stage, key)
@@ -205,6 +205,6 @@ class Context:
             self.log.reused[stage] = self.log.reused.get(stage, 0) + 1
             for crop in (item for item in inputs if isinstance(item, Crop)):
                 self.log.count("load", crop.counters)
-        # the work behind a result, whenever it was done: a run that was interrupted says the same as one that was not
+        # counted for stored results, too: a resumed run reports the same work as one that was not interrupted
         self.log.count(stage, result.counters, result.levels)
         return result

@@ -1,4 +1,4 @@
-"""simulate, where another simulator did it: its wires, judged by the rule that every frame counts."""
+"""simulate, where another simulator did it: each frame takes that simulator's wire, or has failed."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""One scan under two names: the voxels say so where the files do not."""
+"""Scans that occur twice in a case under different names, found by their voxels."""
 
 import hashlib
 from collections.abc import Sequence
@@ -12,21 +12,24 @@ from pipeline.status import FrameStatus
 
 
 def once(frames: Sequence[Frame], voxels: Sequence[bytes]) -> list[Frame]:
-    """The frames; one with the voxels of an earlier one, in whatever file, is not counted again."""
+    """The frames; one with the voxels of an earlier one has failed and is not counted again.
+
+    voxels : of each frame, see ``known_by``; empty where its scan could not be read.
+    """
     out, first = list(frames), dict[bytes, int]()
     for n, known in enumerate(voxels):
         same = first.setdefault(known, n)
         if known and same != n:
-            # whatever is wrong with its trace, too: that other frames agree with it would be nothing new
+            # also where its trace has failed: the same scan again is no further evidence for anything
             as_read = replace(frames[n], status=FrameStatus.OK.identifier)
             out[n] = as_read.failed("load", FrameStatus.REPEATED, f"it has the voxels of frame {same}")
     return out
 
 
 def known_by(volume: Volume) -> bytes:
-    """A hash of the sums of the rows in memory, which noise makes as good as that of all voxels in a fifth of its time.
+    """A hash (16 bytes) of the sums over the rows in memory, whatever type the voxels are kept in.
 
-    Whatever type the voxels are kept in.
+    In scans with noise it tells as much as a hash of all voxels, in a fifth of the time.
     """
     rows = volume.values.sum(axis=int(np.argmin(volume.values.strides)), dtype=np.float64)
     return hashlib.blake2b(np.ascontiguousarray(rows).data, digest_size=16).digest()

@@ -1,7 +1,7 @@
-"""Simulators that lack something, as predictors: what the roll and the tip's curve are worth.
+"""Simulated predictors: the simulator without the roll, or without the tip's curve; they show what these are worth.
 
-Both have everything else of the simulated wire, the clamp and the depths too. One does not know the roll and gives the
-mean, at equal arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
+Both have everything else of the simulated wire, the clamp and the depths too. ``roll_unknown`` is the mean, at equal
+arc length, of twelve wires 30 degrees apart: of all guesses that with the least expected squared error.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ ROLLS = 12
 
 
 Wires = list[Array | None]
-"""The wire of each frame that was simulated; None where it comes to no rest."""
+"""The wire of each frame that was simulated; None where it did not come to rest."""
 
 
 def _simulated(known: Known) -> list[Frame]:
@@ -27,7 +27,10 @@ def _simulated(known: Known) -> list[Frame]:
 
 
 def rival_ways(run: Context, known: Known) -> list[tuple[SimulateConfig, float]]:
-    """Settings and turns to be simulated, by themselves each; none where nothing is to be."""
+    """Settings and extra roll (degrees) of each simulation: one without the tip's curve, then ROLLS turned ones.
+
+    Empty where they are switched off or nothing was simulated.
+    """
     if not run.config.compare.simulated_nulls or not _simulated(known) or not np.isfinite(known.segment_mm):
         return []
     plain = run.config.simulate
@@ -35,7 +38,7 @@ def rival_ways(run: Context, known: Known) -> list[tuple[SimulateConfig, float]]
 
 
 def simulated_rivals(run: Context, known: Known, wires: Sequence[Wires]) -> dict[int, dict[str, Array]]:
-    """By frame and by name, the wires (n, 3) of both; a frame that was not simulated has none.
+    """By frame and by name, the wires (n, 3) of both predictors; a frame that was not simulated has none.
 
     wires : of each of ``rival_ways``.
     """
@@ -53,7 +56,7 @@ def simulated_rivals(run: Context, known: Known, wires: Sequence[Wires]) -> dict
 
 
 def rival_wires(run: Context, known: Known, config: SimulateConfig, turn_deg: float) -> Wires:
-    """The wires under other settings, turned."""
+    """The wires under one of ``rival_ways``: other settings, every roll turned by ``turn_deg``."""
     case, lumen, clamp, frames = run.case, known.lumen, known.clamp, _simulated(known)
     assert lumen is not None
     assert clamp is not None

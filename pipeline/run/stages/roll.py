@@ -9,7 +9,7 @@ from pipeline.run.stages.known import Context, Known
 from pipeline.status import FrameStatus, StageError
 
 LOOSE_DEG = 10.0
-"""A roll that is known no better than this is warned of."""
+"""A roll with a larger standard deviation than this gets a warning."""
 
 
 def with_fitted_roll(run: Context, known: Known) -> Known:

@@ -37,13 +37,13 @@ def segment_vessel(run: Context, known: Known) -> Known:
 
 
 def scan_at_entry(run: Context, known: Known) -> ScanCrop | None:
-    """What a reader looks at where no lumen was found: the scan about the entry; None where it cannot be read."""
+    """The scan around the entry, as pictures for a case without a lumen; None where it cannot be read."""
     scan = None if known.scans is None else known.scans.first
     if scan is None:
         return None
     try:
         volume = Crop(scan, scan.box, run.config.load).load()
-    except StageError:  # it is the very failure
+    except StageError:  # this is what failed
         return None
     pictures = dict(enumerate(slabs(volume, np.array(run.case.entry_mm))))
     shape = (scan.shape[0], scan.shape[1], scan.shape[2])

@@ -20,13 +20,13 @@ from reports.case_files import counted
 from solver import Snap, Solution
 
 MOST_OVERLAP_RADII = 0.1
-"""Of the wire with itself that still counts as a touch: less than a scan can show."""
+"""Overlap of the wire with itself, in radii, that still counts as a touch: less than a scan can show."""
 NEARLY_MM = 1.0
 """How much deeper than the traced wire a catheter may be stated without a warning."""
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
-    """Replay the insertion; a frame without a known depth is passed over."""
+    """Replay the insertion; a frame without a known depth is left out."""
     with run.log.timed("clamp"):
         known = with_fitted_roll(run, known)
         clamp = clamp_of(run, known)
@@ -34,7 +34,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
     if run.case.simulated is None:
         return _replayed(run, known)
     try:
-        # the predictors that are simulations need segments of some length: those that the solver would choose
+        # the simulated predictors need a segment length: that of this project's own solver
         with run.log.timed("simulate"):
             segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
     except StageError:
@@ -64,13 +64,13 @@ def _replayed(run: Context, known: Known) -> Known:
 
 
 def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
-    """The wires of frames, with segments as short as it takes; ValueError where the solver refuses what it is given."""
+    """The wires of frames, with segments as short as needed; ValueError where the solver refuses its inputs."""
     config = run.config
     assert known.lumen is not None
     lengths = lengths_mm(config.solver.segment_mm, altered(run.case.wire, config.simulate).rest_curvature_per_mm)
-    # two lengths are needed whatever comes of the first one: side by side, where there are cores
+    # the first two lengths are needed in any case: side by side, where there are cores
     tries = [(lengths[0], len(lengths) == 1), *((shorter, True) for shorter in lengths[1:2])]
-    wall_of(known.lumen.distance, config.solver.hull)  # inherited by all
+    wall_of(known.lumen.distance, config.solver.hull)  # made here, so that helpers inherit it
     found = run.share("simulate", lambda i, _: _inserted(run, known, frames, *tries[i]), len(tries))
     ahead = dict(zip(tries, found, strict=True))
 
@@ -87,7 +87,7 @@ def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
 def _inserted(
     run: Context, known: Known, frames: Sequence[Frame], segment_mm: float, refined: bool
 ) -> tuple[list[Solution], Log]:
-    """The wires of frames with segments of one length, and what is noted. refined : rough steps are taken again."""
+    """The wires of frames with segments of one length, and a log. refined : repeat rough steps with shorter ones."""
     case, config, part = run.case, run.config, run.part()
     assert known.lumen is not None
     assert known.clamp is not None
@@ -114,7 +114,7 @@ def judged(frame: Frame, wire: Solution, radius_mm: float) -> Frame:
 
 
 def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: int) -> Iterator[Solution]:
-    """The wires, each with its time, its work and a line in the log."""
+    """Pass the wires on, each with its time and its work counted and a line in the log."""
     clock = perf_counter()
     for frame, wire in zip(frames, found, strict=True):
         log.spent("simulate", perf_counter() - clock, frame.index)
@@ -127,7 +127,7 @@ def _noted(log: Log, frames: Sequence[Frame], found: Iterator[Solution], total: 
 
 
 def _cut_short(frame: Frame) -> str:
-    """A catheter that is said to lie beyond the wire's tip."""
+    """A warning: the catheter is stated to reach beyond the wire's tip."""
     return (
         f"frame {frame.index}: the catheter's tip is stated at {frame.catheter_mm:.1f} mm, the wire's lies at "
         f"{frame.depth_mm:.1f} mm: simulated as if both ended there; check insertion_mm of the catheter"
@@ -149,7 +149,7 @@ def _pressed_deep(frames: Sequence[Frame], wires: Sequence[Solution], radius_mm:
 
 
 def _told(frame: int, snap: Snap) -> str:
-    """An event in words."""
+    """A snap of the simulated wire in words."""
     hangs = "what is seen here and shortly after hangs on small causes"
     if snap.other_mm > 0.0:
         hangs = f"the other side, {snap.other_mm:.2f} mm off, was as good: what follows holds for this one"
@@ -166,8 +166,8 @@ def _with_depths(run: Context, known: Known, clamp: Clamp) -> tuple[Frame, ...]:
 def with_depth(frame: Frame, source: str, clamp: Clamp) -> Frame:
     """The frame with the depth to simulate: the traced length, else the manifest's; failed where neither is known.
 
-    The length of a trace that is not to be trusted is taken only where no depth is stated: a wire that were drawn back
-    to it and pushed on again would lie elsewhere in the frames that follow, where there is friction.
+    The length of a trace that is not trusted is taken only where no depth is stated: pulling the wire back to it and
+    pushing it on again would change the frames that follow, where there is friction.
     """
     depth = frame.expected_mm
     told = frame.trusted_curve is not None or np.isnan(depth)

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from pipeline.run.stages.known import Frame
 
 LEAST_SHARE = 0.9
-"""Radius seen over the stated one, below which that is doubted: 1.15 to 2.1 in 17 scenes of the catalogue (the fit is
-wider than a disc that is blurred), so that twice the radius reads 0.57 to 1.05, and 15 of them are told."""
+"""Ratio of the seen to the stated radius below which the latter is doubted. It is 1.15 to 2.1 in 17 scenes of the
+catalogue (the fit is wider than a blurred disc); with twice the radius stated it is 0.57 to 1.05: 15 of them are
+noticed."""
 LEAST_VOXELS = 1.2
-"""Stated diameter that can be told from nothing: at 0.84 voxels the share was 1.0."""
+"""Least stated diameter, voxels, whose blur differs from a thin line's: at 0.84 voxels the ratio was 1.0."""
 
 
 def too_thin(
@@ -19,8 +20,8 @@ def too_thin(
 ) -> list[str]:
     """A sentence where the blur of the traced wires leaves no room for the stated radius.
 
-    A disc of radius r blurs to a variance of r^2 / 4 more. scanner_blur_mm : of the lumen's wall; nan where unknown.
-    Slices that are thicker than pixels have a blur of their own (a share of 0 was seen), and nothing is said.
+    A disc of radius r adds r^2 / 4 to the variance of the blur. scanner_blur_mm : of the lumen's wall; NaN where
+    unknown. Slices that are thicker than pixels have a blur of their own (a ratio of 0 was seen), and nothing is said.
     """
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     blurs = [curve.levels["blur_mm"] for curve in curves if "blur_mm" in curve.levels]

@@ -38,7 +38,7 @@ def trace_frames(run: Context, known: Known) -> Known:
         pairs = zip(known.frames, given, strict=True) if given else ()
         return replace(known, frames=tuple(_as_given(run, *pair) for pair in pairs) or known.frames)
     work = _Tracing(run, known, given)
-    # a second and more with 256^3 voxels, while the helpers trace
+    # the wall takes a second and more with 256^3 voxels: it is made while the helpers trace
     wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.simulates else nothing
     parts = run.share("trace", work.part, len(known.frames), wall)
     for part in parts:
@@ -61,10 +61,10 @@ def trace_frames(run: Context, known: Known) -> Known:
 
 
 class _Part(NamedTuple):
-    """What becomes of one frame.
+    """The result of one frame.
 
-    window : the grey values that are shown of all frames from the first traced one on.     voxels : by which its scan
-    is known again; empty where it could not be read.
+    window : grey values of all pictures, set by the first frame with a trusted trace; None until then.     voxels : a
+    hash of its scan; empty where that could not be read.
     """
 
     frame: Frame
@@ -74,7 +74,7 @@ class _Part(NamedTuple):
 
 
 class _Tracing:
-    """What all frames share: the box around the lumen, the wire-free scan there, and where the phantom belongs."""
+    """What all frames share: the box around the lumen, the wire-free scan there, and the alignment of the phantom."""
 
     def __init__(self, run: Context, known: Known, given: list[Curve]) -> None:
         assert known.scans is not None
@@ -95,7 +95,7 @@ class _Tracing:
             )
 
     def part(self, number: int, earlier: Earlier[_Part]) -> _Part:
-        """One frame, which failed where it cannot be read."""
+        """Trace one frame; it has failed where its scan cannot be read."""
         run, frame = self.run.part(), self.frames[number]
         try:
             done, window, voxels = self.look(run, frame, self.headers[number], earlier)
@@ -108,7 +108,7 @@ class _Tracing:
     def look(
         self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
     ) -> tuple[Frame, tuple[float, float] | None, bytes]:
-        """One frame read, put in place and traced, the grey window of the wires so far and a hash of its voxels.
+        """Read, align and trace one frame; also the grey window that frames so far have set, and a hash of its voxels.
 
         LoadError where it cannot be read.
         """
@@ -162,7 +162,7 @@ def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame
 
 
 def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
-    """The curve of the last frame before this one that stands: it is to say which of two strands is the wire's."""
+    """The last good curve before this frame, which tells which of two strands is the wire's; NOTHING without one."""
     curves = (cleared(curve) for k in reversed(range(number)) if (curve := earlier(k).frame.curve) is not None)
     return next((curve for curve in curves if curve.status is FrameStatus.OK and len(curve.points_mm)), NOTHING)
 
@@ -196,8 +196,8 @@ def _given_traces(run: Context) -> list[Curve]:
 def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:
     """A warning where more of the traced wire runs in the plane of the scanner's rotation than by chance.
 
-    Of directions that are all alike a share of sin(limit_deg) lies so near to a plane, 0.17 at 10 degrees: a bend
-    passes through (5 % in half of the catalogue's scenes), and that is no news.
+    Of evenly distributed directions a share of sin(limit_deg) lies that near to a plane, 0.17 at 10 degrees. A bend may
+    pass through the plane (5 % in half of the catalogue's scenes) without a warning.
     """
     curves = [f.curve for f in frames if f.curve is not None and len(f.curve.points_mm)]
     marks = np.concatenate([np.asarray(c.in_plane) for c in curves]) if curves else np.zeros(0, bool)

@@ -20,7 +20,7 @@ from pipeline.status import FrameStatus
 
 
 def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
-    """The frames with their errors on the planes of their views, beside those of predictors with the same freedom."""
+    """The frames with their errors on the planes of their views, beside those of predictors that are shifted alike."""
     clues, config = _clues(run, known), run.config.compare
     ways = [] if clues is None else rival_ways(run, known)
     wires = run.share("compare", lambda i, _: rival_wires(run, known, *ways[i]), len(ways))
@@ -37,7 +37,7 @@ def compare_in_views(run: Context, known: Known) -> tuple[Frame, ...]:
     )
     if not limited:
         return tuple(frames)
-    # a wire cannot lie farther from its vessel's middle than the vessel is wide: what is left is registration
+    # a wire cannot lie farther from its vessel's middle than the vessel's radius: the rest is a registration error
     run.log.warnings.insert(0, limited)
     run.log.chosen["label"] = limited
     return tuple(replace(frame, nulls_rms_mm={}) for frame in frames)
@@ -77,7 +77,7 @@ def screen_seen(view: View) -> Screen:
 
 
 def _limited(frames: Sequence[Frame], clues: Clues, config: CompareConfig) -> str:
-    """What is to be said where even the vessel's middle lies farther from the wire than the vessel is wide."""
+    """A warning where even the centreline lies farther from the wire than the lumen's radius; empty elsewhere."""
     known = [frame for frame in frames if frame.ok and "centreline" in frame.nulls_rms_mm]
     if not known or clues.centreline is None:
         return ""

@@ -134,7 +134,7 @@ class WithoutJacobian(RivalWire):
 
 
 class WithJacobian(WithoutJacobian):
-    """With the wall's own sparse Jacobian; and scene A, in which no wall is asked."""
+    """With the wall's own sparse Jacobian; and scene A, which has no wall."""
 
     name = "Exudyn"
     segments_a = (5, 10, 20, 50, 100, 200)

@@ -4,9 +4,9 @@ Bodies lie about the nodes, so that the first hinge is half a cell behind the cl
 and is first order). The plugin's stiffness is explicit: the mass is scaled so that the fastest bending mode is stable
 at the time step, and joints are damped critically for the slowest.
 
-The wall is asked between the two halves of a step, where the places are those of now. After a whole step they are
-those before it; a force one step late is a negative damping of dt times the wall's stiffness, more than the joints
-take away, and the wire flew apart soon after it had touched.
+The wall's force is computed between the two halves of a step, when positions are current. After a whole step they are
+those before it; a force one step late is a negative damping of dt times the wall's stiffness, more than the joints take
+away, and the wire flew apart soon after it had touched.
 """
 
 import mujoco
@@ -17,9 +17,9 @@ from pipeline.model import Array
 
 DT_S = 0.002
 SAFETY = 0.005
-"""Share of the mass that an explicit step would need: joints damped implicitly carry the fast modes; by hand."""
+"""Share of the mass that an explicit step would need: joints damped implicitly carry the fast modes; tuned by hand."""
 WALL_SAFETY = 1.4
-"""The same for the wall, which nothing damps implicitly: more than 1, by hand (0.8 times the time of 2)."""
+"""The same for the wall, which nothing damps implicitly: more than 1, tuned by hand (0.8 times the time of 2)."""
 STILL_MM = 1e-3
 """Relative to the slowest mode's own pace: a node that moves slower than this times its frequency is at rest.
 In scene B with 30 segments no node is 1e-3 mm from where a limit 10,000 times tighter leaves it."""

@@ -18,12 +18,12 @@ ITERATIONS = 5
 KEEP = {"cantilever": 0.7, "bend": 0.9}
 """Share of the momentum kept from one step to the next, tuned by hand at 20 and 30 segments."""
 MASS_A = 2e-7
-"""Of the whole wire in scene A: light enough to rest in about 50 steps, heavy enough not to overshoot."""
+"""Mass of the whole wire in scene A: light enough to rest in about 50 steps, heavy enough not to overshoot."""
 STILL_MM = {"cantilever": 1e-6, "bend": 1e-5}
 """A step that moves no node by more ends the wait; ten times tighter changes the answers by less than 1 %."""
 MOST_STEPS = 4000
 GRAVITY = np.array([0.0, -9.81, 0.0])
-"""The library's own, which its Python door cannot turn off; it is taken out of the velocity before each step."""
+"""The library's own gravity, which Python cannot turn off; it is taken out of the velocity before each step."""
 ALONG = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """The library twists about a segment's own y, so y is laid along the wire."""
 CORNERS = "--- +-- ++- -+- --+ +-+ +++ -++"
@@ -82,7 +82,7 @@ class Wire(RivalWire):
         return np.array([np.ravel(body.getPosition()) for body in self.bodies])
 
     def push(self, depth_mm: float) -> None:
-        """Move the held segment; the force is added to the velocity before each step, the only door for it."""
+        """Move the held segment; a force can only be given as a change of velocity before each step."""
         self.bodies[0].setPosition(np.array([0.0, 0.0, depth_mm - self.length_mm]))
         self.now = self.points()
         self.velocity = np.zeros_like(self.now)
