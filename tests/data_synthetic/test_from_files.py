@@ -210,5 +210,5 @@ def test_a_background_that_is_none_is_refused(tmp_path: Path, name: str) -> None
 def test_a_tree_too_wide_everywhere_has_no_way() -> None:
     """Its whole path was kept: an aorta holds no guide wire in place."""
     edges = np.column_stack([np.arange(len(TRUNK) - 1), np.arange(1, len(TRUNK))])
-    with pytest.raises(ValueError, match="no path with radii from 3.0 down to 0.7 mm"):
+    with pytest.raises(ValueError, match=r"no path with radii from 3\.0 down to 0\.7 mm"):
         widest_path(Tree(TRUNK, np.full(len(TRUNK), 4.0), edges))
