@@ -51,10 +51,15 @@ MOST_NAMED = 4
 """Places that a warning names; the largest."""
 
 
+def counted(places: Sequence[object]) -> str:
+    """Their number in words: 1 place, 2 places."""
+    return f"{len(places)} place{'s' * (len(places) != 1)}"
+
+
 def named(places: Sequence[Contact]) -> str:
     """The largest places in words, each with its area."""
     largest = sorted(places, key=lambda c: -c.area_mm2)[:MOST_NAMED]
-    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm^2)" for c in largest)
+    return ", ".join(f"{[float(round(x, 1)) for x in c.place_mm]} ({c.area_mm2:.1f} mm²)" for c in largest)
 
 
 def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
@@ -62,7 +67,7 @@ def warning(places: tuple[Contact, ...]) -> tuple[str, ...]:
     if not places:
         return ()
     return (
-        f"segment: vessels that run side by side are open to each other in {len(places)} place(s), allowed 0; largest "
+        f"segment: vessels that run side by side are open to each other in {counted(places)}, allowed 0; largest "
         f"at {named(places)} mm; a simulated wire may slip across there: look at the picture, scan with smaller voxels,"
         " or give the lumen as a file (manifest key lumen)",
     )

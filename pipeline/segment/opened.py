@@ -9,6 +9,7 @@ from scipy.ndimage import map_coordinates
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Array, Curve, Lumen
 from pipeline.segment._kernels.solids import cones
+from pipeline.segment.contact import counted
 from solver.grid import Grid, read_only
 
 OUTSIDE_VOXELS = 1.0
@@ -45,7 +46,7 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bo
     deepest, place = max(said, key=lambda one: one[0])
     where = ", ".join(f"{x:.1f}" for x in place)
     text = (
-        f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {len(said)} place(s), allowed "
+        f"segment: traced wires ran up to {deepest:.2f} mm outside the lumen in {counted(said)}, allowed "
         f"{OUTSIDE_VOXELS * voxel:.2f} and {SIGMAS:g} standard deviations; furthest at [{where}] mm; the lumen was "
         "opened there: look whether vessel is missing, or "
         + ("correct the file of the lumen" if given else "give the lumen as a file (manifest key lumen)")

@@ -53,7 +53,7 @@ def out_of_round(image: Subtraction, points: Array, sigma: float) -> tuple[Array
     window = np.ones(width) / width
     axis = np.convolve(image.along(points), window, "same")
     usual = float(np.median(axis))
-    smooth = np.abs(np.convolve(harmonic, window, "same")) / np.maximum(axis, 0.3 * usual)
+    smooth = np.abs(np.convolve(harmonic, window, "same")) / np.maximum(axis, max(0.3 * usual, 1e-9))
     independent = max(1.0, min(OVER_MM, width * step) / (INDEPENDENT_VOXELS * image.voxel))
     noise = image.noise_in(CREST_VOXELS) * np.sqrt(4.0 / ANGLES / independent) / max(usual, 1e-9)
     return np.asarray(smooth, float), float(noise)
