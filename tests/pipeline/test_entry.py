@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve
+from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
-from pipeline.simulate.clamp import Prior, Seen, _left_out, depth_from, estimated_clamp
+from pipeline.simulate.clamp import Prior, Seen, _left_out, depth_from, estimated_clamp, moved
 from solver import GuideWire, Insertion, Solution
+from solver.relax import base_frame
 
 VOXEL_MM = 0.3
 PRIOR = Prior(0.5 * VOXEL_MM, 2.0)
@@ -139,3 +143,19 @@ def test_traces_are_not_blamed_where_most_of_them_fit_no_clamp() -> None:
     assert "disagree" not in most
     assert "frames 0, 1, 2, 3" in most
     assert "check roll" in most
+
+
+def test_a_clamp_that_is_turned_keeps_the_material_axis_that_was_not_stated() -> None:
+    """Of the turned clamp another world axis is least along the direction: a roll meant 90 degrees more."""
+    case = SimpleNamespace(
+        entry_mm=(0.0, 0.0, 0.0), entry_direction=(0.101, 0.055, 0.993), material_axis=None, down=None,
+        entry_sigma_mm=None, entry_direction_sigma_deg=2.0,
+    )  # fmt: skip
+    lumen = SimpleNamespace(distance=SimpleNamespace(spacing_mm=np.full(3, VOXEL_MM)))
+    given, _, _ = manifest_clamp(cast(Any, SimpleNamespace(case=case)), cast(Any, SimpleNamespace(lumen=lumen)))
+    for tilts in ((0.0, 0.0), (-0.1, 0.05), (0.05, -0.1), (0.1, 0.1)):
+        clamp = moved(given, np.array([0.0, 0.0, 0.0, *tilts]))
+        first = base_frame(clamp.direction, clamp.material_axis, 0.0)[:, 0]
+        assert (
+            angle_deg(first, np.array([0.0, 1.0, 0.0])) < 12.0
+        )  # the turn itself, 8 degrees at most, and what was tilted before

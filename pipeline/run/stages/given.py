@@ -30,12 +30,18 @@ def _faint(frame: Frame) -> Curve | None:
 
 
 def manifest_clamp(run: Context, known: Known) -> tuple[Clamp, Prior, float]:
-    """The clamp as the manifest has it, how well it knows it, and the voxels' size, mm."""
+    """The clamp as the manifest has it, how well it knows it, and the voxels' size, mm.
+
+    A material axis that is not stated is chosen here, once: by the direction of a clamp that is turned later, another
+    world axis may be the one least along it, and every roll would change by 90 degrees.
+    """
     case = run.case
     assert known.lumen is not None
     voxel = float(np.mean(known.lumen.distance.spacing_mm))
-    axis, down = (None if v is None else np.array(v) for v in (case.material_axis, case.down))
     direction = np.array(case.entry_direction) / np.linalg.norm(case.entry_direction)
+    least = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    axis = least if case.material_axis is None else np.array(case.material_axis)
+    down = None if case.down is None else np.array(case.down)
     given = Clamp(np.array(case.entry_mm), direction, axis, down)
     sigma = ENTRY_SIGMA_VOXELS * voxel if case.entry_sigma_mm is None else case.entry_sigma_mm
     return given, Prior(sigma, case.entry_direction_sigma_deg), voxel
