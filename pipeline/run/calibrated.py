@@ -34,6 +34,8 @@ def as_calibrated(
                 read[path] = read_parameters(path)
             found = read[path]
             changed = _with_clamp(case, with_parameters(case, found, data_of(case)), found)
+            if own:
+                changed = changed.model_copy(update={"calibrated_scans": ()})
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]
             continue

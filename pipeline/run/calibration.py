@@ -38,13 +38,15 @@ class CalibrationError(InputError):
 class Gathered:
     """Calibration cases and their insertions.
 
-    stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     left_out : cases that
+    stated_mm : the depth that the manifest states for each fitted frame, NaN where none.     voxels : by which each
+    case's scans are known again.     left_out : cases that
     cannot be used, and why.     notes : assumptions and warnings of all cases.
     """
 
     cases: tuple[Case, ...]
     trials: tuple[Trial, ...]
     stated_mm: tuple[np.ndarray[Any, np.dtype[np.float64]], ...]
+    voxels: tuple[tuple[str, ...], ...]
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -70,7 +72,7 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
 
     CalibrationError where none is left.
     """
-    kept, trials, stated, left_out, notes = [], [], [], [], []
+    kept, trials, stated, voxels, left_out, notes = [], [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
         run = Context(case, config, store, log)
@@ -85,11 +87,12 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         kept.append(case)
         trials.append(trial_of(run, known, known.frames, roll_free=case.roll_deg == "fit"))
         stated.append(np.array([frame.expected_mm for frame in frames]))
+        voxels.append(tuple(frame.voxels for frame in known.frames if frame.voxels))
     if not trials:
         for note in notes:
             say(note)
         raise CalibrationError(left_out)
-    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(left_out), tuple(notes))
+    return Gathered(tuple(kept), tuple(trials), tuple(stated), tuple(voxels), tuple(left_out), tuple(notes))
 
 
 def all_unknowns(cases: Sequence[Case]) -> tuple[Unknown, ...]:
@@ -146,7 +149,8 @@ def design(cases: Sequence[Case], config: Config, store: Store) -> tuple[list[Pr
 
 def used_by(found: Gathered) -> list[dict[str, Any]]:
     """The cases that were calibrated with, as parameters.toml names them."""
-    return [{"case": case.id, "group": case.group, "data": list(data_of(case))} for case in found.cases]
+    pairs = zip(found.cases, found.voxels, strict=True)
+    return [{"case": case.id, "group": case.group, "data": [*data_of(case), *voxels]} for case, voxels in pairs]
 
 
 def file_in(out: Path) -> Path:

@@ -60,7 +60,7 @@ class Result:
     frames : status, sentence, stage and message of each.     failures, summary : rows of those tables.
     key : of everything that the result depends on; empty where it is to be computed again.     phantom : of what the
     vessel was taken from, the same for insertions into the same; empty where the frames alone show it.     scans :
-    of the contents of each frame or trace.     details :
+    of the contents of each frame or trace, and of the voxels of each frame.     details :
     settings, inputs, counters, assumptions and what else the pages show.
     """
 
@@ -131,7 +131,8 @@ def result_of(case: Case, known: Known, summary: dict[str, Any], key: str, detai
     head = (case.id, case.role, case.group, summary["status"], sentence)
     source = case.lumen or case.reference
     phantom = "" if source is None else digest(source)
-    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, data_of(case), details)
+    scans = (*data_of(case), *(frame.voxels for frame in known.frames if frame.voxels))
+    return Result(*head, frames, failure_rows(case.id, known), summary, key, phantom, scans, details)
 
 
 def untold(name: str) -> Result:

@@ -90,6 +90,7 @@ class Case(Strict):
     parameters: PathText | None = None
     calibrated: Annotated[str, *FILLED_IN] = ""
     own_parameters: Annotated[str, *FILLED_IN] = ""
+    calibrated_scans: Annotated[tuple[str, ...], *FILLED_IN] = ()
     roll_deg: Finite | PerFrame | Literal["fit"] = 0.0
     roll_sigma_deg: NonNegative | None = None
     push_force_N: PerFrame | None = None

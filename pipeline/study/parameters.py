@@ -61,7 +61,7 @@ class Stated(Table):
 
 
 class Used(Table):
-    """A case that was calibrated with. data : SHA-256 of each of its frames and traces."""
+    """A case that was calibrated with. data : hashes of each of its frames and traces, and of its frames' voxels."""
 
     case: str
     group: str
@@ -137,6 +137,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Ca
         "wire": replace(case.wire, **profiles),
         "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=found.friction),
         "calibrated": _told(case, found, known_wall=stiffness is not None),
+        "calibrated_scans": tuple(scan for used in found.used for scan in used.data),
     }
     if case.roll_deg != "fit":
         rolls = case.roll_deg if isinstance(case.roll_deg, tuple) else (case.roll_deg,)
@@ -147,7 +148,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str]) -> "Ca
     own = sharing(found, data)
     if own:
         warning = f"its scans or traces were calibrated with (as case {own!r}): its errors say nothing about the model"
-        changes |= {"role": "calibration", "own_parameters": warning}
+        changes |= {"role": "calibration", "own_parameters": warning, "calibrated_scans": ()}
     return case.model_copy(update=changes)
 
 

@@ -109,7 +109,9 @@ def test_what_ends_with_a_stated_catheter_is_not_cleared_by_other_depths() -> No
 
 
 def test_a_copy_of_a_frame_is_no_third_that_agrees() -> None:
-    seen = once(dim([20.0, 30.0, 20.0], [8.0, 8.0, 8.0]), [b"a", b"b", b"a"])
+    read = [replace(f, voxels=v) for f, v in zip(dim([20.0, 30.0, 20.0], [8.0, 8.0, 8.0]), "aba", strict=True)]
+    seen = once(read)
+    assert once(read, ("b",))[1].status == FrameStatus.REPEATED.identifier
     assert seen[2].status == FrameStatus.REPEATED.identifier
     assert not any(f.ok for f in own_dim_ends(seen, 0.3)[0])
 

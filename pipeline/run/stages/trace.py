@@ -16,6 +16,7 @@ from pipeline.run.helpers import Earlier, nothing
 from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
+from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Context, Frame, Known
@@ -44,12 +45,13 @@ def trace_frames(run: Context, known: Known) -> Known:
     for part in parts:
         run.log.add(part.log)
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
-    frames, assumed = own_dim_ends(once([p.frame for p in parts], [p.voxels for p in parts]), voxel_mm)
+    frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
     run.log.assumptions += assumed
     frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
+    run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
@@ -63,14 +65,14 @@ def trace_frames(run: Context, known: Known) -> Known:
 class _Part(NamedTuple):
     """The result of one frame.
 
-    window : grey values of all pictures, set by the first frame with a trusted trace; None until then.     voxels : a
-    hash of its scan; empty where that could not be read.
+    window : grey values of all pictures, set by the first frame with a trusted trace; None until then.     seen : the
+    wire as the scan shows it, where the curve is the user's own.
     """
 
     frame: Frame
     window: tuple[float, float] | None
     log: Log
-    voxels: bytes = b""
+    seen: Curve | None = None
 
 
 class _Tracing:
@@ -98,23 +100,22 @@ class _Tracing:
         """Trace one frame; it has failed where its scan cannot be read."""
         run, frame = self.run.part(), self.frames[number]
         try:
-            done, window, voxels = self.look(run, frame, self.headers[number], earlier)
+            done, window, seen = self.look(run, frame, self.headers[number], earlier)
         except StageError as error:
             return _Part(frame.failed("load", error), None, run.log)
         length = 0.0 if done.curve is None else done.curve.length_mm
         run.log.progress("trace", number + 1, len(self.frames), f"{done.status} {length:.1f} mm")
-        return _Part(done, window, run.log, voxels)
+        return _Part(done, window, run.log, seen)
 
     def look(
         self, run: Context, frame: Frame, header: Header, earlier: Earlier[_Part]
-    ) -> tuple[Frame, tuple[float, float] | None, bytes]:
-        """Read, align and trace one frame; also the grey window that frames so far have set, and a hash of its voxels.
+    ) -> tuple[Frame, tuple[float, float] | None, Curve | None]:
+        """Read, align and trace one frame; also the grey window that frames so far have set, and ``_Part.seen``.
 
         LoadError where it cannot be read.
         """
         log = run.log
         volume = run.load(Crop(header, self.box, self.load), frame.index)
-        voxels = known_by(volume)
 
         def read_moved(motion: Motion) -> Volume:
             box = header.box_of(motion.moved(self.corners))
@@ -123,18 +124,18 @@ class _Tracing:
         with log.timed("trace", frame.index):
             here, shown, registration = put_in_place(volume, self.alignment, read_moved)
         log.count("trace", counters_of(registration))
-        done = self.follow(run, replace(frame, registration=registration), here, earlier)
+        frame = replace(frame, registration=registration, voxels=known_by(volume))
+        seen = self.follow(run, frame, here, earlier)
+        done = _as_given(run, frame, self.given[frame.index]) if self.given else _of_scan(run, frame, seen)
         before = (earlier(k) for k in range(frame.index))
         window = next((part.window for part in before if part.window), None)
         if window is None and done.trusted_curve is not None:
             window = grey_window(shown, done.trusted_curve.points_mm)
-        return _pictured(done, shown, window or grey_window(shown)), window, voxels
+        return _pictured(done, shown, window or grey_window(shown)), window, seen if self.given else None
 
-    def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Frame:
-        """One frame with its wire, as the user's file has it or as it is traced."""
-        if self.given:
-            return _as_given(run, frame, self.given[frame.index])
-        curve = run.stored(
+    def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Curve:
+        """The wire that the scan of a frame shows."""
+        return run.stored(
             "trace",
             trace,
             here,
@@ -148,9 +149,13 @@ class _Tracing:
             opacity=run.case.wire.opacity,
             config=run.config.trace,
         )
-        if run.case.catheter is not None and np.isnan(frame.expected_mm):
-            curve = of_catheter(curve, frame.catheter_mm)
-        return _traced(frame, curve)
+
+
+def _of_scan(run: Context, frame: Frame, curve: Curve) -> Frame:
+    """The frame with the wire that its scan shows."""
+    if run.case.catheter is not None and np.isnan(frame.expected_mm):
+        curve = of_catheter(curve, frame.catheter_mm)
+    return _traced(frame, curve)
 
 
 def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
@@ -189,7 +194,7 @@ def _as_given(run: Context, frame: Frame, curve: Curve) -> Frame:
 def _given_traces(run: Context) -> list[Curve]:
     """The user's own curves, where the manifest names them."""
     if run.case.traces:
-        run.log.assumptions.append("the traced curves are the manifest's own files; no tracing was done")
+        run.log.assumptions.append("the traced curves are the manifest's own files")
     return [read_curve(source.path) for source in run.case.traces]
 
 
