@@ -255,6 +255,15 @@ def test_a_case_does_not_score_itself_under_another_name(study):
     assert "say nothing about the model" in notes[0]
 
 
+def test_scans_that_were_calibrated_with_are_looked_for_unless_they_are_to_be_scored(study):
+    """The same voxels in another file were scored as validation."""
+    cases = read_manifest(study / "manifest.toml").cases
+    (judged,), _ = as_calibrated([case for case in cases if case.id == "b"], study / "p.toml")
+    assert judged.calibrated_scans == read_parameters(study / "p.toml").used[0].data
+    scored, _ = as_calibrated(cases, study / "p.toml", own=True)
+    assert not any(case.calibrated_scans for case in scored)
+
+
 def test_one_frame_in_common_is_enough(study):
     text = (study / "manifest.toml").read_text(encoding="utf-8").replace('traces = ["3.csv"]', 'traces = ["0.csv"]')
     (study / "manifest.toml").write_text(text, encoding="utf-8")

@@ -518,6 +518,28 @@ def test_the_same_voxels_in_other_files_are_one_insertion(
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
 
 
+def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finished: Path, tmp_path: Path) -> None:
+    """Curves given to the wrong frames were ok, at 0.04 mm and a skill of 0.998."""
+    folder, said = tmp_path / "study", []
+    shutil.copytree(study, folder)
+    manifest = folder / "manifest.toml"
+    kept = [line for line in manifest.read_text(encoding="utf-8").splitlines() if not line.startswith("insertion_mm")]
+    manifest.write_text("\n".join(kept).replace("[[case]]", '[[case]]\ntraces = "own/*.csv"'), encoding="utf-8")
+    (folder / "own").mkdir()
+    with h5py.File(finished / "cases" / "bifurcation" / "frames.h5") as file:
+        curves = [group["traced_mm"][:] for _, group in sorted(file["frames"].items())]
+    for order in (curves, curves[::-1]):
+        for number, curve in enumerate(order):
+            np.savetxt(folder / "own" / f"{number:03d}.csv", curve, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+        run(folder, tmp_path / "out", "--until", "compare", "--fresh")
+        result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
+        said.append([text for text in result["warnings"] if "own curves are not where the scans show" in text])
+    assert not said[0]
+    (text,) = said[1]
+    assert "frame 0: " in text
+    assert "mm longer" in text
+
+
 def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path, tmp_path: Path) -> None:
     """Shards are merged by copying folders together; their tables are those of a run of all cases, byte by byte."""
     both, sweep = two_cases(study, tmp_path / "study"), ("--sweep", "simulate.wall_scale=2")
