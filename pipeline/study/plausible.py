@@ -1,6 +1,7 @@
 """What a manifest says and hardly can be: a wire that no guide wire is, an entry that leads out of the scan."""
 
 from collections.abc import Iterable, Iterator
+from operator import attrgetter
 
 import numpy as np
 
@@ -76,3 +77,17 @@ def _to_the_edge(case: Case, header: Header, sign: float) -> float:
     limit = np.where(step > 0.0, np.array(header.shape) - 0.5, -0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(max(0.0, np.nanmin(np.where(step != 0.0, (limit - start) / step, np.inf))))
+
+
+MEASURES = "compare.skip_mm", "compare.sample_mm", "compare.simulated_nulls", "trace.length_tolerance_mm"
+"""Settings that decide what counts as an error."""
+
+
+def measured_otherwise(config: Config) -> list[str]:
+    """A sentence for each setting that decides what counts as an error and is not the default."""
+    read = [attrgetter(name) for name in MEASURES]
+    return [
+        f"{name} = {value(config)} where the default is {value(Config())}: errors and skill are not those of the default"
+        for name, value in zip(MEASURES, read, strict=True)
+        if value(config) != value(Config())
+    ]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,6 +17,8 @@ from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import Way, scored
 from pipeline.model import Curve, Lumen, arc_length
+from pipeline.run.stages.compare import _too_near
+from pipeline.run.stages.known import Frame
 from solver import Solution, Status
 from solver.grid import Grid
 from tests.naive import curves as naive
@@ -234,3 +239,15 @@ def test_the_distal_errors_are_of_the_last_millimetres() -> None:
     curve = np.column_stack([arc, np.where(arc > 35.0, 1.0, 0.0), 0 * arc])
     result = compare(simulated(line(40.0)), traced(curve), open_space())
     assert result["distal10_rms_mm"] > result["distal20_rms_mm"] > result["rms_mm"] > 0.0
+
+
+@pytest.mark.parametrize(("off_mm", "sigma_mm", "said"), [(4e-16, 0.05, 1), (0.02, 0.05, 0), (4e-16, np.nan, 0)])
+def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
+    off_mm: float, sigma_mm: float, said: int
+) -> None:
+    """A simulator that handed the traces back came first, without a word. Own curves state no uncertainty."""
+    curve = Curve(np.zeros((5, 3)), np.full(5, sigma_mm))
+    errors = cast(Any, SimpleNamespace(error_mm=np.full(5, off_mm)))
+    warnings = _too_near([Frame(0, curve=curve, comparison=errors), Frame(1)])
+    assert len(warnings) == said
+    assert all("made from the traces" in text for text in warnings)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from pipeline.load.order import natural_key
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible
+from pipeline.study.plausible import implausible, measured_otherwise
+from pipeline.study.settings import Config
 
 GOOD = """
 schema = 1
@@ -167,3 +169,11 @@ def test_real_wires_are_no_warning(tmp_path: Path, radius_mm: float, modulus_gpa
     stiffness = 1000.0 * modulus_gpa * math.pi * radius_mm**4 / 4.0
     text = GOOD.replace("0.18", str(radius_mm)).replace("[30.0, 5.0]", f"[30.0, {stiffness}]")
     assert implausible(read_manifest(written(tmp_path, text)).cases) == []
+
+
+def test_settings_that_change_what_an_error_is_are_said() -> None:
+    """With compare.skip_mm = 0 the stretch that the clamp was fitted on flattered the error, and only a table told."""
+    plain = Config()
+    assert measured_otherwise(plain) == []
+    (said,) = measured_otherwise(replace(plain, compare=replace(plain.compare, skip_mm=0.0)))
+    assert said.startswith("compare.skip_mm = 0.0 where the default is 10.0")

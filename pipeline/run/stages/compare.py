@@ -1,10 +1,13 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from pipeline.compare import compare, compare_truth
+from pipeline.compare.metrics import rms
 from pipeline.compare.nulls import Clues, Seen, score
 from pipeline.model import Array, Curve
 from pipeline.run.log import Log
@@ -29,6 +32,7 @@ def compare_frames(run: Context, known: Known) -> Known:
         entered, simulated = _simulated_otherwise(run, known, clues.known_ways)
         clues.known_ways()
     known = replace(known, frames=_all_compared(run, known, clues, simulated))
+    run.log.warnings += _too_near(known.frames)
     with run.log.timed("compare"):
         known = replace(known, entries=four_entries(run, known, entered, clues.way) if entered else ())
     return budgeted(run, known)
@@ -83,6 +87,25 @@ def _clues(run: Context, known: Known) -> Clues | None:
         return None
     deepest = max(curves, key=lambda curve: curve.length_mm)
     return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, deepest.points_mm)
+
+
+NEAREST = 0.2
+"""Share of the traces' standard deviation below which no wire lies near them that does not know them."""
+
+
+def _too_near(frames: Sequence[Frame]) -> list[str]:
+    """A warning where wires lie nearer to the traces than these can be known."""
+    compared = [(f.comparison, f.curve) for f in frames if f.ok and f.comparison is not None and f.curve is not None]
+    if not compared:
+        return []
+    off = rms(np.concatenate([comparison.error_mm for comparison, _ in compared]))
+    sigma = float(np.median(np.concatenate([curve.sigma_mm for _, curve in compared])))
+    if not off < NEAREST * sigma:
+        return []
+    return [
+        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, which are known to {sigma:.2g} mm: only "
+        "wires that were made from the traces are so near; their errors say nothing about a simulator"
+    ]
 
 
 def _trusted_before(frames: tuple[Frame, ...]) -> Iterator[Array | None]:

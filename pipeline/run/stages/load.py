@@ -10,7 +10,7 @@ from pipeline.load.geometry import LoadError
 from pipeline.load.views import read_views
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.study.manifest import Case, not_one_per_frame
-from pipeline.study.plausible import implausible, leads_out
+from pipeline.study.plausible import implausible, leads_out, measured_otherwise
 
 
 def open_case(run: Context, known: Known) -> Known:
@@ -18,7 +18,7 @@ def open_case(run: Context, known: Known) -> Known:
     case = run.case
     with run.log.timed("load"):
         scans = read_headers(case.reference, case.frames, run.config.load, case.spacing_mm)
-    run.log.assumptions += [*case.unconfirmed, *_axis_assumed(case), *scans.assumed]
+    run.log.assumptions += [*case.unconfirmed, *_axis_assumed(case), *scans.assumed, *measured_otherwise(run.config)]
     count = len(scans.frames) or case.frame_count
     wrong = not_one_per_frame(case.lists, count)
     if wrong:
