@@ -87,7 +87,7 @@ def measured_otherwise(config: Config) -> list[str]:
     """A sentence for each setting that decides what counts as an error and is not the default."""
     read = [attrgetter(name) for name in MEASURES]
     return [
-        f"{name} = {value(config)} where the default is {value(Config())}: errors and skill are not those of the default"
+        f"{name} = {value(config)} where the default is {value(Config())}: errors are not those of the default"
         for name, value in zip(MEASURES, read, strict=True)
         if value(config) != value(Config())
     ]
