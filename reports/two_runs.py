@@ -12,6 +12,9 @@ from reports.diff import Difference
 SHOWN = 30
 """Regressions that a text names; JSON and JUnit have all."""
 
+NOT_JUDGED = "not judged"
+"""The word on two runs of which nothing was compared: a gate must not stay open for that."""
+
 Judged = Literal["worse", "holds", "withheld"]
 
 
@@ -40,15 +43,19 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """worse, moved or not worse."""
+        """worse, moved, not judged (no value was held against another) or not worse."""
         if self.judged == "worse" or len(self.frames.regressions):
             return "worse"
-        return "moved" if len(self.frames.moved) else "not worse"
+        if len(self.frames.moved):
+            return "moved"
+        return "not worse" if self.judged == "holds" or self.frames.judged else NOT_JUDGED
 
     @property
     def sentence(self) -> str:
         """The verdict in a line."""
         pooled = "; over all frames it is worse" * (self.judged == "worse") + f"; {self.caveat}" * bool(self.caveat)
+        if self.word == NOT_JUDGED:
+            return f"NOTHING WAS JUDGED: no error of the first run could be held against one of the second{pooled}"
         return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
 
     def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:

@@ -231,6 +231,7 @@ def test_a_run_that_ended_before_frames_are_compared_is_no_baseline(
     own = tmp_path / "forces.toml"
     own.write_text("max_penetration_mm = 0.02", encoding="utf-8")
     assert main(["diff", str(second), str(second), "--tolerance", str(own)]) == 0, "asked for"
+    assert "no error of the simulated wire is judged frame by frame" in capsys.readouterr().out.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("text", "said"), [("status = 1", "status holds no number"), (None, "no such file")])
@@ -308,6 +309,21 @@ def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
     verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
     assert "a\\|b &lt;c&gt;" in _markdown(verdict)
     assert replace(verdict, judged="worse").closed
+
+
+def test_where_nothing_was_judged_no_gate_stays_open(first: Path, tmp_path: Path) -> None:
+    """Equal statuses and a ratio that is withheld were called "not worse"."""
+    from reports.diff import diff_folders
+    from reports.two_runs_files import write
+
+    verdict = Verdict((first, first), [], [], "", "withheld", diff_folders(first, first, {"insertion_mm": 5.0}))
+    assert verdict.closed
+    assert verdict.lines()[-1].startswith("NOTHING WAS JUDGED")
+    assert "not worse" not in "".join(verdict.lines())
+    write(verdict, junit=tmp_path / "diff.xml", html=tmp_path / "diff.html")
+    assert [f.get("type") for f in ET.parse(tmp_path / "diff.xml").findall(".//failure")] == ["not_judged"]
+    assert "not judged" in (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert not replace(verdict, judged="holds").closed
 
 
 def test_a_baseline_without_numbers_leaves_no_gate_open(
