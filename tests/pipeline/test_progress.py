@@ -48,6 +48,22 @@ def test_the_first_run_says_that_it_compiles_with_quiet_too(tmp_path: Path, monk
     assert stream.getvalue().startswith("[a] compiling the solver, once per installation")
 
 
+def test_an_empty_folder_for_machine_code_is_not_taken_for_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any NUMBA_CACHE_DIR was, so that a fresh one of a build server took its minute without a word."""
+    monkeypatch.setattr(case_module, "_kernels_loaded", lambda: 0.0)
+    store = tmp_path / "numba"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(store))
+    for name, said in (("", True), ("_kernels_1a2b/tube.py311.nbi", True), ("_kernels_3c4d/newton.py311.nbi", False)):
+        if name:
+            (store / name).parent.mkdir(parents=True)
+            (store / name).touch()
+        stream = io.StringIO()
+        load_kernels(CaseProgress("a", tmp_path / "log.txt", stream, quiet=True))
+        assert ("compiling the solver" in stream.getvalue()) is said, name
+
+
 def jobs(tmp_path: Path, count: int) -> list[Job]:
     cases = [Case.model_construct(id=f"c{n}") for n in range(count)]
     return [Job(case, resolve([]), tmp_path) for case in cases]
