@@ -8,8 +8,11 @@ UNCHANGED = "(plain)"
 
 def silent_points(sweep: pd.DataFrame) -> list[str]:
     """A sentence for each point of which no frame is ok, where the plain result has one that is."""
-    good = sweep.assign(frames_ok=pd.to_numeric(sweep["frames_ok"]).fillna(0))
-    points = good.groupby(["parameter", "value"], sort=False, dropna=False)["frames_ok"].sum()
-    if not points.loc[points.index.get_level_values("parameter") == UNCHANGED].sum():
+    good: dict[tuple[str, str], int] = {}
+    for row in sweep.to_dict("records"):
+        name = str(row["parameter"])
+        point = name, "" if name == UNCHANGED else str(row["value"])
+        good[point] = good.get(point, 0) + (0 if pd.isna(row["frames_ok"]) else int(row["frames_ok"]))
+    if not good.get((UNCHANGED, "")):
         return []
-    return [f"sweep point {parameter} = {value}: no frame is ok" for (parameter, value), n in points.items() if not n]
+    return [f"sweep point {name} = {value}: no frame is ok" for (name, value), count in good.items() if not count]
