@@ -72,7 +72,9 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))
         judged = int(totals.pooled.get("cases") or totals.cases)
-        over = f" over the {counted(judged, 'case')} that are scored" * (judged < totals.cases)
+        over = f" over the {counted(judged, 'case')} that {'is' if judged == 1 else 'are'} scored" * (
+            judged < totals.cases
+        )
         parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm{over} ({in_words(low, high, said)})")
         parts += filter(None, [in_short(totals.pooled)])
     if totals.unscored:
