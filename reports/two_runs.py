@@ -26,6 +26,7 @@ class Verdict:
     before, after) of overall.csv.     paired : the sentence on the ratio of their errors with its interval.
     judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
     caveat : what the last line has to add, as that the two were not measured alike.
+    alike : the sentence that nothing differs in where they come from; empty where something does.
     """
 
     runs: tuple[Path, Path]
@@ -35,6 +36,7 @@ class Verdict:
     judged: Judged
     frames: Difference
     caveat: str = ""
+    alike: str = ""
 
     @property
     def closed(self) -> bool:
@@ -83,5 +85,6 @@ class Verdict:
         ]
         verdict = f"Verdict: {self.word.upper()}{f'. {self.paired}' if self.paired else ''}\n"
         parts.insert(1 if self.differs else 0, verdict)
+        parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []
         gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"
         return [*parts, f"{self.sentence}: {gate}"]

@@ -102,6 +102,7 @@ def _markdown(verdict: Verdict) -> str:
     parts = [
         f"**{_cell(verdict.sentence)}**\n",
         f"first: {first}, second: {second}\n",
+        f"{_cell(verdict.alike)}\n" * bool(verdict.alike),
         f"{_cell(verdict.paired)}\n" * bool(verdict.paired),
     ]
     for head, table in verdict.tables().items():

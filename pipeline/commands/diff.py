@@ -90,7 +90,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
     from reports.case_files import find_cases
     from reports.diff import diff_folders, not_judged
-    from reports.origin import what_differs
+    from reports.origin import told_alike, what_differs
     from reports.tolerance import RATIO
     from reports.two_runs import Judged, Verdict
 
@@ -116,7 +116,7 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
     caveat = "; ".join(filter(None, (otherwise, unpaired, not_judged(tolerance))))
-    return Verdict((first, second), differs, pooled, said, judged, frames, caveat)
+    return Verdict((first, second), differs, pooled, said, judged, frames, caveat, told_alike(first, second))
 
 
 def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:
