@@ -44,5 +44,5 @@ def _check_errors(given: Iterable[str], path: Path) -> None:
     if not set(given) & set(errors):
         raise ValueError(
             f"{path}: found {', '.join(given)}: no error, so that errors of any size would pass; name at least rms_mm, "
-            f"as in rms_mm = 0.03; errors are {', '.join(errors)}"
+            f"as in rms_mm = 0.03; one is needed of {', '.join(errors)}"
         )
