@@ -220,6 +220,9 @@ def _limits(node: Schema, exact: bool) -> str:
     limits = {
         word: node[key] for key, word in LIMITS.items() if exact or abs(node.get(key, VAST)) < VAST if key in node
     }
+    if "maxLength" in node:
+        least = f"{node['minLength']} to" if node.get("minLength") else "at most"
+        return f" of {least} {node['maxLength']} characters"
     return "".join(f" {word} {bound:g}".replace("e+0", "e") for word, bound in limits.items())
 
 

@@ -48,6 +48,12 @@ class Difference:
         return rows.loc[times.sort_values(ascending=False, kind="stable").index]
 
     @property
+    def judged(self) -> bool:
+        """Whether a value that may become worse was held against another: equal statuses say nothing of errors."""
+        directed = self.rows["column"].isin([column.name for column in ERRORS if column.better])
+        return bool((directed & self.rows["change"].notna()).any())
+
+    @property
     def moved(self) -> pd.DataFrame:
         """The rows that are neither worse nor better, but another thing than before."""
         return self.rows[self.rows["verdict"] == "moved"]
@@ -136,6 +142,15 @@ def diff_folders(
         what = "nothing to hold against: no frame of it is ok and has an error that the tolerance names"
         raise ValueError(f"{out_a}: {what}; a run that ended before frames are compared has none")
     return replace(diff_tables(before, after, tolerance, damaged), empty=empty)
+
+
+def not_judged(tolerance: Mapping[str, float]) -> str:
+    """What the last line adds where the tolerance names no error of the simulated wire; empty where it does."""
+    names = [name for name in tolerance if name != RATIO]
+    lengths = {name for name in names if ERRORS[name].unit == "mm" and ERRORS[name].better == "low"}
+    if any(name not in BEFORE_COMPARE and not name.startswith("u_") for name in lengths):  # u_: what is not known
+        return ""
+    return f"no error of the simulated wire is judged frame by frame: the tolerance names {', '.join(names)} alone"
 
 
 def _has_numbers(table: pd.DataFrame, tolerance: Mapping[str, float]) -> bool:

@@ -25,6 +25,7 @@ from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
 from reports.page import Each, draw_sections, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
+from reports.sweep import silent_points
 from reports.tables import read_if_there
 from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
 from reports.viewer import viewer_data
@@ -118,6 +119,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
         "cases": _content.cases(summary, links),
         "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
+        "sweep_silent": silent_points(files.sweep),
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
         "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
         "version": _version(infos),

@@ -36,6 +36,17 @@ def what_differs(before: Path, after: Path) -> list[dict[str, str]]:
     return [{"what": name, "before": a, "after": b} for name, a, b in rows if a != b]
 
 
+def told_alike(before: Path, after: Path) -> str:
+    """The sentence on two output folders of which nothing differs; empty where something does, or was not kept."""
+    results = [result for out in (before, after) for result in results_in(out).values()]
+    kept = all(result.get(key) is not None for result in results for key in ("config", "provenance", "inputs"))
+    if not results or not kept or what_differs(before, after):
+        return ""
+    if any(result["provenance"].get("git_dirty") for result in results):
+        return "nothing differs in settings, commit and inputs; files were changed since the commit, how is not kept"
+    return "nothing differs in settings, code and inputs"
+
+
 def mixed_settings(*outs: Path) -> str:
     """Why nothing may be pooled over the cases of output folders: their settings differ; empty where they do not."""
     made = {

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 from reports.schema import ERRORS
@@ -14,7 +15,8 @@ RATIO = "rms_ratio"
 def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
     """Read column = allowed change, with the shipped one of the ratio over all frames where the file has none.
 
-    Raises ValueError for a file without columns, an unknown column, and a negative, infinite or absent number.
+    Raises ValueError for a file without columns, or without one of an error, an unknown column, and a negative,
+    infinite or absent number.
     """
     if not path.is_file():
         raise ValueError(f"{path}: no such file; a tolerance is a TOML file of lines such as rms_mm = 0.03")
@@ -28,5 +30,19 @@ def load_tolerance(path: Path = DEFAULT_TOLERANCE) -> dict[str, float]:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not 0 <= value < math.inf:
             raise ValueError(f"{path}: {name} = {value!r}; give the allowed change, a number from 0 up")
+    _check_errors(table, path)
     shipped = {} if RATIO in table else {RATIO: load_tolerance()[RATIO]}
     return {name: float(value) for name, value in table.items()} | shipped
+
+
+def _check_errors(given: Iterable[str], path: Path) -> None:
+    """Refuse columns of which none is an error: a gate that no error closes would say "not worse" of any.
+
+    The ratio alone is no gate either: it is withheld below three insertions.
+    """
+    errors = [column.name for column in ERRORS if column.unit == "mm" and column.better == "low"]
+    if not set(given) & set(errors):
+        raise ValueError(
+            f"{path}: found {', '.join(given)}: no error, so that errors of any size would pass; name at least rms_mm, "
+            f"as in rms_mm = 0.03; one is needed of {', '.join(errors)}"
+        )

@@ -12,6 +12,9 @@ from reports.diff import Difference
 SHOWN = 30
 """Regressions that a text names; JSON and JUnit have all."""
 
+NOT_JUDGED = "not judged"
+"""The word on two runs of which nothing was compared: a gate must not stay open for that."""
+
 Judged = Literal["worse", "holds", "withheld"]
 
 
@@ -23,6 +26,7 @@ class Verdict:
     before, after) of overall.csv.     paired : the sentence on the ratio of their errors with its interval.
     judged : worse where that closes the gate, holds, or withheld where there are too few insertions to tell.
     caveat : what the last line has to add, as that the two were not measured alike.
+    alike : the sentence that nothing differs in where they come from; empty where something does.
     """
 
     runs: tuple[Path, Path]
@@ -32,6 +36,7 @@ class Verdict:
     judged: Judged
     frames: Difference
     caveat: str = ""
+    alike: str = ""
 
     @property
     def closed(self) -> bool:
@@ -40,15 +45,19 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """worse, moved or not worse."""
+        """worse, moved, not judged (no value was held against another) or not worse."""
         if self.judged == "worse" or len(self.frames.regressions):
             return "worse"
-        return "moved" if len(self.frames.moved) else "not worse"
+        if len(self.frames.moved):
+            return "moved"
+        return "not worse" if self.judged == "holds" or self.frames.judged else NOT_JUDGED
 
     @property
     def sentence(self) -> str:
         """The verdict in a line."""
         pooled = "; over all frames it is worse" * (self.judged == "worse") + f"; {self.caveat}" * bool(self.caveat)
+        if self.word == NOT_JUDGED:
+            return f"NOTHING WAS JUDGED: no error of the first run could be held against one of the second{pooled}"
         return f"{self.word.upper() if self.closed else self.word + ' than is allowed'}: {self.frames.sentence}{pooled}"
 
     def tables(self, most: int = SHOWN) -> dict[str, pd.DataFrame]:
@@ -76,5 +85,6 @@ class Verdict:
         ]
         verdict = f"Verdict: {self.word.upper()}{f'. {self.paired}' if self.paired else ''}\n"
         parts.insert(1 if self.differs else 0, verdict)
+        parts[:0] = [f"{self.alike[0].upper()}{self.alike[1:]}.\n"] if self.alike else []
         gate = "exit 1, the gate closes" if self.closed else "exit 0, the gate stays open"
         return [*parts, f"{self.sentence}: {gate}"]

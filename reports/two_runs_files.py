@@ -19,7 +19,7 @@ from reports.page import write_page
 from reports.schema import ERRORS, SUMMARY, Column
 from reports.simulators import folders_in
 from reports.tolerance import RATIO
-from reports.two_runs import Verdict
+from reports.two_runs import NOT_JUDGED, Verdict
 
 ON_PAGE = 1000
 """Regressions that a page names; JSON and JUnit have all."""
@@ -102,6 +102,7 @@ def _markdown(verdict: Verdict) -> str:
     parts = [
         f"**{_cell(verdict.sentence)}**\n",
         f"first: {first}, second: {second}\n",
+        f"{_cell(verdict.alike)}\n" * bool(verdict.alike),
         f"{_cell(verdict.paired)}\n" * bool(verdict.paired),
     ]
     for head, table in verdict.tables().items():
@@ -117,6 +118,8 @@ def _suites(verdict: Verdict) -> list[tuple[str, list[Outcome]]]:
     whole = Outcome("over all frames")
     if verdict.judged == "worse":
         whole = replace(whole, verdict="failed", kind=RATIO, message=verdict.paired)
+    elif verdict.word == NOT_JUDGED:
+        whole = replace(whole, verdict="failed", kind="not_judged", message=verdict.sentence)
     elif verdict.judged == "withheld":
         whole = replace(whole, verdict="skipped", message=verdict.paired or "no frame counts in both runs")
     rows = verdict.frames.rows

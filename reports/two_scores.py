@@ -27,6 +27,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
     judged: Judged = "holds"
     for word in ("withheld", "worse"):
         judged = word if any(part.judged == word for part in parts.values()) else judged
+    told = list(dict.fromkeys(part.alike for part in parts.values()))
     return Verdict(
         runs,
         _differs(parts),
@@ -35,6 +36,7 @@ def together(runs: tuple[Path, Path], parts: Mapping[str, Verdict], gone: list[s
         judged,
         Difference(rows, empty),
         "; ".join(dict.fromkeys(part.caveat for part in parts.values() if part.caveat)),
+        "; ".join(told) if all(told) and not lone else "",
     )
 
 

@@ -154,6 +154,30 @@ def test_manifests_of_the_manual_fit_the_schema_and_the_code(tmp_path: Path) -> 
         ManifestTables.model_validate(tomllib.loads(text), context={"folder": tmp_path})
 
 
+def _jobs_of_ci() -> list[dict[str, Any]]:
+    """The job of each file for a build server."""
+    yaml = pytest.importorskip("yaml")  # comes with the extra docs
+    github, gitlab = (yaml.safe_load(text) for text in blocks(DOCS / "howto" / "ci.md", "yaml"))
+    return [github["jobs"]["gate"], gitlab["gate"]]
+
+
+def test_files_for_build_servers_are_yaml_and_keep_compiled_code() -> None:
+    github, gitlab = _jobs_of_ci()
+    for variables in (github["env"], gitlab["variables"]):
+        assert {"WIREVAL", "NUMBA_CACHE_DIR", "WIREVAL_CACHE"} <= variables.keys()
+        assert all("/.cache/" in variables[name] for name in ("NUMBA_CACHE_DIR", "WIREVAL_CACHE"))
+    assert next(step for step in github["steps"] if "cache" in step.get("uses", ""))["with"]["path"] == ".cache"
+    assert gitlab["cache"]["paths"] == [".cache"]
+
+
+def test_files_for_build_servers_install_wireval_and_not_the_user_s_repository() -> None:
+    """`pip install .` did; nothing was kept, so that each job compiled."""
+    for text in blocks(DOCS / "howto" / "ci.md", "yaml"):
+        assert 'pip install "$WIREVAL"' in text
+        assert "NUMBA_CACHE_DIR" in text
+        assert "pip install ." not in text
+
+
 def test_the_layout_of_projections_in_the_manual_is_read(tmp_path: Path) -> None:
     (text,) = blocks(DOCS / "adapters.md", "json")
     (tmp_path / "projections.json").write_text(text, encoding="utf-8")

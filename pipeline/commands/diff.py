@@ -34,7 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression; InputError on wrong input."""
+    """Exit 0 when nothing got worse than the tolerance allows, 1 on a regression, or where nothing could be judged.
+
+    InputError on wrong input.
+    """
     from pipeline.run.launch import UsageError
     from pipeline.toml_words import not_toml
     from reports.case_files import find_cases
@@ -86,8 +89,8 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     from pipeline.run.ledger import RESULT
     from pipeline.run.overall import damaged, found_cases, golden_cases, ratio
     from reports.case_files import find_cases
-    from reports.diff import diff_folders
-    from reports.origin import what_differs
+    from reports.diff import diff_folders, not_judged
+    from reports.origin import told_alike, what_differs
     from reports.tolerance import RATIO
     from reports.two_runs import Judged, Verdict
 
@@ -112,8 +115,8 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
     unpaired = "over all frames nothing is judged: no frame has points in both runs" * (paired is None)
     said = paired.verdict(allowed, otherwise) if paired else ""
     pooled = _pooled(with_another(first, before), with_another(second, after))
-    caveat = "; ".join(filter(None, (otherwise, unpaired)))
-    return Verdict((first, second), differs, pooled, said, judged, frames, caveat)
+    caveat = "; ".join(filter(None, (otherwise, unpaired, not_judged(tolerance))))
+    return Verdict((first, second), differs, pooled, said, judged, frames, caveat, told_alike(first, second))
 
 
 def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:

@@ -207,9 +207,18 @@ def _kernels_loaded() -> float:
     return perf_counter() - clock
 
 
+def _compiled() -> bool:
+    """Whether machine code of the solver is on disk: beside its sources, or where NUMBA_CACHE_DIR says."""
+    own, place = Path(solver.__file__).parent, os.environ.get("NUMBA_CACHE_DIR")
+    if not place:
+        return any(own.rglob("*.nbi"))
+    # numba puts code there below the name of the sources' folder and a hash; that of the imaging stages lies beside it
+    kernels = {path.stem for path in own.glob("_kernels/**/*.py")}
+    return any(path.name.partition(".")[0] in kernels for path in Path(place).rglob("_kernels_*/*.nbi"))
+
+
 def load_kernels(progress: CaseProgress) -> None:
     """Compile or load the solver's kernels before anything is timed; compiling is announced even with -q or a bar."""
-    cached = any(Path(solver.__file__).parent.rglob("*.nbi")) or os.environ.get("NUMBA_CACHE_DIR")
-    if not cached:
+    if not _compiled():
         progress.warn("compiling the solver, once per installation: half a minute to two")
     progress.write(f"compiled code ready in {_kernels_loaded():.2f} s")

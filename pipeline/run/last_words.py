@@ -17,11 +17,13 @@ from reports.alike import alike
 from reports.case_files import counted, left_over_sentence
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
+from reports.sweep import silent_points
+from reports.tables import read_if_there
 from reports.verdict import in_short, next_command, typed
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
-    """What went wrong, a line each (frames, cases, crashed points of a sweep), and what comes next.
+    """What went wrong, a line each (frames, cases, points of a sweep without a result), and what comes next.
 
     then : what comes next, where it is not the run's own command for these cases.
     """
@@ -34,6 +36,7 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
         f"{folder}: {result.case}: {result.status}: {result.failures[0]['message']}"
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
+    lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
     then = then or _next(plan, cases)
     aside = [text] if (text := left_over_sentence(plan.out)) else []
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
@@ -69,7 +72,9 @@ def last_line(totals: Totals, index: Path) -> str:
         parts.append(f"median point error {totals.median_mm:.3f} mm (p95 {totals.p95_mm:.3f})")
         low, high, said = (totals.pooled[name] for name in ("rms_low_mm", "rms_high_mm", "interval"))
         judged = int(totals.pooled.get("cases") or totals.cases)
-        over = f" over the {counted(judged, 'case')} that are scored" * (judged < totals.cases)
+        over = f" over the {counted(judged, 'case')} that {'is' if judged == 1 else 'are'} scored" * (
+            judged < totals.cases
+        )
         parts.append(f"rms {totals.pooled['rms_mm']:.3f} mm{over} ({in_words(low, high, said)})")
         parts += filter(None, [in_short(totals.pooled)])
     if totals.unscored:

@@ -18,7 +18,9 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextC
 from rich.table import Column
 
 from pipeline.run.case import Job
+from pipeline.run.ledger import RESULT
 from pipeline.run.log import STAGES
+from reports.case_files import GOOD, counted, read_json
 
 EVERY_S = 0.3
 STEP = re.compile(rf"\] ({'|'.join(STAGES)}) (\d+)/(\d+)  ")
@@ -31,6 +33,19 @@ def share_done(log: str) -> float:
     stage, done, total = (STEP.findall(log) or [(STAGES[0], 0, 1)])[-1]
     before = sum(share for name, share in WORK.items() if STAGES.index(name) < STAGES.index(stage))
     return before + WORK[stage] * int(done) / max(int(total), 1)
+
+
+def became(folder: Path) -> str:
+    """What became of a case, by its result.json; just that it is finished where that cannot be read."""
+    try:
+        result = read_json(folder / RESULT)
+    except (ValueError, OSError):
+        return "finished"
+    status, numbers = str(result.get("status", "ok")), result.get("summary", {})
+    good, planned = numbers.get("frames_ok") or 0, numbers.get("frames") or 0
+    if status in GOOD or good == planned > 0:
+        return "finished"
+    return f"finished, {good} of {counted(planned, 'frame')} ok" if good else f"failed: {status}"
 
 
 @dataclass
@@ -62,7 +77,7 @@ class Watch:
         passed = time.time() - self._start
         rest = f", about {_clock(passed / done * (total - done))} left" if done < total else ""
         what = job.label if job.pictures else f"{job.label} with {job.out.name}"
-        self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or 'finished'}\n")
+        self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or became(job.folder)}\n")
         self.stream.flush()
 
     @contextmanager

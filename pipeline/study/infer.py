@@ -76,8 +76,8 @@ def _deeper(folder: Path) -> str:
         return ""
     names = ", ".join(found[:3]) + f" and {len(found) - 3} more" * (len(found) > 3)
     return (
-        f"; further down are scans: {names}; move each frame's own folder or file up into {folder.name}/frames, or "
-        "list them in a manifest (frames = [...])"
+        f"; further down are scans: {names}; move each frame's own folder or file up into "
+        f"{folder.resolve().name}/frames, or list them in a manifest (frames = [...])"
     )
 
 

@@ -46,6 +46,12 @@ __all__ = [
     "score",
 ]
 
+
+def __dir__() -> list[str]:
+    """What a notebook completes: what is promised, without the modules and names that are imported for it."""
+    return sorted([*__all__, *(name for name in globals() if name.startswith("__"))])
+
+
 Place = str | Path
 Settings = Mapping[str, bool | float | str | Sequence[object]]
 """``{"solver.segment_mm": 0.5}``: what --set takes, by table.key; `wireval settings` lists them."""

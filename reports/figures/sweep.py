@@ -10,9 +10,9 @@ from reports.colours import SIMULATED, TRUE
 from reports.figures._drawing import Drawing, lattice, legend, plain
 from reports.figures._style import GREY, Look
 from reports.figures.run import RunFiles
+from reports.sweep import UNCHANGED
 from reports.tables import has
 
-UNCHANGED = "(plain)"  # the parameter of the rows of sweep.csv in which nothing was changed
 POOLED = "(all)"  # the case of the rows over all cases
 _LOG_FROM_RATIO = 5.0
 _STYLES: tuple[tuple[str, str, Look], ...] = (

@@ -330,6 +330,33 @@ def test_each_gate_is_a_test(study: Path, tmp_path: Path, capsys: pytest.Capture
     assert "gate closed" in str(suite[0][0].get("message"))
 
 
+def test_a_refused_command_leaves_no_summary_of_an_earlier_one(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A build server read the file of the run before, in which all had passed."""
+    old = [tmp_path / f"old.{name}" for name in ("xml", "json", "md", "html")]
+    for path in old:
+        path.write_text("passed", encoding="utf-8")
+    assert main(["run", str(tmp_path / "none"), "-o", str(tmp_path / "out"), "--junit", str(old[0])]) == 2
+    assert not old[0].exists()
+    old[0].touch()
+    names = ("junit", "json", "markdown", "html")
+    asked = [word for name, path in zip(names, old, strict=True) for word in (f"--{name}", str(path))]
+    assert main(["diff", str(tmp_path / "a"), str(tmp_path / "b"), *asked]) == 2
+    assert not any(path.exists() for path in old)
+
+
+def test_what_a_command_reads_is_no_summary(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest, kept = study / "manifest.toml", tmp_path / "junit.xml"
+    for given in (study, manifest):
+        assert main(["run", str(given), "-o", str(tmp_path / "out"), "--junit", str(manifest)]) == 2
+        assert "the command reads this file" in capsys.readouterr().err
+    assert manifest.is_file()
+    kept.touch()
+    assert main(["run", str(study), "-o", str(tmp_path / "out"), "--junit", str(kept), "--dry-run"]) == 0
+    assert kept.exists(), "a dry run does nothing"
+
+
 def test_check_does_not_say_that_nothing_was_run(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(study / "none.toml")]) == 2
     assert "nothing was run" not in capsys.readouterr().err

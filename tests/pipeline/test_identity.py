@@ -161,7 +161,7 @@ def test_dicom_is_found_in_a_folder(tmp_path: Path, name: str) -> None:
     assert [path.name for path in _scans_in(below, None)[1]] == ["f2", "f10"]
 
 
-def test_scans_further_down_are_named(tmp_path: Path) -> None:
+def test_scans_further_down_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An archive's patient/study/series was "found no scans", and nobody was told where they lie."""
     assert _deeper(tmp_path) == ""
     for number in range(5):
@@ -174,3 +174,5 @@ def test_scans_further_down_are_named(tmp_path: Path) -> None:
         in said
     )
     assert f"up into {tmp_path.name}/frames" in said
+    monkeypatch.chdir(tmp_path)
+    assert f"up into {tmp_path.name}/frames" in _deeper(Path()), "it was /frames, of the disk"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,8 @@ def test_one_population_everywhere(study: Path) -> None:
     assert f"median point error {np.median(good):.3f} mm" in line
     interval = f"95 %: {whole['rms_low_mm']:.3f} to {whole['rms_high_mm']:.3f}, wide: 4 ins"
     assert f"rms {rms:.3f} mm over the 4 cases that are scored ({interval}" in line
+    one = replace(totals, pooled={**totals.pooled, "cases": 1})
+    assert "mm over the 1 case that is scored (" in last_line(one, study / "index.html")
     page = render_index(study).read_text(encoding="utf-8")
     assert f"<b>{rms:.3f}</b>" in page
     curve = pd.read_csv(study / "figures" / "planned_within.csv")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import time
 from dataclasses import replace
@@ -46,6 +47,22 @@ def test_the_first_run_says_that_it_compiles_with_quiet_too(tmp_path: Path, monk
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     load_kernels(CaseProgress("a", tmp_path / "log.txt", stream, quiet=True))
     assert stream.getvalue().startswith("[a] compiling the solver, once per installation")
+
+
+def test_an_empty_folder_for_machine_code_is_not_taken_for_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Any NUMBA_CACHE_DIR was, so that a fresh one of a build server took its minute without a word."""
+    monkeypatch.setattr(case_module, "_kernels_loaded", lambda: 0.0)
+    store = tmp_path / "numba"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(store))
+    for name, said in (("", True), ("_kernels_1a2b/tube.py311.nbi", True), ("_kernels_3c4d/newton.py311.nbi", False)):
+        if name:
+            (store / name).parent.mkdir(parents=True)
+            (store / name).touch()
+        stream = io.StringIO()
+        load_kernels(CaseProgress("a", tmp_path / "log.txt", stream, quiet=True))
+        assert ("compiling the solver" in stream.getvalue()) is said, name
 
 
 def jobs(tmp_path: Path, count: int) -> list[Job]:
@@ -95,6 +112,25 @@ def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:
     silent.finished(batch[0])
     assert len(stream.getvalue().splitlines()) == 2
     assert not Watch(batch, lines=True, stream=Terminal()).bar
+
+
+def test_a_line_says_what_became_of_a_case(tmp_path: Path) -> None:
+    """A case without a lumen was "finished", as any other."""
+    stream, batch = io.StringIO(), jobs(tmp_path, 5)
+    results = (("ok", 2, 2), ("segment_failed", 0, 2), ("no_wire", 1, 2), ("simulated", 0, 0))
+    for job, (status, good, frames) in zip(batch, results, strict=False):
+        job.folder.mkdir(parents=True)
+        result = {"status": status, "summary": {"frames_ok": good, "frames": frames}}
+        (job.folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    watch = Watch(batch, stream=stream)
+    for job in batch:
+        watch.finished(job)
+    said = [
+        line.rpartition(": c")[2] if "failed" not in line else line[-27:] for line in stream.getvalue().splitlines()
+    ]
+    assert said[0] == "0 finished"
+    assert said[1].endswith("c1 failed: segment_failed")
+    assert said[2:] == ["2 finished, 1 of 2 frames ok", "3 finished", "4 finished"]
 
 
 def test_lines_name_the_simulator_where_there_are_several(tmp_path: Path) -> None:

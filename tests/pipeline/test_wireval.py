@@ -26,6 +26,11 @@ def test_everything_that_is_promised_is_there_and_says_what_it_is() -> None:
     assert promised | {"score", "calibrate", "Grid", "relax", "InputError"} <= set(wireval.__all__)
 
 
+def test_what_a_notebook_completes_is_what_is_promised() -> None:
+    """json, sys, Path, BAD_INPUT, parsed and carried_out stood among the names."""
+    assert [name for name in dir(wireval) if not name.startswith("__")] == sorted(wireval.__all__)
+
+
 def test_a_check_gives_sentences(study: Path, tmp_path: Path) -> None:
     assert wireval.check(study) == []
     assert wireval.check(tmp_path / "none.toml") == [f"{tmp_path / 'none.toml'}: no such manifest"]

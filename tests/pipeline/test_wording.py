@@ -107,6 +107,7 @@ def test_no_wrong_setting_is_told_in_foreign_words() -> None:
         ("entry_mm", "[1, 2]", "entry_mm = [1, 2]: expected [number, number, number], each from -10000 to 10000"),
         ("wire", "5", "case 'a': wire 5 is not among [wires.*]; allowed: w"),
         ("push_force_N", "[]", "a list (not empty) of numbers"),
+        ("group", f'"{"g" * 400}"', "expected a text of 1 to 200 characters"),
         ("lumen", "5", "expected the name of a file in quotes, or {file = ..., label = ...}"),
         ("simulated", "5", "or a table {files = ..., space = ..., unit = ...}"),
         ("entry", '"run1"', 'expected "case:ID", with the id of another case'),

@@ -123,6 +123,10 @@ def test_a_folder_without_cases_is_no_reference(tmp_path: Path) -> None:
         ("rms_mm = 'x'", "from 0 up"),
         ("rms_mm = inf", "from 0 up"),
         ("# nothing", "names no column"),
+        ("rms_ratio = 0.05", "found rms_ratio: no error, .* name at least rms_mm"),
+        ("insertion_mm = 5", "name at least rms_mm"),
+        ("iterations = 1000\ncoverage = 2", "found iterations, coverage: no error"),
+        ("null_shortest_rms_mm = 1", "name at least rms_mm"),
     ],
 )
 def test_wrong_tolerances_are_refused(tmp_path: Path, text: str, hint: str) -> None:

@@ -15,6 +15,7 @@ from pipeline.run import ledger
 from pipeline.run.overall import Ratio
 from reports import tables
 from reports.junit import Outcome, write_junit
+from reports.origin import told_alike
 from reports.schema import ERRORS, POINTS, SIMULATORS
 from reports.two_runs import Verdict
 from reports.two_runs_files import _markdown
@@ -55,8 +56,23 @@ def test_the_same_twice_is_not_worse(first: Path, capsys: pytest.CaptureFixture[
     assert main(["diff", str(first), str(first)]) == 0
     said = capsys.readouterr().out
     assert "What differs" not in said
+    assert said.splitlines()[0] == "Nothing differs in settings, code and inputs."
     assert "the error of no validation frame changed" in said
     assert said.splitlines()[-1].startswith("not worse")
+
+
+def test_what_is_not_known_to_be_the_same_is_not_called_so(first: Path, second: Path, tmp_path: Path) -> None:
+    """Of two baselines of tables alone nothing is kept; of changed files, that there were some."""
+    golden = shutil.copytree(first, tmp_path / "golden", ignore=shutil.ignore_patterns("*.json"))
+    assert told_alike(golden, golden) == ""
+    assert told_alike(first, golden) == ""
+    for name in GROUPS:
+        path = second / "cases" / name / "result.json"
+        result = json.loads(path.read_text(encoding="utf-8"))
+        result["provenance"]["git_dirty"] = True
+        path.write_text(json.dumps(result), encoding="utf-8")
+    assert told_alike(first, second) == ""
+    assert "files were changed since the commit" in told_alike(second, second)
 
 
 def test_what_differs_is_said_first(first: Path, second: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,6 +87,7 @@ def test_what_differs_is_said_first(first: Path, second: Path, capsys: pytest.Ca
     assert main(["diff", str(first), str(second)]) == 0, "another commit alone is no regression"
     said = capsys.readouterr().out
     assert said.splitlines()[0] == "What differs between the runs:"
+    assert "othing differs" not in said
     for what in (f"{table}.{key}", "0123abc", "input of a: frames[4]", "input of b, c: frames[0]"):
         assert what in said
 
@@ -231,6 +248,7 @@ def test_a_run_that_ended_before_frames_are_compared_is_no_baseline(
     own = tmp_path / "forces.toml"
     own.write_text("max_penetration_mm = 0.02", encoding="utf-8")
     assert main(["diff", str(second), str(second), "--tolerance", str(own)]) == 0, "asked for"
+    assert "no error of the simulated wire is judged frame by frame" in capsys.readouterr().out.splitlines()[-1]
 
 
 @pytest.mark.parametrize(("text", "said"), [("status = 1", "status holds no number"), (None, "no such file")])
@@ -276,7 +294,9 @@ def test_two_scores_are_compared_simulator_by_simulator(
         "d, (all)": "0",
     }
     assert 'href="new/simulators/b/cases/b/report.html"' in page.read_text(encoding="utf-8")
+    capsys.readouterr()
     assert main(["diff", str(scores[0]), str(scores[0])]) == 0
+    assert capsys.readouterr().out.startswith("Nothing differs in settings, code and inputs.")
 
 
 @pytest.mark.parametrize(
@@ -308,6 +328,21 @@ def test_a_table_of_markdown_keeps_its_columns(first: Path) -> None:
     verdict = Verdict((first, first), [{"what": "a|b <c>", "before": "1", "after": "2"}], [], "", "holds", frames)
     assert "a\\|b &lt;c&gt;" in _markdown(verdict)
     assert replace(verdict, judged="worse").closed
+
+
+def test_where_nothing_was_judged_no_gate_stays_open(first: Path, tmp_path: Path) -> None:
+    """Equal statuses and a ratio that is withheld were called "not worse"."""
+    from reports.diff import diff_folders
+    from reports.two_runs_files import write
+
+    verdict = Verdict((first, first), [], [], "", "withheld", diff_folders(first, first, {"insertion_mm": 5.0}))
+    assert verdict.closed
+    assert verdict.lines()[-1].startswith("NOTHING WAS JUDGED")
+    assert "not worse" not in "".join(verdict.lines())
+    write(verdict, junit=tmp_path / "diff.xml", html=tmp_path / "diff.html")
+    assert [f.get("type") for f in ET.parse(tmp_path / "diff.xml").findall(".//failure")] == ["not_judged"]
+    assert "not judged" in (tmp_path / "diff.html").read_text(encoding="utf-8")
+    assert not replace(verdict, judged="holds").closed
 
 
 def test_a_baseline_without_numbers_leaves_no_gate_open(
