@@ -11,11 +11,13 @@ from reports.alike import alike
 from reports.case_files import (
     GOOD,
     CaseFiles,
+    amiss,
     counted,
     find_cases,
     left_out_sentence,
     left_over_sentence,
     not_reached,
+    not_run,
     not_run_sentence,
     read_case,
     read_json,
@@ -99,18 +101,18 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     infos = list(runs.values())
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
+    missing = not_run(out_dir)
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        **_headline(cases, "failures" if failures else "settings differ" if mixed else "ok", row),
+        **_headline(cases, _status(out_dir, failures, mixed), row, missing),
         "verdict": verdict(row, _simulator(cases)) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
-        "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
+        "next": next_command([*(f["case"] for f in failures), *missing], typed(out_dir) if len(infos) == 1 else ()),
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
-        "left_over": left_over_sentence(out_dir),
-        "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],
+        **_not_counted(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
@@ -191,16 +193,33 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
 
 
 def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
-    """Every case that can be read, and a failure for each that cannot: one bad file must not hide the others."""
+    """Every case that can be read, and a failure for each that has a bad file, or lost one: it must not hide others."""
     cases, broken = [], []
     for folder in find_cases(out_dir):
+        wrong = amiss(folder)
+        message = f"{folder}: {wrong}; run the case again" * bool(wrong)
         try:
             cases.append(read_case(folder, points=False, rest=False))
         except ValueError as error:
+            message = str(error)
+        if message:
             row = dict.fromkeys((*FAILURES.names, "link"), "") | {"case": folder.name, "stage": "report"}
-            row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": str(error)}
+            row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": message}
             broken.append(row)
     return cases, broken
+
+
+def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
+    """The worst that can be said of a run in a word or two."""
+    if failures:
+        return "failures"
+    return "cases missing" if not_run(out_dir) else "settings differ" if mixed else "ok"
+
+
+def _not_counted(out_dir: Path) -> dict[str, str]:
+    """Cases that no number of the page is over."""
+    said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
+    return {name: sentence(out_dir) for name, sentence in said.items()}
 
 
 def _simulator(cases: list[CaseFiles]) -> str:
@@ -208,14 +227,16 @@ def _simulator(cases: list[CaseFiles]) -> str:
     return next((case.simulator for case in cases if case.simulator), "")
 
 
-def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> dict[str, Any]:
+def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any], missing: Sequence[str]) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too.
 
-    status : ok, or what the badge says instead.
+    status : ok, or what the badge says instead.     missing : cases without a result here.
     """
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
-    sentence = f"{counted(len(cases), 'case')}, {counted(n_frames, 'frame')}: {n_good} ok"
+    absent = set(missing) - {case.name for case in cases}
+    of = f"{len(cases)} of " * bool(absent)
+    sentence = f"{of}{counted(len(cases) + len(absent), 'case')}, {counted(n_frames, 'frame')}: {n_good} ok"
     sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
     look = badge(status if cases else "failures", bool(cases) and status == "ok", row)
     name = _simulator(cases)

@@ -11,7 +11,17 @@ from matplotlib.backends.backend_pdf import PdfPages
 from reports import _content, colours
 from reports.alike import alike, of_what
 from reports.atomic import replacing
-from reports.case_files import WORST, CaseFiles, counted, not_reached, read_case, read_json, results_in, said_by_cases
+from reports.case_files import (
+    WORST,
+    CaseFiles,
+    counted,
+    not_reached,
+    not_run_sentence,
+    read_case,
+    read_json,
+    results_in,
+    said_by_cases,
+)
 from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
 from reports.origin import mixed_settings
@@ -63,6 +73,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
     page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
+    if missing := not_run_sentence(out_dir):
+        page.text(f"Of the study {missing}. Every number is over the other cases alone.", size=11, colour=colours.BAD)
     if len(failures):
         _failures(page, failures, out_dir)
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
