@@ -153,9 +153,9 @@ def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
     return ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
 
 
-def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
-    """One row per case, linked to its page."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary))
+def cases(summary: pd.DataFrame, links: Mapping[str, str], worse: Iterable[str] = ()) -> Grid:
+    """One row per case, linked to its page; those that failed are marked, and those that are worse than a guess."""
+    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary) | summary["case"].isin(list(worse)))
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

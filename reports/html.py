@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import pandas as pd
+
 from reports import _content
 from reports._content import flatten, settings, size
 from reports.alike import alike
@@ -28,7 +30,17 @@ from reports.origin import mixed_settings
 from reports.page import Each, draw_sections, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.tables import read_if_there
-from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import (
+    OF_CALIBRATION,
+    badge,
+    next_command,
+    typed,
+    unscored,
+    verdict,
+    worse_cases,
+    worse_sentence,
+    worst_frames,
+)
 from reports.viewer import viewer_data
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
@@ -106,6 +118,7 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
         **_headline(cases, _status(out_dir, failures, mixed), row, missing),
+        **_worse_cases(summary, links),
         "verdict": verdict(row, _simulator(cases)) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
@@ -118,7 +131,6 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
-        "cases": _content.cases(summary, links),
         "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
         "provenance": [(name, list(flatten(run.get("provenance", {})))) for name, run in runs.items()],
@@ -214,6 +226,12 @@ def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
     if failures:
         return "failures"
     return "cases missing" if not_run(out_dir) else "settings differ" if mixed else "ok"
+
+
+def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:
+    """The table of the cases, and which of them are worse than a guess, whatever a number over all of them says."""
+    rows = summary.to_dict("records")
+    return {"cases": _content.cases(summary, links, worse_cases(rows)), "worse": worse_sentence(rows)}
 
 
 def _not_counted(out_dir: Path) -> dict[str, str]:

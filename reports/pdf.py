@@ -28,7 +28,7 @@ from reports.origin import mixed_settings
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import next_command, typed, unscored, verdict, worse_sentence, worst_frames
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
 _MOST_WARNINGS, _FOR_ASSUMPTIONS = 4, 0.25
@@ -73,6 +73,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
     page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
+    if worse := worse_sentence(summary.to_dict("records")):
+        page.text(worse, size=11, colour=colours.BAD)
     if missing := not_run_sentence(out_dir):
         page.text(f"Of the study {missing}. Every number is over the other cases alone.", size=11, colour=colours.BAD)
     if len(failures):

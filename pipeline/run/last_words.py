@@ -17,7 +17,7 @@ from reports.alike import alike
 from reports.case_files import counted, left_over_sentence
 from reports.origin import mixed_settings
 from reports.schema import SWEEP
-from reports.verdict import in_short, next_command, typed
+from reports.verdict import in_short, next_command, typed, worse_sentence
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
@@ -35,7 +35,8 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
         for folder, result in lost_points(plan.out, heads_of(plan.template.settings, plan.cases, plan.points))
     ]
     then = then or _next(plan, cases)
-    aside = [text] if (text := left_over_sentence(plan.out)) else []
+    worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
+    aside = [*filter(None, [left_over_sentence(plan.out), worse])]
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
 
 

@@ -343,3 +343,16 @@ def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
     assert "It is a calibration case and not scored" in text["learnt"]
     assert "That is better" not in text["learnt"]
     assert "That is better" in text["judged"]
+
+
+def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -> None:
+    """The index was green and said "That is better" of both together."""
+    out = write_run(tmp_path / "out", (FakeCase("a", 3), FakeCase("b", 3)))
+    rows = tables.read(out / "summary.csv", SUMMARY).assign(skill_strongest=[0.9, -0.6], strongest_null="previous")
+    tables.write(out / "summary.csv", SUMMARY, rows)
+    page = render_index(out).read_text(encoding="utf-8")
+    assert "<strong>1 of 2 cases is worse than a guess: b.</strong>" in page
+    assert '<span class="status poor">a case is worse than a guess</span>' in page
+    marked = re.findall(r'<tr class="bad"><td class="text">(?:<a[^>]*>)?(\w+)', page)
+    assert marked == ["b"]
+    assert "only marked rows" in page
