@@ -14,6 +14,8 @@ from reports.schema import ERRORS, SUMMARY, Column
 Grid = dict[str, Any]
 NOTHING = "–"
 _LEVEL = {"min", "median", "max"}
+_WITH_INTERVAL = ("rms_mm", "skill_strongest")
+"""Numbers at the head of a page that say so where they have no interval."""
 MOST_TILES = 6
 """Of the numbers at the head of a page so many are tiles, which a reader decides by; the others stand in a table."""
 
@@ -103,12 +105,18 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             column = SUMMARY[name]
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
-            interval_95 = f" (95 %: {ends})" if ends else ""
+            interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics) if name in _WITH_INTERVAL else ""
             named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
             part = fewer_frames(statistics) if name == "skill_strongest" else ""
             fewer = f"; {part}, of which all predictors have a guess (the rms beside it are over more)" * bool(part)
             shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}"})
     return shown
+
+
+def _withheld(statistics: Mapping[str, Any]) -> str:
+    """`` (no interval: 1 insertion)`` where the note on intervals says so; empty where it says something else."""
+    why, told, rest = str(statistics.get("interval")).partition("interval withheld: ")
+    return f" (no interval: {rest.partition(',')[0]})" if told and not why else ""
 
 
 def predictor_label(name: str) -> str:

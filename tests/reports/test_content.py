@@ -51,6 +51,20 @@ def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> Non
     assert _content.cards(entries, row | {"strongest_frames": 6})[0]["label"] == "skill"
 
 
+def test_a_tile_says_that_its_interval_is_withheld() -> None:
+    """It had none, without a word: that there are too few insertions stood on no first screen."""
+    entries = [{"column": name, "label": name} for name in ("rms_mm", "skill_strongest", "tip_median_mm")]
+    row = {"rms_mm": 0.2, "skill_strongest": 0.9, "tip_median_mm": 0.3}
+    withheld = row | {"interval": "interval withheld: 1 insertion, at least 3 needed"}
+    rms, skill, tip = (card["label"] for card in _content.cards(entries, withheld))
+    assert (rms, skill) == ("rms_mm (no interval: 1 insertion)", "skill_strongest (no interval: 1 insertion)")
+    assert tip == "tip_median_mm"
+    bounded = withheld | {"rms_low_mm": 0.1, "rms_high_mm": 0.3}
+    assert _content.cards(entries, bounded)[0]["label"] == "rms_mm (95 %: 0.100 to 0.300)"
+    for note in (None, "wide: 4 insertions; not bounded: rms_low_mm"):
+        assert _content.cards(entries, row | {"interval": note})[0]["label"] == "rms_mm"
+
+
 def test_a_caption_speaks_of_what_is_there() -> None:
     text = "Dashed: simulated{band|, in its band}{u_mm|; bars: u}."
     table = pd.DataFrame({"curve": ["simulated", "band"], "u_mm": [math.nan, math.nan]})
