@@ -109,8 +109,15 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
             part = fewer_frames(statistics) if name == "skill_strongest" else ""
             fewer = f"; {part}, of which all predictors have a guess (the rms beside it are over more)" * bool(part)
-            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}"})
+            fitted = _used_for_roll(statistics) if name == "frames_ok" else ""
+            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}{fitted}"})
     return shown
+
+
+def _used_for_roll(statistics: Mapping[str, Any]) -> str:
+    """`` (1 more used for the roll)`` beside a number of frames; empty without such a one."""
+    fitted = number(statistics.get("frames_fitted"))
+    return "" if fitted in (NOTHING, "0") else f" ({fitted} more used for the roll)"
 
 
 def _withheld(statistics: Mapping[str, Any]) -> str:

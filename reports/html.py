@@ -25,6 +25,7 @@ from reports.case_files import (
     read_json,
     said_by_cases,
 )
+from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
 from reports.page import Each, draw_sections, one_by_one, section, write_page
@@ -176,11 +177,20 @@ def _case_verdict(case: CaseFiles) -> str:
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
-    if planned and good != planned:
+    if fitted := case.statistics.get("frames_fitted"):
+        became = scans(good or 0, planned or 0, fitted, _scored_or_ok([case])) + "."
+    elif planned and good != planned:
         became = f"{good} of {counted(planned, 'frame')} have a result."
     scored = _scored(case)
     how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
     return " ".join(filter(None, (became, how)))
+
+
+def _scored_or_ok(cases: Sequence[CaseFiles]) -> str:
+    """What a frame with a result is called: not all are scored where parameters are learnt or nothing is compared."""
+    results = [case.result for case in cases]
+    learnt = any(result.get("role") == "calibration" or result.get("status") == "simulated" for result in results)
+    return "ok" if learnt else "scored"
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:
@@ -254,8 +264,11 @@ def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any], missi
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
     absent = set(missing) - {case.name for case in cases}
     of = f"{len(cases)} of " * bool(absent)
-    sentence = f"{of}{counted(len(cases) + len(absent), 'case')}, {counted(n_frames, 'frame')}: {n_good} ok"
-    sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
+    frames = f"{counted(n_frames, 'frame')}: {n_good} ok"
+    frames += f", {n_frames - n_good} without a result" * (n_good < n_frames)
+    if fitted := sum(case.statistics.get("frames_fitted") or 0 for case in cases):
+        frames = scans(n_good, n_frames, fitted, _scored_or_ok(cases))
+    sentence = f"{of}{counted(len(cases) + len(absent), 'case')}, {frames}."
     look = badge(status if cases else "failures", bool(cases) and status == "ok", row)
     name = _simulator(cases)
     title = " - ".join(filter(None, (name, "wireval")))

@@ -22,6 +22,7 @@ from reports.case_files import (
     results_in,
     said_by_cases,
 )
+from reports.counts import scans
 from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
 from reports.origin import mixed_settings
@@ -72,7 +73,10 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
-    page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
+    frames = f"{ok} of {counted(planned, 'frame')} have a result"
+    if fitted := int(summary["frames_fitted"].sum()):
+        frames = scans(ok, planned, fitted, "with a result")
+    page.text(f"{counted(len(summary), 'case')}, {frames}. {said}", size=11)
     if worse := worse_sentence(summary.to_dict("records")):
         page.text(worse, size=11, colour=colours.BAD)
     if missing := not_run_sentence(out_dir):

@@ -10,6 +10,7 @@ import pytest
 
 from reports import _content
 from reports.case_files import counted
+from reports.counts import scans
 
 
 @pytest.mark.parametrize(
@@ -63,6 +64,16 @@ def test_a_tile_says_that_its_interval_is_withheld() -> None:
     assert _content.cards(entries, bounded)[0]["label"] == "rms_mm (95 %: 0.100 to 0.300)"
     for note in (None, "wide: 4 insertions; not bounded: rms_low_mm"):
         assert _content.cards(entries, row | {"interval": note})[0]["label"] == "rms_mm"
+
+
+def test_a_frame_that_the_roll_was_fitted_on_is_counted_apart() -> None:
+    """Of six scans five were "5 of 5 frames"."""
+    assert scans(5, 5, 1, "scored") == "6 scans: 1 used for the roll, 5 scored"
+    assert scans(4, 5, 1, "scored") == "6 scans: 1 used for the roll, 4 scored, 1 without a result"
+    entries = [{"column": "frames_ok", "of": "frames", "label": "frames"}]
+    row = {"frames_ok": 5, "frames": 5}
+    assert _content.cards(entries, row | {"frames_fitted": 1})[0]["label"] == "of 5 frames (1 more used for the roll)"
+    assert _content.cards(entries, row | {"frames_fitted": 0})[0]["label"] == "of 5 frames"
 
 
 def test_a_caption_speaks_of_what_is_there() -> None:

@@ -356,3 +356,15 @@ def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -
     marked = re.findall(r'<tr class="bad"><td class="text">(?:<a[^>]*>)?(\w+)', page)
     assert marked == ["b"]
     assert "only marked rows" in page
+
+
+def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Path) -> None:
+    """Six scans were "Every frame is ok" and "5 frames: 5 ok"."""
+    out = write_run(tmp_path / "out", (FakeCase("a", 5),))
+    path = out / "cases" / "a" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result["summary"]["frames_fitted"] = 1
+    path.write_text(json.dumps(result), encoding="utf-8")
+    said = "6 scans: 1 used for the roll, 5 scored."
+    assert f'<p class="verdict">1 case, {said} ' in render_index(out).read_text(encoding="utf-8")
+    assert f'<p class="verdict">{said} The simulated' in render_case(out / "cases" / "a").read_text(encoding="utf-8")
