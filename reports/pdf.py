@@ -98,7 +98,8 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))
         frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
         text = textwrap.shorten(str(row["message"]), 300, placeholder="…")
-        page.text(f"{case}{frames}: {row['status']}. {text}")
+        files = f"{row['files']}. " * bool(row["files"])
+        page.text(f"{case}{frames}: {row['status']}. {files}{text}")
     if rest := sum(row["count"] for row in rows[_MOST_FAILURES:]):
         page.text(f"… and {rest} more in failures.csv")
     command = next_command(failures["case"], typed(out_dir))

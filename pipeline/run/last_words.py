@@ -45,7 +45,8 @@ def _failure(row: Mapping[str, Any]) -> str:
     several = row["count"] > 1
     of = f" frame{'s' * several} {row['frames']}" * bool(row["frames"])
     said = f"in frame {row['frame']}: {row['message']}" if several and row["message"] else row["message"]
-    return f"{row['case']}{of}: {row['status']}: {said or row['sentence']}"
+    files = f"{row['files']}; " * bool(row["files"])
+    return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
 
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from reports import figures, tables
 from reports.case_files import find_cases, read_case
 from reports.figures import Drawing, declared, figures_of
 from reports.html import render_case, render_index
-from reports.schema import ERRORS, SUMMARY
+from reports.schema import ERRORS, FAILURES, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -368,3 +368,12 @@ def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Pat
     said = "6 scans: 1 used for the roll, 5 scored."
     assert f'<p class="verdict">1 case, {said} ' in render_index(out).read_text(encoding="utf-8")
     assert f'<p class="verdict">{said} The simulated' in render_case(out / "cases" / "a").read_text(encoding="utf-8")
+
+
+def test_all_scans_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("a", 5, failed=(1, 3)),))
+    rows = tables.read(out / "failures.csv", FAILURES)
+    told = [f"s/frame_{n}.mha: the file is cut short" for n in rows["frame"]]
+    tables.write(out / "failures.csv", FAILURES, rows.assign(message=told))
+    page = render_index(out).read_text(encoding="utf-8")
+    assert "Files: frame_1.mha, frame_3.mha.<br>In frame 1: <code>s/frame_1.mha: the file is cut short</code>" in page
