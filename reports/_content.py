@@ -16,6 +16,7 @@ NOTHING = "–"
 _LEVEL = {"min", "median", "max"}
 _WITH_INTERVAL = ("rms_mm", "skill_strongest")
 """Numbers at the head of a page that say so where they have no interval."""
+_FEWER = "It is over the frames of which all predictors have a guess; the rms beside it are over more."
 MOST_TILES = 6
 """Of the numbers at the head of a page so many are tiles, which a reader decides by; the others stand in a table."""
 
@@ -94,8 +95,8 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
     """The numbers at the head of a page; those that do not apply are left out.
 
     entries : ``column`` and ``label`` of each, as in sections.toml; ``{name}`` within a column's name is the value of
-    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label. The number of
-    frames is said of a skill that is over fewer than the numbers beside it.
+    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label, ``why`` explains.
+    The number of frames is said of a skill that is over fewer than the numbers beside it.
     """
     shown = []
     for entry in entries:
@@ -108,9 +109,11 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics) if name in _WITH_INTERVAL else ""
             named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
             part = fewer_frames(statistics) if name == "skill_strongest" else ""
-            fewer = f"; {part}, of which all predictors have a guess (the rms beside it are over more)" * bool(part)
+            fewer = f" {part}" * bool(part)
+            why = " ".join(filter(None, (entry.get("why"), _FEWER * bool(part))))
             fitted = _used_for_roll(statistics) if name == "frames_ok" else ""
-            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}{fitted}"})
+            card = {"value": value, "label": f"{total}{entry['label']}{named}{fewer}{interval_95}{fitted}"}
+            shown.append(card | ({"why": why} if why else {}))
     return shown
 
 

@@ -84,7 +84,8 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     if len(failures):
         _failures(page, failures, out_dir)
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
-        page.text(f"{tile['value']}  {tile['label']}")
+        why = f". {tile['why']}" if "why" in tile else ""
+        page.text(f"{tile['value']}  {tile['label']}{why}")
     page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases", _MOST_WARNINGS)
     return page
 

@@ -47,9 +47,12 @@ def test_a_tile_may_be_the_number_that_another_column_names() -> None:
 def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> None:
     entries = [{"column": "skill_strongest", "label": "skill"}]
     row = {"skill_strongest": 0.9, "strongest_frames": 5, "frames_ok": 6}
-    label = _content.cards(entries, row)[0]["label"]
-    assert label == "skill; over 5 of 6 frames, of which all predictors have a guess (the rms beside it are over more)"
-    assert _content.cards(entries, row | {"strongest_frames": 6})[0]["label"] == "skill"
+    card = _content.cards(entries, row)[0]
+    assert card["label"] == "skill over 5 of 6 frames", "the reason made eight lines of a narrow tile"
+    assert card["why"].endswith("frames of which all predictors have a guess; the rms beside it are over more.")
+    assert _content.cards(entries, row | {"strongest_frames": 6}) == [{"value": "0.900", "label": "skill"}]
+    explained = [entries[0] | {"why": "1 is perfect."}]
+    assert _content.cards(explained, row)[0]["why"].startswith("1 is perfect. It is over")
 
 
 def test_a_tile_says_that_its_interval_is_withheld() -> None:
