@@ -7,6 +7,7 @@
 ``frames_file``    frames.h5: curves of every frame and projections of the scan, written and read
 ``export``         files for 3D Slicer and ParaView, LPS mm: .mrk.json, .vtp, .seg.nrrd
 ``case_files``     the folder of one case, read
+``counts``         how many frames a page speaks of, in words
 ``figures``        one function per figure: what is on disk -> figure and its table, or None without data
 ``sections.toml``  which figures a page shows, in order, with captions; the cards at its head
 ``html``           report.html of a case, index.html of a run

@@ -14,6 +14,9 @@ from reports.schema import ERRORS, SUMMARY, Column
 Grid = dict[str, Any]
 NOTHING = "–"
 _LEVEL = {"min", "median", "max"}
+_WITH_INTERVAL = ("rms_mm", "skill_strongest")
+"""Numbers at the head of a page that say so where they have no interval."""
+_FEWER = "It is over the frames of which all predictors have a guess; the rms beside it are over more."
 MOST_TILES = 6
 """Of the numbers at the head of a page so many are tiles, which a reader decides by; the others stand in a table."""
 
@@ -92,8 +95,8 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
     """The numbers at the head of a page; those that do not apply are left out.
 
     entries : ``column`` and ``label`` of each, as in sections.toml; ``{name}`` within a column's name is the value of
-    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label. The number of
-    frames is said of a skill that is over fewer than the numbers beside it.
+    that column; ``of`` names the column of a total, ``name`` that of a word that follows the label, ``why`` explains.
+    The number of frames is said of a skill that is over fewer than the numbers beside it.
     """
     shown = []
     for entry in entries:
@@ -103,12 +106,27 @@ def cards(entries: Iterable[Mapping[str, str]], statistics: Mapping[str, Any]) -
             column = SUMMARY[name]
             total = f"of {statistics[entry['of']]} " if entry.get("of") in statistics else ""
             ends = _interval(statistics, column)
-            interval_95 = f" (95 %: {ends})" if ends else ""
+            interval_95 = f" (95 %: {ends})" if ends else _withheld(statistics) if name in _WITH_INTERVAL else ""
             named = f" {predictor_label(statistics[entry['name']])}" if entry.get("name") else ""
             part = fewer_frames(statistics) if name == "skill_strongest" else ""
-            fewer = f"; {part}, of which all predictors have a guess (the rms beside it are over more)" * bool(part)
-            shown.append({"value": value, "label": f"{total}{entry['label']}{named}{interval_95}{fewer}"})
+            fewer = f" {part}" * bool(part)
+            why = " ".join(filter(None, (entry.get("why"), _FEWER * bool(part))))
+            fitted = _used_for_roll(statistics) if name == "frames_ok" else ""
+            card = {"value": value, "label": f"{total}{entry['label']}{named}{fewer}{interval_95}{fitted}"}
+            shown.append(card | ({"why": why} if why else {}))
     return shown
+
+
+def _used_for_roll(statistics: Mapping[str, Any]) -> str:
+    """`` (1 more used for the roll)`` beside a number of frames; empty without such a one."""
+    fitted = number(statistics.get("frames_fitted"))
+    return "" if fitted in (NOTHING, "0") else f" ({fitted} more used for the roll)"
+
+
+def _withheld(statistics: Mapping[str, Any]) -> str:
+    """`` (no interval: 1 insertion)`` where the note on intervals says so; empty where it says something else."""
+    why, told, rest = str(statistics.get("interval")).partition("interval withheld: ")
+    return f" (no interval: {rest.partition(',')[0]})" if told and not why else ""
 
 
 def predictor_label(name: str) -> str:
@@ -153,9 +171,9 @@ def _failed(summary: pd.DataFrame) -> "pd.Series[bool]":
     return ((summary["frames_failed"] > 0) | ~summary["status"].isin(GOOD)).fillna(value=True)
 
 
-def cases(summary: pd.DataFrame, links: Mapping[str, str]) -> Grid:
-    """One row per case, linked to its page."""
-    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary))
+def cases(summary: pd.DataFrame, links: Mapping[str, str], worse: Iterable[str] = ()) -> Grid:
+    """One row per case, linked to its page; those that failed are marked, and those that are worse than a guess."""
+    table = grid(summary, SUMMARY.shown("cases"), bad=_failed(summary) | summary["case"].isin(list(worse)))
     for row, name in zip(table["rows"], summary["case"], strict=True):
         row["cells"][0]["link"] = links.get(name, "")
     return table

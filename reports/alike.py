@@ -7,14 +7,16 @@ from typing import Any
 from reports.case_files import counted
 
 _SCAN = re.compile(r" \(scan [^()]*\)$")
+_FILE = re.compile(r"^(\S.*?): ")
+_MOST_FILES = 6
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of failures.csv, those of a case that differ in frame, scan and numbers alone as the first of them.
 
-    Each has ``count``, how many it stands for, and ``frames``, their numbers as a reader says them; empty for a whole
-    case.
+    Each has ``count``, how many it stands for, ``frames``, their numbers as a reader says them, empty for a whole
+    case, and ``files``, those that could not be read where they are several.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -23,8 +25,22 @@ def alike(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         groups.setdefault(key, []).append(row)
     return [
         {**own[0], "count": len(own), "frames": in_words([row["frame"] for row in own if _stated(row)])}
+        | {"files": _files(own)}
         for own in groups.values()
     ]
+
+
+def _files(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The files with which the messages of rows begin, no more than a few; empty unless they are several.
+
+    Without their folders, where that tells them apart.
+    """
+    heads = (_FILE.match(str(row.get("message") or "")) for row in rows)
+    paths = list(dict.fromkeys(head[1] for head in heads if head and re.search(r"[/\\]|\.\w+$", head[1])))
+    names = [re.split(r"[/\\]", path)[-1] for path in paths]
+    shown = names if len(set(names)) == len(names) else paths
+    rest = len(shown) - _MOST_FILES
+    return ", ".join(shown[:_MOST_FILES]) + f" and {rest} more" * (rest > 0) if len(shown) > 1 else ""
 
 
 def in_words(frames: Sequence[int]) -> str:

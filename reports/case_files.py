@@ -140,8 +140,32 @@ def left_over_sentence(out_dir: Path) -> str:
 
 def not_run_sentence(out_dir: Path) -> str:
     """Cases that the runs into a folder name and that have no result in it, as those of a shard that was not merged."""
-    names = listed([name for name, asked in _without_result(out_dir).items() if asked])
+    names = listed(not_run(out_dir))
     return f"named by the manifest and without a result here: {names}" * bool(names)
+
+
+def not_run(out_dir: Path) -> list[str]:
+    """Identifiers of these cases; those that were left out are not among them."""
+    return [name for name, asked in _without_result(out_dir).items() if asked]
+
+
+def amiss(folder: Path) -> str:
+    """Which file of a finished case is missing or of another size than its ledger.json says; empty where none is.
+
+    Pages and views are drawn again and not asked for; contents are not read.
+    """
+    try:
+        files = dict(read_json(folder / "ledger.json").get("files", {}))
+        known = {str(n): int(entry["bytes"]) for n, entry in files.items() if "/" not in n and n != "report.html"}
+    except (ValueError, TypeError, KeyError):
+        return "ledger.json cannot be read"
+    for name, expected in known.items():
+        path = folder / name
+        if not path.is_file():
+            return f"{name} is missing"
+        if path.stat().st_size != expected:
+            return f"{name} is not as it was written"
+    return ""
 
 
 def left_out_sentence(out_dir: Path) -> str:

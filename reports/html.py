@@ -5,29 +5,44 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import pandas as pd
+
 from reports import _content
 from reports._content import flatten, settings, size
 from reports.alike import alike
 from reports.case_files import (
     GOOD,
     CaseFiles,
+    amiss,
     counted,
     find_cases,
     left_out_sentence,
     left_over_sentence,
     not_reached,
+    not_run,
     not_run_sentence,
     read_case,
     read_json,
     said_by_cases,
 )
+from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
 from reports.page import Each, draw_sections, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import OF_CALIBRATION, badge, next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import (
+    OF_CALIBRATION,
+    badge,
+    next_command,
+    typed,
+    unscored,
+    verdict,
+    worse_cases,
+    worse_sentence,
+    worst_frames,
+)
 from reports.viewer import viewer_data
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
@@ -100,24 +115,24 @@ def render_index(out_dir: Path, embed: bool = False, each: Each = one_by_one) ->
     infos = list(runs.values())
     row = dict(whole.iloc[0]) if len(whole) else {}
     calibration = set(summary["case"][summary["role"] == "calibration"])
+    missing = not_run(out_dir)
     mixed, cases_said = mixed_settings(out_dir), zip(summary["role"], summary["status"], strict=True)
     why_none = mixed or unscored(cases_said) or not_reached(out_dir)
     page = {
-        **_headline(cases, "failures" if failures else "settings differ" if mixed else "ok", row),
+        **_headline(cases, _status(out_dir, failures, mixed), row, missing),
+        **_worse_cases(summary, links),
         "verdict": verdict(row, _simulator(cases)) or why_none,
         "worst": worst_frames({n: t for n, t in errors.items() if n not in calibration}, links),
         # of several shards' commands none is the one of the run
-        "next": next_command([f["case"] for f in failures], typed(out_dir) if len(infos) == 1 else ()),
+        "next": next_command([*(f["case"] for f in failures), *missing], typed(out_dir) if len(infos) == 1 else ()),
         "failures": alike(failures),
         "beside_others": (out_dir / SIMULATORS.file).exists(),
-        "left_over": left_over_sentence(out_dir),
-        "not_run": [text for text in (not_run_sentence(out_dir), left_out_sentence(out_dir)) if text],
+        **_not_counted(out_dir),
         "assumptions": [text for run in infos for text in run.get("assumptions", ())],
         "warnings": said_by_cases({case.name: case.result for case in cases}, "warnings"),
         "numbers": _content.in_tiles(_content.overall(declared("overall"), whole)),
         # the first stands beside the tiles: not the map of hundreds of cases, which is taller than a screen
         "sections": sorted(draw_sections("run", files, out_dir, embed, each), key=_is_tall),
-        "cases": _content.cases(summary, links),
         "sweep": _content.grid(files.sweep, SWEEP.columns) if len(files.sweep) else None,
         "sweep_silent": silent_points(files.sweep),
         "config": settings(next((run["config"] for run in infos if "config" in run), {})),
@@ -164,11 +179,20 @@ def _case_verdict(case: CaseFiles) -> str:
     said = str(case.result.get("sentence", nothing)).strip().rstrip(".")
     good, planned = case.statistics.get("frames_ok"), case.statistics.get("frames")
     became = said[:1].upper() + said[1:] + "."
-    if planned and good != planned:
+    if fitted := case.statistics.get("frames_fitted"):
+        became = scans(good or 0, planned or 0, fitted, _scored_or_ok([case])) + "."
+    elif planned and good != planned:
         became = f"{good} of {counted(planned, 'frame')} have a result."
     scored = _scored(case)
     how = verdict(scored, case.simulator) if scored or not case.statistics else OF_CALIBRATION
     return " ".join(filter(None, (became, how)))
+
+
+def _scored_or_ok(cases: Sequence[CaseFiles]) -> str:
+    """What a frame with a result is called: not all are scored where parameters are learnt or nothing is compared."""
+    results = [case.result for case in cases]
+    learnt = any(result.get("role") == "calibration" or result.get("status") == "simulated" for result in results)
+    return "ok" if learnt else "scored"
 
 
 def _is_tall(section: Mapping[str, Any]) -> bool:
@@ -193,16 +217,39 @@ def _run_failures(out_dir: Path, cases: list[CaseFiles], links: dict[str, str]) 
 
 
 def readable_cases(out_dir: Path) -> tuple[list[CaseFiles], list[dict[str, Any]]]:
-    """Every case that can be read, and a failure for each that cannot: one bad file must not hide the others."""
+    """Every case that can be read, and a failure for each that has a bad file, or lost one: it must not hide others."""
     cases, broken = [], []
     for folder in find_cases(out_dir):
+        wrong = amiss(folder)
+        message = f"{folder}: {wrong}; run the case again" * bool(wrong)
         try:
             cases.append(read_case(folder, points=False, rest=False))
         except ValueError as error:
+            message = str(error)
+        if message:
             row = dict.fromkeys((*FAILURES.names, "link"), "") | {"case": folder.name, "stage": "report"}
-            row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": str(error)}
+            row |= {"status": "damaged", "sentence": "a result file cannot be read", "message": message}
             broken.append(row)
     return cases, broken
+
+
+def _status(out_dir: Path, failures: Sequence[Any], mixed: str) -> str:
+    """The worst that can be said of a run in a word or two."""
+    if failures:
+        return "failures"
+    return "cases missing" if not_run(out_dir) else "settings differ" if mixed else "ok"
+
+
+def _worse_cases(summary: pd.DataFrame, links: Mapping[str, str]) -> dict[str, Any]:
+    """The table of the cases, and which of them are worse than a guess, whatever a number over all of them says."""
+    rows = summary.to_dict("records")
+    return {"cases": _content.cases(summary, links, worse_cases(rows)), "worse": worse_sentence(rows)}
+
+
+def _not_counted(out_dir: Path) -> dict[str, str]:
+    """Cases that no number of the page is over."""
+    said = {"left_over": left_over_sentence, "not_run": not_run_sentence, "left_out": left_out_sentence}
+    return {name: sentence(out_dir) for name, sentence in said.items()}
 
 
 def _simulator(cases: list[CaseFiles]) -> str:
@@ -210,15 +257,20 @@ def _simulator(cases: list[CaseFiles]) -> str:
     return next((case.simulator for case in cases if case.simulator), "")
 
 
-def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any]) -> dict[str, Any]:
+def _headline(cases: list[CaseFiles], status: str, row: Mapping[str, Any], missing: Sequence[str]) -> dict[str, Any]:
     """Cases and frames as the last line on the terminal counts them: a case that crashed had frames, too.
 
-    status : ok, or what the badge says instead.
+    status : ok, or what the badge says instead.     missing : cases without a result here.
     """
     n_good = sum(case.statistics.get("frames_ok", len(case.good)) for case in cases)
     n_frames = sum(case.statistics.get("frames") or len(case.errors) for case in cases)
-    sentence = f"{counted(len(cases), 'case')}, {counted(n_frames, 'frame')}: {n_good} ok"
-    sentence += f", {n_frames - n_good} without a result." if n_good < n_frames else "."
+    absent = set(missing) - {case.name for case in cases}
+    of = f"{len(cases)} of " * bool(absent)
+    frames = f"{counted(n_frames, 'frame')}: {n_good} ok"
+    frames += f", {n_frames - n_good} without a result" * (n_good < n_frames)
+    if fitted := sum(case.statistics.get("frames_fitted") or 0 for case in cases):
+        frames = scans(n_good, n_frames, fitted, _scored_or_ok(cases))
+    sentence = f"{of}{counted(len(cases) + len(absent), 'case')}, {frames}."
     look = badge(status if cases else "failures", bool(cases) and status == "ok", row)
     name = _simulator(cases)
     title = " - ".join(filter(None, (name, "wireval")))

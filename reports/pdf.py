@@ -11,14 +11,25 @@ from matplotlib.backends.backend_pdf import PdfPages
 from reports import _content, colours
 from reports.alike import alike, of_what
 from reports.atomic import replacing
-from reports.case_files import WORST, CaseFiles, counted, not_reached, read_case, read_json, results_in, said_by_cases
+from reports.case_files import (
+    WORST,
+    CaseFiles,
+    counted,
+    not_reached,
+    not_run_sentence,
+    read_case,
+    read_json,
+    results_in,
+    said_by_cases,
+)
+from reports.counts import scans
 from reports.figures import declared, figures_of
 from reports.html import readable_cases, run_files
 from reports.origin import mixed_settings
 from reports.pdf_page import RIGHT, WIDE, Figured, Page
 from reports.schema import FAILURES, OVERALL_FILE, SUMMARY
 from reports.tables import read_if_there
-from reports.verdict import next_command, typed, unscored, verdict, worst_frames
+from reports.verdict import next_command, typed, unscored, verdict, worse_sentence, worst_frames
 
 _MOST_FAILURES, _MOST_CASES, _MOST_SETTINGS = 8, 40, 24
 _MOST_WARNINGS, _FOR_ASSUMPTIONS = 4, 0.25
@@ -62,11 +73,19 @@ def _first(out_dir: Path, summary: pd.DataFrame, whole: pd.DataFrame) -> Page:
     results = results_in(out_dir)
     simulator = next((name for one in results.values() if (name := str(one.get("simulator", "")))), "")
     said = verdict(row, simulator) or mixed_settings(out_dir) or unscored(cases) or not_reached(out_dir)
-    page.text(f"{counted(len(summary), 'case')}, {ok} of {counted(planned, 'frame')} have a result. {said}", size=11)
+    frames = f"{ok} of {counted(planned, 'frame')} have a result"
+    if fitted := int(summary["frames_fitted"].sum()):
+        frames = scans(ok, planned, fitted, "with a result")
+    page.text(f"{counted(len(summary), 'case')}, {frames}. {said}", size=11)
+    if worse := worse_sentence(summary.to_dict("records")):
+        page.text(worse, size=11, colour=colours.BAD)
+    if missing := not_run_sentence(out_dir):
+        page.text(f"Of the study {missing}. Every number is over the other cases alone.", size=11, colour=colours.BAD)
     if len(failures):
         _failures(page, failures, out_dir)
     for tile in _content.in_tiles(_content.overall(declared("overall"), whole))["tiles"]:
-        page.text(f"{tile['value']}  {tile['label']}")
+        why = f". {tile['why']}" if "why" in tile else ""
+        page.text(f"{tile['value']}  {tile['label']}{why}")
     page.some("Warnings", said_by_cases(results, "warnings"), "on the pages of the cases", _MOST_WARNINGS)
     return page
 
@@ -80,7 +99,8 @@ def _failures(page: Page, failures: pd.DataFrame, out_dir: Path) -> None:
         case = ": ".join(filter(None, (row["simulator"], row["case"])))
         frames = f", frame{'s' * (row['count'] > 1)} {row['frames']}" * bool(row["frames"])
         text = textwrap.shorten(str(row["message"]), 300, placeholder="…")
-        page.text(f"{case}{frames}: {row['status']}. {text}")
+        files = f"{row['files']}. " * bool(row["files"])
+        page.text(f"{case}{frames}: {row['status']}. {files}{text}")
     if rest := sum(row["count"] for row in rows[_MOST_FAILURES:]):
         page.text(f"… and {rest} more in failures.csv")
     command = next_command(failures["case"], typed(out_dir))

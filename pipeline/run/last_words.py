@@ -19,7 +19,7 @@ from reports.origin import mixed_settings
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import in_short, next_command, typed
+from reports.verdict import in_short, next_command, typed, worse_sentence
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
@@ -38,7 +38,8 @@ def failure_lines(plan: Plan, then: str = "") -> list[str]:
     ]
     lines += silent_points(read_if_there(plan.out / SWEEP.file, SWEEP))
     then = then or _next(plan, cases)
-    aside = [text] if (text := left_over_sentence(plan.out)) else []
+    worse = worse_sentence([{**result.summary, "role": result.role} for result in found])
+    aside = [*filter(None, [left_over_sentence(plan.out), worse])]
     return [*aside, *lines, f"next: {then}"] if cases else [*aside, *lines]
 
 
@@ -47,7 +48,8 @@ def _failure(row: Mapping[str, Any]) -> str:
     several = row["count"] > 1
     of = f" frame{'s' * several} {row['frames']}" * bool(row["frames"])
     said = f"in frame {row['frame']}: {row['message']}" if several and row["message"] else row["message"]
-    return f"{row['case']}{of}: {row['status']}: {said or row['sentence']}"
+    files = f"{row['files']}; " * bool(row["files"])
+    return f"{row['case']}{of}: {row['status']}: {files}{said or row['sentence']}"
 
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.status import InputError
 from reports import tables
-from reports.case_files import CaseFiles, find_cases, read_case
+from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
 from reports.origin import mixed_settings
 from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
@@ -34,8 +34,10 @@ class Results:
 
     @property
     def ok(self) -> bool:
-        """Whether there is a case, all frames of all cases are ok, and all were run with the same settings."""
-        return bool(len(self.summary)) and len(self.failures) == 0 and not mixed_settings(self.out)
+        """Whether every case that was to be run is here, whole, all its frames ok, and all had the same settings."""
+        if not len(self.summary) or len(self.failures) or not_run(self.out) or mixed_settings(self.out):
+            return False
+        return not any(amiss(case.folder) for case in self.cases.values())
 
     @property
     def points(self) -> pd.DataFrame:

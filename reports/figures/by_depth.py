@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
 from reports.figures._drawing import Drawing, FrameAxis, frames_of, legend, new_figure, plain, positive_axis
-from reports.figures._style import GREY, Look, lines, predictors
+from reports.figures._style import GREY, SLATE, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
 
@@ -25,7 +25,7 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
     if not has(good, "rms_mm"):
         return None
     figure = new_figure(4.2)
-    axes, rivals = figure.subplots(), list(predictors())
+    axes, rivals = figure.subplots(), _with_strongest(case, good)
     for column, label, colour, style, marker in rivals:
         dots = {"marker": marker if len(good) == 1 else "", "linestyle": style, "linewidth": 1.2}
         _line(axes, good, column, f"predictor: {label}", color=colour, **dots)
@@ -36,7 +36,23 @@ def error_by_depth(case: CaseFiles) -> Drawing | None:
         axes.fill_between(*floor, color=TRACED, alpha=0.15, linewidth=0)
     _mark_failed(axes, case)
     _finish({axes: "distance, mm"})
-    return Drawing(figure, _table(case, shown), frames=_depths(case, axes))
+    table = _table(case, shown)
+    if len(rivals) > len(list(predictors())):  # the caption speaks of it where there is one
+        table = table.assign(strongest_null=case.statistics["strongest_null"])
+    return Drawing(figure, table, frames=_depths(case, axes))
+
+
+def _with_strongest(case: CaseFiles, good: pd.DataFrame) -> list[tuple[str, str, str, Any, str]]:
+    """The predictors of every case, and the strongest of this one, which its verdict names, where it is none of them.
+
+    The strongest is called so.
+    """
+    strongest = f"null_{case.statistics.get('strongest_null')}_rms_mm"
+    every = [(column, label + " (strongest)" * (column == strongest), *look) for column, label, *look in predictors()]
+    if strongest in ERRORS.names and has(good, strongest) and strongest not in (column for column, *_ in every):
+        label = ERRORS[strongest].shown.get("rivals") or str(case.statistics["strongest_null"]).replace("_", " ")
+        every.append((strongest, f"{label} (strongest)", SLATE, "-", "*"))
+    return every
 
 
 OTHER_BRANCH = "tips in different branches"

@@ -160,3 +160,29 @@ def test_a_result_that_cannot_be_read_says_nothing_of_settings(study: Path, tmp_
     path = tmp_path / "out" / "cases" / "a" / "result.json"
     path.write_text(json.dumps([1]), encoding="utf-8")
     assert mixed_settings(tmp_path / "out") == ""
+
+
+def test_what_is_missing_is_no_ok_anywhere(study: Path, tmp_path: Path) -> None:
+    """The index was green, with "Failures: none", and read_results ok, where `report` exits with 1."""
+    out = tmp_path / "out"
+    main(["run", str(study), "-o", str(out), "--until", "segment", "-q"])
+    assert main(["report", str(out), "--overview"]) == 0
+    assert wireval.read_results(out).ok
+    assert "Failures: none" in (out / "index.html").read_text(encoding="utf-8")
+    frames = out / "cases" / "b" / "frames.h5"
+    kept = frames.read_bytes()
+    frames.unlink()
+    assert main(["report", str(out)]) == 1
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "frames.h5 is missing" in page
+    assert '<span class="status bad">failures</span>' in page
+    assert not wireval.read_results(out).ok
+    frames.write_bytes(kept)
+    assert wireval.read_results(out).ok
+    shutil.rmtree(out / "cases" / "b")
+    assert main(["report", str(out), "--overview", "--pdf"]) == 1
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "Failures: none" not in page
+    assert '<span class="status bad">cases missing</span>' in page
+    assert "1 of 2 cases, 2 frames: 2 ok." in page
+    assert not wireval.read_results(out).ok

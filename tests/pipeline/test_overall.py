@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,8 @@ import pytest
 
 from pipeline.cli import main
 from pipeline.run.aggregate import aggregate
-from pipeline.run.last_words import last_line
+from pipeline.run.last_words import failure_lines, last_line
+from pipeline.run.launch import Plan
 from pipeline.run.overall import found_cases, overall, ratio, shared_scans
 from reports import tables
 from reports.html import render_index
@@ -166,3 +168,12 @@ def test_cases_of_one_stated_insertion_that_share_scans_have_nothing_to_be_told(
         write_case(study / group, "x", [GOOD], group="one", scans=["same"])
         write_case(study / group, "y", [GOOD], group=group, scans=["same"])
         assert len(shared_scans([c.result for c in found_cases(study / group)])) == told
+
+
+def test_the_last_words_name_a_case_that_is_worse_than_a_guess(tmp_path: Path) -> None:
+    """The numbers over both cases were good, and nothing else was said."""
+    for name, skill in (("a", 0.9), ("b", -0.6)):
+        row = {"case": name, "status": "ok", "frames": 1, "frames_ok": 1, "rms_mm": GOOD}
+        write_case(tmp_path, name, [GOOD], summary=row | {"skill_strongest": skill, "strongest_null": "previous"})
+    plan = SimpleNamespace(out=tmp_path, template=SimpleNamespace(settings=None), cases=(), points=())
+    assert failure_lines(cast(Plan, plan), "-") == ["1 of 2 cases is worse than a guess: b."]

@@ -38,3 +38,16 @@ def test_other_statuses_are_not_alike() -> None:
 def test_numbers_of_frames_in_words() -> None:
     assert in_words([4]) == "4"
     assert in_words([0, 1, 3, 4, 5]) == "0, 1, 3 to 5"
+
+
+def test_all_files_that_cannot_be_read_are_named() -> None:
+    """Of two damaged scans terminal and page named the first."""
+    rows = [row(n, f"s/frames/frame_{n:03}.mha: the file is cut short", status="load_failed") for n in (1, 3)]
+    (found,) = alike(rows)
+    assert found["files"] == "frame_001.mha, frame_003.mha"
+    assert alike(rows[:1])[0]["files"] == "", "the message names it"
+    (many,) = alike([row(n, f"s/{n}.mha: cut short") for n in range(8)])
+    assert many["files"] == "0.mha, 1.mha, 2.mha, 3.mha, 4.mha, 5.mha and 2 more"
+    (same,) = alike([row(n, f"depth_{n}/recon.mha: cut short") for n in (0, 1)])
+    assert same["files"] == "depth_0/recon.mha, depth_1/recon.mha", "one name of several files tells nothing"
+    assert alike([row(n, f"trace: brightest ridge at CNR {n}.3") for n in (0, 1)])[0]["files"] == ""

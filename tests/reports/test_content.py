@@ -10,6 +10,7 @@ import pytest
 
 from reports import _content
 from reports.case_files import counted
+from reports.counts import scans
 
 
 @pytest.mark.parametrize(
@@ -46,9 +47,36 @@ def test_a_tile_may_be_the_number_that_another_column_names() -> None:
 def test_a_tile_says_where_it_is_over_fewer_frames_than_those_beside_it() -> None:
     entries = [{"column": "skill_strongest", "label": "skill"}]
     row = {"skill_strongest": 0.9, "strongest_frames": 5, "frames_ok": 6}
-    label = _content.cards(entries, row)[0]["label"]
-    assert label == "skill; over 5 of 6 frames, of which all predictors have a guess (the rms beside it are over more)"
-    assert _content.cards(entries, row | {"strongest_frames": 6})[0]["label"] == "skill"
+    card = _content.cards(entries, row)[0]
+    assert card["label"] == "skill over 5 of 6 frames", "the reason made eight lines of a narrow tile"
+    assert card["why"].endswith("frames of which all predictors have a guess; the rms beside it are over more.")
+    assert _content.cards(entries, row | {"strongest_frames": 6}) == [{"value": "0.900", "label": "skill"}]
+    explained = [entries[0] | {"why": "1 is perfect."}]
+    assert _content.cards(explained, row)[0]["why"].startswith("1 is perfect. It is over")
+
+
+def test_a_tile_says_that_its_interval_is_withheld() -> None:
+    """It had none, without a word: that there are too few insertions stood on no first screen."""
+    entries = [{"column": name, "label": name} for name in ("rms_mm", "skill_strongest", "tip_median_mm")]
+    row = {"rms_mm": 0.2, "skill_strongest": 0.9, "tip_median_mm": 0.3}
+    withheld = row | {"interval": "interval withheld: 1 insertion, at least 3 needed"}
+    rms, skill, tip = (card["label"] for card in _content.cards(entries, withheld))
+    assert (rms, skill) == ("rms_mm (no interval: 1 insertion)", "skill_strongest (no interval: 1 insertion)")
+    assert tip == "tip_median_mm"
+    bounded = withheld | {"rms_low_mm": 0.1, "rms_high_mm": 0.3}
+    assert _content.cards(entries, bounded)[0]["label"] == "rms_mm (95 %: 0.100 to 0.300)"
+    for note in (None, "wide: 4 insertions; not bounded: rms_low_mm"):
+        assert _content.cards(entries, row | {"interval": note})[0]["label"] == "rms_mm"
+
+
+def test_a_frame_that_the_roll_was_fitted_on_is_counted_apart() -> None:
+    """Of six scans five were "5 of 5 frames"."""
+    assert scans(5, 5, 1, "scored") == "6 scans: 1 used for the roll, 5 scored"
+    assert scans(4, 5, 1, "scored") == "6 scans: 1 used for the roll, 4 scored, 1 without a result"
+    entries = [{"column": "frames_ok", "of": "frames", "label": "frames"}]
+    row = {"frames_ok": 5, "frames": 5}
+    assert _content.cards(entries, row | {"frames_fitted": 1})[0]["label"] == "of 5 frames (1 more used for the roll)"
+    assert _content.cards(entries, row | {"frames_fitted": 0})[0]["label"] == "of 5 frames"
 
 
 def test_a_caption_speaks_of_what_is_there() -> None:

@@ -526,3 +526,29 @@ def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None
     assert said["title"] == "Clamp and depth", "there is no budget"
     assert "no fault by itself" in said["read"]
     assert "further from the manifest's than that was measured to" in said["bad"]
+
+
+def test_the_first_figure_draws_the_predictor_that_the_verdict_names(tmp_path: Path) -> None:
+    """It drew the four that every case has, and left out the one that verdict and tile were about."""
+    folder = write_run(tmp_path / "out", (FakeCase("c", 4),)) / "cases" / "c"
+    case = read_case(folder)
+    rival = "null_roll_unknown_rms_mm"
+    entry = next(one for one in declared("case") if one["figure"] == "error_by_depth")
+
+    def drawn(strongest: str) -> tuple[set[str], bool, str]:
+        case.result["summary"]["strongest_null"] = strongest  # type: ignore[index]
+        known = replace(case, errors=case.errors.assign(**{rival: [0.5, 0.6, 0.7, 0.8]}))
+        drawing = CASE_FIGURES["error_by_depth"](known)
+        assert drawing is not None
+        legend = drawing.figure.axes[0].get_legend_handles_labels()[1]
+        said = {label for label in legend if "(strongest)" in label}
+        return said, rival in drawing.table, caption(entry["read"], drawing.table)
+
+    said, shown, read = drawn("roll_unknown")
+    assert said == {"predictor: roll unknown (strongest)"}
+    assert shown
+    assert "blue-grey line is the strongest predictor" in read
+    said, shown, read = drawn("previous")
+    assert said == {"predictor: previous frame (strongest)"}
+    assert not shown
+    assert "strongest" not in read

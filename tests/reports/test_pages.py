@@ -18,7 +18,7 @@ from reports import figures, tables
 from reports.case_files import find_cases, read_case
 from reports.figures import Drawing, declared, figures_of
 from reports.html import render_case, render_index
-from reports.schema import ERRORS, SUMMARY
+from reports.schema import ERRORS, FAILURES, SUMMARY
 from tests.reports.fake_results import EVERY_KIND, FakeCase, write_run
 
 CASE_FIGURES = figures_of("case")
@@ -343,3 +343,37 @@ def test_a_calibration_case_is_not_said_to_be_better(tmp_path: Path) -> None:
     assert "It is a calibration case and not scored" in text["learnt"]
     assert "That is better" not in text["learnt"]
     assert "That is better" in text["judged"]
+
+
+def test_a_case_that_is_worse_than_a_guess_is_marked_and_named(tmp_path: Path) -> None:
+    """The index was green and said "That is better" of both together."""
+    out = write_run(tmp_path / "out", (FakeCase("a", 3), FakeCase("b", 3)))
+    rows = tables.read(out / "summary.csv", SUMMARY).assign(skill_strongest=[0.9, -0.6], strongest_null="previous")
+    tables.write(out / "summary.csv", SUMMARY, rows)
+    page = render_index(out).read_text(encoding="utf-8")
+    assert "<strong>1 of 2 cases is worse than a guess: b.</strong>" in page
+    assert '<span class="status poor">a case is worse than a guess</span>' in page
+    marked = re.findall(r'<tr class="bad"><td class="text">(?:<a[^>]*>)?(\w+)', page)
+    assert marked == ["b"]
+    assert "only marked rows" in page
+
+
+def test_a_scan_that_the_roll_was_fitted_on_is_no_frame_that_is_ok(tmp_path: Path) -> None:
+    """Six scans were "Every frame is ok" and "5 frames: 5 ok"."""
+    out = write_run(tmp_path / "out", (FakeCase("a", 5),))
+    path = out / "cases" / "a" / "result.json"
+    result = json.loads(path.read_text(encoding="utf-8"))
+    result["summary"]["frames_fitted"] = 1
+    path.write_text(json.dumps(result), encoding="utf-8")
+    said = "6 scans: 1 used for the roll, 5 scored."
+    assert f'<p class="verdict">1 case, {said} ' in render_index(out).read_text(encoding="utf-8")
+    assert f'<p class="verdict">{said} The simulated' in render_case(out / "cases" / "a").read_text(encoding="utf-8")
+
+
+def test_all_scans_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    out = write_run(tmp_path / "out", (FakeCase("a", 5, failed=(1, 3)),))
+    rows = tables.read(out / "failures.csv", FAILURES)
+    told = [f"s/frame_{n}.mha: the file is cut short" for n in rows["frame"]]
+    tables.write(out / "failures.csv", FAILURES, rows.assign(message=told))
+    page = render_index(out).read_text(encoding="utf-8")
+    assert "Files: frame_1.mha, frame_3.mha.<br>In frame 1: <code>s/frame_1.mha: the file is cut short</code>" in page

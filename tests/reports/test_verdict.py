@@ -7,7 +7,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from reports.verdict import badge, in_short, next_command, typed, unscored, verdict, warned, worst_frames
+from reports.verdict import (
+    badge,
+    in_short,
+    next_command,
+    typed,
+    unscored,
+    verdict,
+    warned,
+    worse_sentence,
+    worst_frames,
+)
 from tests.reports.fake_results import FakeCase, write_run
 
 
@@ -179,3 +189,13 @@ def test_a_warning_of_several_cases_is_one_line_on_the_terminal(tmp_path: Path) 
     """Two cases in one phantom said all of it twice: failures and the next command scrolled out of sight."""
     out = write_run(tmp_path / "out", [FakeCase(name, frames=3, failed=(1,)) for name in "ab"])
     assert warned(out) == ["warning: a, b: roll is unknown and was taken as 0"]
+
+
+def test_cases_that_are_worse_than_a_guess_are_named() -> None:
+    row = {"case": "a", "role": "validation", "rms_mm": 0.3, "strongest_null": "previous", "skill_strongest": 0.9}
+    worse = row | {"case": "b", "skill_strongest": -0.6}
+    assert worse_sentence([row, worse]) == "1 of 2 cases is worse than a guess: b."
+    assert worse_sentence([row, worse, worse | {"case": "c"}]) == "2 of 3 cases are worse than a guess: b, c."
+    assert worse_sentence([row, worse | {"skill_strongest": -0.05}]) == "", "that is no better, and not worse"
+    assert worse_sentence([row, worse | {"role": "calibration"}]) == ""
+    assert worse_sentence([worse]) == "", "all else on the page speaks of this case"
