@@ -33,9 +33,7 @@ def as_calibrated(
             if path not in read:
                 read[path] = read_parameters(path)
             found = read[path]
-            changed = _with_clamp(case, with_parameters(case, found, data_of(case)), found)
-            if own:
-                changed = changed.model_copy(update={"calibrated_scans": ()})
+            changed = _with_clamp(case, with_parameters(case, found, data_of(case), own=own), found)
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]
             continue
