@@ -33,7 +33,7 @@ def as_calibrated(
             if path not in read:
                 read[path] = read_parameters(path)
             found = read[path]
-            changed = _with_clamp(case, with_parameters(case, found, data_of(case), own=own), found)
+            changed = _with_clamp(case, with_parameters(case, found, data_of(case), score_used=own), found)
         except ParametersError as error:
             problems += [text for text in error.problems if text not in problems]
             continue

@@ -118,11 +118,11 @@ def read_parameters(path: Path) -> Parameters:
         raise ParametersError([f"{path}: {said(*one)}; wireval calibrate writes this file" for one in found]) from None
 
 
-def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, own: bool = False) -> "Case":
+def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, score_used: bool = False) -> "Case":
     """A case with calibrated wire, wall, roll and depths; ParametersError where they are another wire's.
 
     data : SHA-256 of its frames and traces. A case that was calibrated with is one for calibration from here on.
-    own : scans that were calibrated with are scored, too: those in other files are not looked for.
+    score_used : scans that were calibrated with are scored, too: those in other files are not looked for.
     """
     if case.wire.name != found.wire:
         what = f"case {case.id!r}: its wire is {case.wire.name!r}, the parameters are those of {found.wire!r}"
@@ -138,7 +138,7 @@ def with_parameters(case: "Case", found: Parameters, data: Sequence[str], *, own
         "wire": replace(case.wire, **profiles),
         "wall": replace(case.wall, stiffness_N_mm2=stiffness or case.wall.stiffness_N_mm2, friction=found.friction),
         "calibrated": _told(case, found, known_wall=stiffness is not None),
-        "calibrated_scans": () if own else tuple(scan for used in found.used for scan in used.data),
+        "calibrated_scans": () if score_used else tuple(scan for used in found.used for scan in used.data),
     }
     if case.roll_deg != "fit":
         rolls = case.roll_deg if isinstance(case.roll_deg, tuple) else (case.roll_deg,)
