@@ -56,7 +56,7 @@ def trace(
     curve = _seen((frame, reference, lumen), stated, previous, config)
     voxel = float(np.min(frame.spacing_mm))
     larger, ok = times(voxel), curve.status is FrameStatus.OK
-    if larger > 1 and (not ok or curve.levels["blur_mm"] > THICK_VOXELS * voxel):
+    if larger > 1 and (not ok or curve.levels.get("blur_mm", 0.0) > THICK_VOXELS * voxel):
         scans = coarse_scan(frame, larger), reference and coarse_scan(reference, larger), coarse_lumen(lumen, larger)
         again = _seen(scans, stated, previous, config)
         if again.status is FrameStatus.OK and not (ok and _same(again, curve, voxel, 1.0)):
