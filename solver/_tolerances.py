@@ -203,8 +203,10 @@ SAME_WAY = 0.9
 ELSEWHERE_MM = 0.1
 """A doubtful step in which no joint moved by more has not led the wire elsewhere: twice the finest step."""
 SOFTEST = 1e-9
-"""Size of the negative Levenberg term with which the search for a wire's softest mode begins; a wire in a sphere gives
-way at 3e-8."""
+"""Size of the smallest negative Levenberg term that is tried for a wire's softest mode; one in a sphere gives way at
+3e-8."""
+RUNGS = 72
+"""Terms that are tried, each 10^(1/4) times the one before: up to WORST_DAMPING."""
 SLIGHT = 1e-4
 """Turn, rad, from which that mode's displacements are computed: its square is negligible."""
 APART_MM = 0.01

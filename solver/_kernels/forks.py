@@ -11,7 +11,7 @@ from solver import _tolerances as tol
 from solver._kernels.algebra import dot, load3, minus, scaled, store3
 from solver._kernels.data import CONVERGED, CURRENT, SPARE, TRIAL, Problem
 from solver._kernels.energy import bending_energy, energy_of, total_energy
-from solver._kernels.flags import kernel, merged
+from solver._kernels.flags import inlined, kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.friction import take_loads
 from solver._kernels.minimise import relax_with_friction
@@ -28,21 +28,39 @@ def other_side(handle: Any, k: int) -> float:
     What the step changed is mirrored, and relaxed from there: that leads back, unless there are two sides. State,
     report and friction are left as they were, and so is LAST_GOOD, for a step that is taken back.
     """
-    problem, state, report = handle.problem, handle.problem.state, handle.report[0]
-    energy, apart = energy_of(problem, CURRENT), 0.0
+    problem, report = handle.problem, handle.report[0]
+    energy = energy_of(problem, CURRENT)
+    if not turned_aside(handle, k):
+        return 0.0
+    outcome, _, _, other = relax_with_friction(problem, CURRENT, k, handle.limits, report)
+    return back_again(handle, k, outcome == CONVERGED and abs(other - energy) < tol.AS_LOW * abs(energy))
+
+
+@kernel
+def turned_aside(handle: Any, k: int) -> bool:
+    """Mirror what the step changed, and keep what it led to; False where that is not worth a relaxation."""
+    report = handle.report[0]
     handle.report[2] = report
-    if mirrored(problem, k, report):
+    worth = mirrored(handle.problem, k, report)
+    if worth:
+        total_energy(handle.problem, CURRENT, 0, k)
+    handle.report[0] = handle.report[2]
+    return worth
+
+
+@kernel
+def back_again(handle: Any, k: int, as_low: bool) -> float:
+    """Put back what the step led to; return the result of ``other_side``. as_low : whether that is at rest as low."""
+    problem, state, apart = handle.problem, handle.problem.state, 0.0
+    if as_low:
+        apart = farthest(state.x[CURRENT], 0, state.x[SPARE], 0, k + 1)
+    if apart > tol.APART_MM and through_wall(problem.field, state.x[CURRENT], k, handle.introducer.margin):
+        apart = 0.0
+    copy_state(problem, SPARE, CURRENT, k)
+    if problem.friction.coefficient > 0.0:
+        take_loads(problem, CURRENT, k)
+    if problem.shaft.drag > 0.0:
         total_energy(problem, CURRENT, 0, k)
-        outcome, _, _, other = relax_with_friction(problem, CURRENT, k, handle.limits, report)
-        if outcome == CONVERGED and abs(other - energy) < tol.AS_LOW * abs(energy):
-            apart = farthest(state.x[CURRENT], 0, state.x[SPARE], 0, k + 1)
-        if apart > tol.APART_MM and through_wall(problem.field, state.x[CURRENT], k, handle.introducer.margin):
-            apart = 0.0
-        copy_state(problem, SPARE, CURRENT, k)
-        if problem.friction.coefficient > 0.0:
-            take_loads(problem, CURRENT, k)
-        if problem.shaft.drag > 0.0:
-            total_energy(problem, CURRENT, 0, k)
     handle.report[0] = handle.report[2]
     return apart if apart > tol.APART_MM else 0.0
 
@@ -103,19 +121,34 @@ def along_softest_way(problem: Problem, k: int, report: Any) -> float:
 def softest_way(problem: Problem, k: int, report: Any) -> bool:
     """Put the wire's softest mode into the report; False where none is found.
 
-    A negative Levenberg term (``newton.sweep``) grows until the wire only just gives way: the direction that is found
-    then is the least stiff one for how far the joints move.
+    Under the least of the negative Levenberg terms (``newton.sweep``) that make the wire give way, the direction that
+    is found is the least stiff one for how far the joints move. The search begins at the wire's last term: mostly that
+    one still makes it give way and the next smaller one does not, which takes 2 sweeps instead of 10.
     """
-    firm, push = 0.0, tol.SOFTEST
-    while push < tol.WORST_DAMPING and sweep(problem, CURRENT, 0, k, -push, report):
-        firm, push = push, 10.0 * push
-    for _ in range(2):
-        between = math.sqrt(firm * push)
-        if sweep(problem, CURRENT, 0, k, -between, report):
-            firm = between
+    now = problem.scratch.descent[0]
+    firm, gives, stride, swept, term = -1, tol.RUNGS, 1, -1, max(now.rung - 1, 0)
+    while gives - firm > 1:
+        swept = term
+        if sweep(problem, CURRENT, 0, k, -term_at(term), report):
+            firm = term
         else:
-            push = between
-    return not sweep(problem, CURRENT, 0, k, -push, report)
+            gives = term
+        if gives == tol.RUNGS:
+            term = min(term + stride, gives - 1)
+        elif firm == -1:
+            term = max(term - stride, 0)
+        else:
+            term = (firm + gives) // 2
+        stride *= 2
+    now.rung = gives
+    # the gains must be those of the term under which it gives way
+    return swept == gives or not sweep(problem, CURRENT, 0, k, -term_at(gives), report)
+
+
+@inlined
+def term_at(rung: int) -> float:
+    """Size of a negative Levenberg term."""
+    return tol.SOFTEST * 10.0 ** (0.25 * rung)  # type: ignore[no-any-return]
 
 
 @merged

@@ -85,8 +85,9 @@ SHAPES = (
 LANE = record(
     *((name, float) for name in ("depth", "roll", "limit", "tolerance", "stiffest", "scale", "noise")),
     *((name, float) for name in ("accuracy", "pivot")),
-    *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load")),
-    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations")),
+    *((name, float) for name in ("fraction", "decrement", "before", "bending", "wall", "load", "energy")),
+    *((name, np.int64) for name in ("phase", "goal", "k", "tries", "allowed", "outcome", "iterations", "used")),
+    ("aside", np.int64),
 )
 """Where a wire is.
 
@@ -95,7 +96,8 @@ depth, roll : that its step leads to.     tolerance : see ``data.Limits``.     s
 before : energy that the iteration began with.     bending, wall, load : energies of the current state.
 limit, iterations : of this depth.     phase : see ``relax``.     goal : index of the depth that it is on its way
 to.     k : segments.     tries : step lengths that failed.     allowed : iterations of this relaxation.
-outcome : how its relaxation ended.
+outcome : how its relaxation ended.     aside : 1 where it relaxes on the other side, see ``forks``.     energy, used :
+of the step's own relaxation, and its iterations.
 """
 SEAT = record(("wire", np.int64), ("filled", np.int64))
 """wire : the one that a lane works for, POOL for none.     filled : first joint of the block that is valid in this

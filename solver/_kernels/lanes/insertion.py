@@ -13,7 +13,7 @@ from solver._kernels.data import CURRENT, Problem
 from solver._kernels.energy import energy_of, stiffest
 from solver._kernels.flags import kernel, merged, released
 from solver._kernels.forces import copy_state, forget_forces
-from solver._kernels.forks import other_side
+from solver._kernels.forks import back_again, turned_aside
 from solver._kernels.insertion import arrived, judge, likeness, next_place, prepare, set_out, settle, sum_up
 from solver._kernels.lanes.block import Block
 from solver._kernels.lanes.decide import ALONE, DONE, IDLE, NEW, READY, RESTED, STOPPED, SWEEP, WAITING
@@ -115,10 +115,11 @@ def finish(team: Team, plan: Plan, raw: Block, lane: int) -> None:
     w = team.seats[lane].wire
     me, wire = team.lanes[w], team.wires[w]
     problem = wire.problem
+    now = problem.scratch.descent[0]
     if me.phase == RESTED:
         hand_over(team, raw, lane, problem, wire.report[0])
-    end_step(me, problem.scratch.descent[0], wire, problem)
-    proceed(team, plan, w)
+    if not end_step(me, now, wire, problem):
+        proceed(team, plan, w)
 
 
 @kernel
@@ -136,18 +137,23 @@ def proceed(team: Team, plan: Plan, w: int) -> None:
         me.depth, me.roll = next_place(wire, depth, roll)
         me.k = set_out(wire, me.depth, me.roll)
         me.outcome, now.iterations, now.energy = data.CONVERGED, 0, 0.0
-        if me.k > 0 and start_relaxing(me, now, wire, team.desk, report):
-            me.stiffest, me.phase = stiffest(problem.chain, me.k), WAITING
+        if (me.k > 0 and start_relaxing(me, now, wire, team.desk, report)) or end_step(me, now, wire, problem):
             return
-        end_step(me, now, wire, problem)
 
 
 @merged
 def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> bool:
     """Choose the start of a step's relaxation; False where it rests as it is, or cannot be relaxed."""
-    at, k, limits, problem = wire.place[0], me.k, wire.limits, wire.problem
+    at, problem = wire.place[0], wire.problem
+    start = chosen_start(problem, desk, at, me.k, likeness(problem, at, me.depth, me.roll))
+    return begin_relaxing(me, now, wire, start, report)
+
+
+@kernel
+def begin_relaxing(me: Any, now: Any, wire: Any, start: int, report: Any) -> bool:
+    """Let a wire wait for a lane that relaxes the state in a slot, whose energy is known; False as above."""
+    k, limits, problem = me.k, wire.limits, wire.problem
     counters = problem.scratch.counters[0]
-    start = chosen_start(problem, desk, at, k, likeness(problem, at, me.depth, me.roll))
     counters.relaxations_without_friction += 1
     counters.relaxations_without_twist += 1
     me.allowed = min(limits.max_iterations, max(limits.work - counters.passed, 0) // (k + problem.chain.first[k + 1]))
@@ -162,22 +168,34 @@ def start_relaxing(me: Any, now: Any, wire: Any, desk: Desk, report: Any) -> boo
         now.slot = CURRENT
     finite = math.isfinite(now.energy)
     me.outcome = data.CONVERGED if finite else data.NON_FINITE
+    me.stiffest, me.phase = stiffest(problem.chain, k), WAITING
     return finite and not resting
 
 
 @kernel
-def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> None:
-    """Keep a step or take it back, as in ``minimise.relax_with_friction``, ``insertion.step`` and ``go``."""
+def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> bool:
+    """End a relaxation as ``minimise.relax_with_friction`` and ``insertion.step`` do; True where another one follows.
+
+    That is the one on the other side. Without it the step is kept or taken back, as in ``insertion.go``.
+    """
     problem.scratch.counters[0].passed += now.iterations * (me.k + problem.chain.first[me.k + 1])
     if me.k > 0 and me.outcome == data.CONVERGED:
         me.outcome = shape_of(problem, CURRENT, me.k)
-    energy, used = now.energy, now.iterations  # another relaxation writes over them
-    me.iterations += used
-    forks = me.k > 0 and me.outcome == data.CONVERGED and may_fork(wire, me.k, me.depth, used)
-    other = other_side(wire, me.k) if forks else 0.0
-    outcome = settle(wire, (me.depth, me.roll, energy), me.k, me.outcome, 0, used, other)
+    if not me.aside:
+        me.energy, me.used = now.energy, now.iterations
+        me.iterations += me.used
+        forks = me.k > 0 and me.outcome == data.CONVERGED and may_fork(wire, me.k, me.depth, me.used)
+        me.aside = forks and turned_aside(wire, me.k)
+        if me.aside and begin_relaxing(me, now, wire, CURRENT, wire.report[0]):
+            return True
+    other = 0.0
+    if me.aside:
+        as_low = me.outcome == data.CONVERGED and abs(now.energy - me.energy) < tol.AS_LOW * abs(me.energy)
+        me.aside, me.outcome, other = 0, data.CONVERGED, back_again(wire, me.k, as_low)
+    outcome = settle(wire, (me.depth, me.roll, me.energy), me.k, me.outcome, 0, me.used, other)
     goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
+    return False
 
 
 @kernel
