@@ -16,7 +16,7 @@ from solver._kernels.energy import total_energy
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.friction import anchor_friction
 from solver._kernels.rollout import copy_base, place
-from solver._kernels.rotation import bend_towards, turn, with_twist
+from solver._kernels.rotation import bend_to, bent_to, from_rest, sine_and_cosine, turn, unrested, with_twist
 from solver._kernels.sleeve import put_over
 
 
@@ -81,18 +81,28 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
     """Bend joint j towards x[j + 1], keeping the twist it has; then put that joint at its exact distance."""
     d = minus(x[j + 1], x[j])
     size = math.sqrt(dot(d, d))
-    frame = load9(r, j)
+    frame, length, rest = load9(r, j), chain.length[j], chain.rest[j]
     # a joint on top of the one before has no direction: it keeps the one before
-    per_size = 1.0 / size if size > 0.0 else 0.0
-    t = apply_transposed(frame, scaled(per_size, d)) if size > 0.0 else (0.0, 0.0, 1.0)
-    u0, u1 = bend_towards(chain.rest[j], t)
+    way = scaled(1.0 / size, d) if size > 0.0 else (frame[2], frame[5], frame[8])
+    p = unrested(rest, apply_transposed(frame, way))
+    # of length 1 to the last digit: what a frame's columns lack would double from joint to joint
+    p = scaled(1.5 - 0.5 * dot(p, p), p)
+    u0, u1 = bend_to(p)
     v = with_twist(u0, u1, u[j, 2])
     store3(u, j, v)
-    frame = times(frame, turn(chain.rest[j], v))
+    if v[2] == 0.0 and p[2] > 0.0:
+        # the turn and the joint straight from the direction: the next joint need not wait for the control
+        e = bent_to(p)
+        if rest != 0.0:
+            sine, cosine = sine_and_cosine(rest)
+            e = from_rest(cosine, sine, e)
+        frame = times(frame, e)
+    else:
+        frame = times(frame, turn(rest, v))
+        way = (frame[2], frame[5], frame[8])
     store9(r, j + 1, frame)
-    length = chain.length[j]
     for a in range(3):
-        x[j + 1, a] = x[j, a] + length * r[j + 1, a, 2]
+        x[j + 1, a] = x[j, a] + length * way[a]
 
 
 @cached

@@ -5,7 +5,6 @@ how far behind the tip a node is, are aligned as well. A shorter wire begins wit
 The last axis of every array is the lane.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from solver._kernels.algebra import load3, load9, store3, store9
 from solver._kernels.data import CURRENT, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.records import record
+from solver._kernels.rotation import sine_and_cosine
 
 NUMBERS = (
     *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted", "room"),
@@ -112,8 +112,7 @@ def put_in(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
         to, rest, length = shift + j, chain.rest[j], chain.length[j]
         b.length[to, lane], b.bend[to, lane] = length, chain.bend[j]
         b.hold[to, lane] = chain.bend[j] / (length * length)
-        b.cosine[to, lane] = math.cos(rest) if rest != 0.0 else 1.0
-        b.sine[to, lane] = math.sin(rest) if rest != 0.0 else 0.0
+        b.sine[to, lane], b.cosine[to, lane] = sine_and_cosine(rest) if rest != 0.0 else (0.0, 1.0)
         b.u[CURRENT, to, 0, lane], b.u[CURRENT, to, 1, lane] = state.u[CURRENT, j, 0], state.u[CURRENT, j, 1]
     for n in range(k + 1):
         put_node(b, lane, shift + n, load3(state.x[CURRENT], n), load9(state.r[CURRENT], n))
