@@ -58,8 +58,8 @@ from solver._kernels.newton import costate as costate_alone
 POOL = 32
 """Wires that eight lanes work for: a lane whose wire is at rest takes another one, so that all stay at about the same
 depth, and lanes are idle only in the last few steps."""
-WORTH_ANOTHER = 3
-"""Lanes with a failed step from which on another trial is made at once: a trial costs a third of a round, and a lane
+WORTH_ANOTHER = 4
+"""Lanes with a failed step from which on another trial is made at once: a trial costs half a round, and a lane
 that waits for the next round loses an eighth of one."""
 
 
