@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from solver._kernels import blocks, closed_form, energy, newton, rollout, rotation, start
+from solver._kernels import blocks, closed_form, energy, forks, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
@@ -42,6 +42,16 @@ def gradients(problem: Any, slot: int, k: int) -> None:
 @entry_point
 def aim(chain: Any, u: Any, x: Any, r: Any, j: int) -> None:
     start.aim(chain, u, x, r, j)
+
+
+@entry_point
+def softest_way(problem: Any, k: int, report: Any) -> bool:
+    return forks.softest_way(problem, k, report)
+
+
+@entry_point
+def term_at(rung: int) -> float:
+    return forks.term_at(rung)
 
 
 @entry_point

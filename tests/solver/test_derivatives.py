@@ -254,3 +254,23 @@ def test_a_joints_block_is_judged_stiffened_and_solved_as_the_matrix_it_is(twist
         inverse = np.zeros((3, 3))
         inverse[:size, :size] = -np.linalg.inv(stiffer[:size, :size])
         np.testing.assert_allclose(found, inverse, atol=1e-9)
+
+
+def test_frames_stay_turns_along_a_long_curve() -> None:
+    """A frame is the one before, turned: what one lacks in length must not double from joint to joint."""
+    b = workspace(WIRES["curved tip"], None, 150.0)
+    s, angle = b.problem.state, 0.3
+    s.x[1, 0], s.r[1, 0] = s.x[0, 0], s.r[0, 0]
+    for j in range(b.k):
+        way = [np.cos(0.2 * j) * np.sin(angle), np.sin(0.2 * j) * np.sin(angle), np.cos(angle)]
+        s.x[1, j + 1] = s.x[1, j] + b.problem.chain.length[j] * np.array(way)
+        s.u[1, j, 2] = 0.0
+        aim(b.problem.chain, s.u[1], s.x[1], s.r[1], j)
+        np.testing.assert_allclose(s.r[1, j + 1, :, 2], way, atol=1e-13)
+    np.testing.assert_allclose(
+        s.r[1, : b.k + 1].transpose(0, 2, 1) @ s.r[1, : b.k + 1], np.eye(3)[None].repeat(b.k + 1, 0), atol=1e-13
+    )
+    # the controls alone lead to the same wire
+    s.u[0, : b.k], s.r[0, 0], s.x[0, 0] = s.u[1, : b.k], s.r[1, 0], s.x[1, 0]
+    place(b.problem.chain, s, 0, b.k)
+    np.testing.assert_allclose(s.x[0, : b.k + 1], s.x[1, : b.k + 1], atol=1e-11)

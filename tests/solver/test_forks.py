@@ -9,6 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from solver import Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
+from solver import _tolerances as tol
+from tests.solver.entry_points import softest_way, sweep, term_at
 from tests.solver.scenes import Array, fork_grid, sampled
 
 DEPTHS = np.arange(1.0, 31.0)
@@ -91,3 +93,25 @@ def test_in_lanes_the_same_is_told() -> None:
         assert told(one)[0] == told(other)[0]
         # to which side is rounding's choice, and lanes round otherwise
         np.testing.assert_allclose(told(one)[1], told(other)[1], rtol=1e-3)
+
+
+def test_the_softest_mode_is_the_same_wherever_its_search_begins() -> None:
+    """The rung above which a wire gives way, climbed one after the other, and the direction that it gives way in."""
+    insertion = into_fork(0.01)
+    list(insertion.to_depths([20.0, 30.0]))
+    work = insertion._work
+    problem, report, now = work.problem, work.report[0], work.problem.scratch.descent[0]
+    firm = [sweep(problem, 0, work.k, -term_at(rung), report) for rung in range(tol.RUNGS)]
+    gives = firm.index(False)
+    assert not any(firm[gives:])
+    found = []
+    for begun in (0, gives - 1, gives, gives + 1, gives + 20, tol.RUNGS):
+        now.rung = begun
+        assert softest_way(problem, work.k, report)
+        assert now.rung == gives
+        found.append((int(report.joint), *report.bend, problem.scratch.gain[: work.k].copy()))
+    for joint, *bend, gain in found:
+        assert joint == found[0][0]
+        np.testing.assert_array_equal(bend, found[0][1:3])
+        # of the joints beyond the one that gives way; those before it keep what earlier sweeps left
+        np.testing.assert_array_equal(gain[joint + 1 :], found[0][3][joint + 1 :])
