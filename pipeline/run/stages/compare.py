@@ -27,14 +27,13 @@ def compare_frames(run: Context, known: Known) -> Known:
             return replace(known, frames=compare_in_views(run, known))
     clues = _clues(run, known)
     if clues is None:
-        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {})))
+        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {}, ())[0]))
     with run.log.timed("compare"):
         entered, simulated = _simulated_otherwise(run, known, clues.known_ways)
         clues.known_ways()
-    known = replace(known, frames=_all_compared(run, known, clues, simulated))
+    frames, entries = _all_compared(run, known, clues, simulated, entered)
+    known = replace(known, frames=frames, entries=entries)
     run.log.warnings += _too_near(known.frames)
-    with run.log.timed("compare"):
-        known = replace(known, entries=four_entries(run, known, entered, clues.way) if entered else ())
     return budgeted(run, known)
 
 
@@ -54,10 +53,20 @@ def _simulated_otherwise(
     return entered, simulated_rivals(run, known, wires)
 
 
+Row = dict[str, Any]
+
+
 def _all_compared(
-    run: Context, known: Known, clues: Clues | None, simulated: Mapping[int, Mapping[str, Array]]
-) -> tuple[Frame, ...]:
-    """The frames with their errors. simulated : by frame, the wires of the simulated predictors."""
+    run: Context,
+    known: Known,
+    clues: Clues | None,
+    simulated: Mapping[int, Mapping[str, Array]],
+    entered: Sequence[Sequence[Solution]],
+) -> tuple[tuple[Frame, ...], tuple[Row, ...]]:
+    """The frames with their errors, and the rows of the four entries, which take as long as a dozen frames.
+
+    simulated : by frame, the wires of the simulated predictors.     entered : the wires from four entries, if any.
+    """
     before = [*_trusted_before(known.frames)]
     after = [*_trusted_before(known.frames[::-1])][::-1]
 
@@ -72,10 +81,20 @@ def _all_compared(
                 done = replace(done, truth=truth)
         return done, part.log
 
-    parts = run.share("compare", one, len(known.frames), inherited=(known.lumen, clues and clues.way))
-    for _, log in parts:
+    def entries(part: Context) -> tuple[tuple[Row, ...], Log]:
+        with part.log.timed("compare"):
+            rows = four_entries(part, known, entered, clues.way) if clues and entered else ()
+        return rows, part.log
+
+    def both(number: int, earlier: object) -> Any:
+        """The entries first: a part so long would keep one core busy at the end."""
+        return one(number - 1, earlier) if number else entries(run.part())
+
+    found = run.share("compare", both, 1 + len(known.frames), inherited=(known.lumen, clues and clues.way))
+    for _, log in found:
         run.log.add(log)
-    return tuple(frame for frame, _ in parts)
+    (rows, _), *parts = found
+    return tuple(frame for frame, _ in parts), rows
 
 
 def _clues(run: Context, known: Known) -> Clues | None:
