@@ -75,8 +75,12 @@ class Clues:
         return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
     def known_ways(self) -> None:
-        """Compute once what all frames share, before these are shared among processes."""
-        _ = self.way, self.shortest, self.hard_wall
+        """Compute once what all frames share but ``shortest``, before these are shared among processes."""
+        _ = self.way, self.hard_wall
+
+    def take_shortest(self, path: Array | None) -> None:
+        """Keep the shortest path, which may have been found in another process."""
+        self.__dict__["shortest"] = path
 
     @cached_property
     def straight_wire(self) -> GuideWire:

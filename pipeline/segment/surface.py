@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
+from pipeline.arrays.cores import in_parts
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.contact import Inner
@@ -152,7 +153,9 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
     lattice = sparse_zeros(site.state.shape, np.float32)
     smooth_lattice(site.volume.values, site.corner, site.taps, site.state, site.near, lattice)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    return voxels, feet(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
+    spacing = np.asarray(site.volume.spacing_mm)
+    parts = in_parts(lambda part: feet(lattice, level, spacing, part, inside), voxels)
+    return voxels, Wall(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArray[np.bool_]:
@@ -170,7 +173,8 @@ def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: flo
     Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
     """
     bend = np.clip(wall.curvature, -1.0 / voxel, 1.0 / voxel)
-    bend = mean_around(owner, voxels, bend, np.isfinite(wall.distance), 2)
+    good, sharp = np.isfinite(wall.distance), bend
+    bend = np.concatenate(in_parts(lambda part: mean_around(owner, part, sharp, good, 2), voxels))
     offset = half_level_offset(bend, blur_mm)
     foot = wall.foot + offset[:, None] * wall.normal
     return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)

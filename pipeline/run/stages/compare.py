@@ -1,6 +1,6 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,7 +29,7 @@ def compare_frames(run: Context, known: Known) -> Known:
     if clues is None:
         return budgeted(run, replace(known, frames=_all_compared(run, known, None, {}, ())[0]))
     with run.log.timed("compare"):
-        entered, simulated = _simulated_otherwise(run, known, clues.known_ways)
+        entered, simulated = _simulated_otherwise(run, known, clues)
         clues.known_ways()
     frames, entries = _all_compared(run, known, clues, simulated, entered)
     known = replace(known, frames=frames, entries=entries)
@@ -38,18 +38,22 @@ def compare_frames(run: Context, known: Known) -> Known:
 
 
 def _simulated_otherwise(
-    run: Context, known: Known, first: Callable[[], object]
+    run: Context, known: Known, clues: Clues
 ) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
     """The wires from four entries (``entries``), and by frame those of the simulated predictors (``rivals``).
 
-    first : what this process can do while helpers simulate.
+    While helpers simulate, this process finds what the clues need; the shortest path, which is small to send, is left
+    to whoever is done first.
     """
     ways = rival_ways(run, known)
 
     def one(number: int, _earlier: object) -> Any:
+        if number > len(ways):
+            return (clues.shortest,)
         return rival_wires(run, known, *ways[number - 1]) if number else replayed_entries(run, known)
 
-    entered, *wires = run.share("compare", one, 1 + len(ways), first)
+    entered, *wires, (shortest,) = run.share("compare", one, 2 + len(ways), clues.known_ways)
+    clues.take_shortest(shortest)
     return entered, simulated_rivals(run, known, wires)
 
 
