@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import solver
 from pipeline.compare.metrics import METRICS
@@ -180,12 +181,8 @@ def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     ledger.record_pages(folder, pages)
 
 
-def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) -> None:
-    """Write every file of the case but its pages; the ledger last, since it says that they are complete.
-
-    files : of the lumen, which may be written already.
-    """
-    key = job.key
+def _write_tables(job: Job, known: Known) -> tuple[dict[str, Any], str]:
+    """Write the tables of a case; returns its row of summary.csv, and its key, for which all sources are read."""
     errors = [outputs.error_row(frame) for frame in known.frames]
     summary = outputs.summary_row(job.case, known, errors)
     tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
@@ -195,11 +192,21 @@ def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) ->
     for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
         if rows:
             tables.write(job.folder / table.file, table, rows)
+    return summary, job.key
+
+
+def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) -> None:
+    """Write every file of the case but its pages; the ledger last, since it says that they are complete.
+
+    files : of the lumen, which may be written already.
+    """
+    write_tables = functools.cache(lambda: _write_tables(job, known))
     write_arrays = functools.partial(outputs.write_frames, job.folder / ledger.FRAMES, known)
     if job.pictures:
-        write_view(job.folder / "view", known, job.cores, write_arrays, files.there)
+        write_view(job.folder / "view", known, job.cores, write_arrays, files.there, write_tables)
     else:
         write_arrays()
+    summary, key = write_tables()
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})

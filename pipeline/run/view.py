@@ -65,11 +65,12 @@ def write_view(
     cores: int = 1,
     beside: Callable[[], object] = nothing,
     lumen_there: Callable[[Lumen | None], bool] = lambda _: False,
+    first: Callable[[], object] = nothing,
 ) -> None:
     """Write the lumen and every frame's wires, each into a file; then the collections and the scene that open them.
 
     beside : writes other files, as one more part that shares the cores.     lumen_there : whether the lumen's files
-    are written already.
+    are written already.     first : called by this process while helpers, if there are any, begin to write.
     """
 
     def one(number: int, _earlier: object) -> bool:
@@ -82,7 +83,7 @@ def write_view(
         return True
 
     written = lumen_there(known.lumen)
-    shared(one, 2 + len(known.frames), cores)
+    shared(one, 2 + len(known.frames), cores, first)
     for kind in ("traced", "simulated", "true"):
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]
