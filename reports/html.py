@@ -47,6 +47,8 @@ from reports.viewer import viewer_data
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
+LONGEST = "projections"
+"""The figure that takes as long as all others of a case together: begun late, it would keep one core busy alone."""
 _OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
 """When and where a case was computed, and how long it took: a page of what is ok says nothing of it, so that the same
 results give the same; one with failures repeats the command."""
@@ -91,13 +93,16 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
 
 
 def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
-    """What is drawn on a case's page: the viewer, first since it takes longest, and the sections."""
+    """What is drawn on a case's page: the viewer and the sections; what takes longest is begun first."""
     entries = declared("case")
+    order = sorted(range(1 + len(entries)), key=lambda n: n > 0 and entries[n - 1]["figure"] != LONGEST)
 
-    def part(number: int) -> dict[str, Any]:
-        return section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
+    def part(turn: int) -> dict[str, Any]:
+        n = order[turn]
+        return section("case", entries[n - 1], case, case.folder, embed) if n else {"of": viewer_data(case)}
 
-    viewer, *sections = each(part, 1 + len(entries))
+    drawn = dict(zip(order, each(part, len(order)), strict=True))
+    viewer, *sections = (drawn[n] for n in sorted(order))
     frames = viewer["of"]["frames"] if viewer["of"] else ()
     curves = {name for frame in frames for name in frame["curves"]}
     return {"viewer": viewer["of"], "curves": curves, "sections": [one for one in sections if one]}
