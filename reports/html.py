@@ -28,7 +28,7 @@ from reports.case_files import (
 from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
-from reports.page import Each, draw_sections, one_by_one, section, write_page
+from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import silent_points
 from reports.tables import read_if_there
@@ -47,8 +47,6 @@ from reports.viewer import viewer_data
 
 PHYSICS = ("wire", "catheter", "down", "wall", "entry", "chosen", "geometry")
 _LISTED_FILES = ("result.json", "errors.csv", "points.csv.gz", "frames.h5")
-LONGEST = "projections"
-"""The figure that takes as long as all others of a case together: begun late, it would keep one core busy alone."""
 _OF_THE_RUN = (TIMINGS.file, "provenance.json", "log.txt")
 """When and where a case was computed, and how long it took: a page of what is ok says nothing of it, so that the same
 results give the same; one with failures repeats the command."""
@@ -95,14 +93,11 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
 def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
     """What is drawn on a case's page: the viewer and the sections; what takes longest is begun first."""
     entries = declared("case")
-    order = sorted(range(1 + len(entries)), key=lambda n: n > 0 and entries[n - 1]["figure"] != LONGEST)
 
-    def part(turn: int) -> dict[str, Any]:
-        n = order[turn]
+    def part(n: int) -> dict[str, Any]:
         return section("case", entries[n - 1], case, case.folder, embed) if n else {"of": viewer_data(case)}
 
-    drawn = dict(zip(order, each(part, len(order)), strict=True))
-    viewer, *sections = (drawn[n] for n in sorted(order))
+    viewer, *sections = begun_first([0, *longest(entries)], part, 1 + len(entries), each)
     frames = viewer["of"]["frames"] if viewer["of"] else ()
     curves = {name for frame in frames for name in frame["curves"]}
     return {"viewer": viewer["of"], "curves": curves, "sections": [one for one in sections if one]}
