@@ -28,7 +28,7 @@ from reports.case_files import (
 from reports.counts import scans
 from reports.figures import RunFiles, declared
 from reports.origin import mixed_settings
-from reports.page import Each, draw_sections, one_by_one, section, write_page
+from reports.page import Each, begun_first, draw_sections, longest, one_by_one, section, write_page
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, SIMULATORS, SUMMARY, SWEEP, TIMINGS
 from reports.sweep import silent_points
 from reports.tables import read_if_there
@@ -91,13 +91,13 @@ def render_case(case_dir: Path, embed: bool = False, each: Each = one_by_one) ->
 
 
 def _drawn(case: CaseFiles, embed: bool, each: Each) -> dict[str, Any]:
-    """What is drawn on a case's page: the viewer, first since it takes longest, and the sections."""
+    """What is drawn on a case's page: the viewer and the sections; what takes longest is begun first."""
     entries = declared("case")
 
-    def part(number: int) -> dict[str, Any]:
-        return section("case", entries[number - 1], case, case.folder, embed) if number else {"of": viewer_data(case)}
+    def part(n: int) -> dict[str, Any]:
+        return section("case", entries[n - 1], case, case.folder, embed) if n else {"of": viewer_data(case)}
 
-    viewer, *sections = each(part, 1 + len(entries))
+    viewer, *sections = begun_first([0, *longest(entries)], part, 1 + len(entries), each)
     frames = viewer["of"]["frames"] if viewer["of"] else ()
     curves = {name for frame in frames for name in frame["curves"]}
     return {"viewer": viewer["of"], "curves": curves, "sections": [one for one in sections if one]}

@@ -1,7 +1,7 @@
 """A page: its figures drawn into a folder, and a template rendered with them."""
 
 import base64
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -15,6 +15,7 @@ from reports.figures import declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 
 R = TypeVar("R")
+LONGEST = "projections"
 _NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0.69  0 0 0 1 0"
 """The matrix by which paper becomes the dark page and ink light, while colours stay theirs."""
 
@@ -29,6 +30,18 @@ class Each(Protocol):
 def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
     """One after the other."""
     return [work(number) for number in range(count)]
+
+
+def longest(entries: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Numbers, from 1, of the figures that take as long as many others."""
+    return [number for number, entry in enumerate(entries, 1) if entry["figure"] == LONGEST]
+
+
+def begun_first(first: Sequence[int], work: Callable[[int], R], count: int, each: Each) -> list[R]:
+    """The results in order, some of the works begun before all others: late, they would keep one core busy alone."""
+    order = sorted(range(count), key=lambda number: number not in first)
+    done = dict(zip(order, each(lambda turn: work(order[turn]), count), strict=True))
+    return [done[number] for number in range(count)]
 
 
 def draw_sections(page: str, data: Any, folder: Path, embed: bool, each: Each = one_by_one) -> list[dict[str, Any]]:

@@ -15,8 +15,8 @@ from numpy.typing import DTypeLike, NDArray
 from solver._compile import on_disk
 
 HOW: dict[str, Any] = {"no_cfunc_wrapper": True}
-entry_point = on_disk(**HOW)
-"""Compiles what Python calls: kept on disk until a source behind it changes."""
+entry_point = on_disk(nogil=True, **HOW)
+"""Compiles what Python calls: kept on disk until a source behind it changes; others may run beside it (``cores``)."""
 kernel = njit(**HOW)
 """Compiles what other kernels call: into the entry points."""
 

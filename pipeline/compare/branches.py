@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from skimage.graph import MCP_Geometric
 from skimage.measure import label
 
+from pipeline.arrays.grids import indices_of
 from pipeline.model import Array
 from solver import Grid
 
@@ -46,37 +47,45 @@ class Branches:
 
 def branches_of(distance: Grid, entry_mm: Array) -> Branches:
     """The branches of a lumen seen from an entry; ``distance`` in mm to its wall, negative inside."""
-    depth = -np.asarray(distance.values, dtype=np.float64)
-    inside = np.argwhere(depth > 0)
-    thick = SLICE_VOXELS * float(distance.spacing_mm.mean())
+    lumen = distance.values < 0
+    inside = indices_of(lumen)
+    at, thick = tuple(inside.T), SLICE_VOXELS * float(distance.spacing_mm.mean())
     first = inside[np.argmin(np.sum((inside - distance.to_index(entry_mm)) ** 2, axis=1))]
-    way, _ = MCP_Geometric(np.where(depth > 0, 1.0, np.inf), sampling=tuple(distance.spacing_mm)).find_costs([first])
+    ways, _ = MCP_Geometric(np.where(lumen, 1.0, np.inf), sampling=tuple(distance.spacing_mm)).find_costs([first])
+    way, bands = ways[at], np.zeros(lumen.shape, np.int32)
     reached = np.isfinite(way)
-    band = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0).astype(np.int32)
-    slices, at = np.asarray(label(band, connectivity=3), dtype=np.int32), tuple(inside.T)
+    bands[at] = np.where(reached, np.floor(np.where(reached, way, 0.0) / thick) + 1, 0)
+    slices = np.asarray(label(bands, connectivity=3), dtype=np.int32)
     # what cannot be reached from the entry is no branch of this vessel and has the number 0
     nodes, middle = slices[at], distance.to_mm(inside.astype(float))
-    graph = _Graph(slices, band, depth, thick)
+    depth = -distance.values[at].astype(np.float64)
+    graph = _Graph(nodes, bands[at], depth, _touching(slices, inside), thick)
     names = graph.names()
     places = [(middle[nodes == node].mean(axis=0), graph.radius[node], names_of) for node, names_of in graph.met(names)]
     return Branches(middle, names[nodes], tuple(places))
 
 
+def _touching(slices: Labels, inside: NDArray[np.int64]) -> Labels:
+    """The pairs (n, 2) of slices that share a face of a voxel, each once; inside (m, 3) : all voxels of slices."""
+    found = []
+    for axis in range(3):
+        here = inside[inside[:, axis] < slices.shape[axis] - 1]
+        low, high = slices[tuple(here.T)], slices[tuple((here + np.eye(3, dtype=np.int64)[axis]).T)]
+        touch = (low != high) & (low > 0) & (high > 0)
+        found.append(np.stack([low[touch], high[touch]], axis=1))
+    return np.asarray(np.unique(np.concatenate(found), axis=0))
+
+
 class _Graph:
     """Slices by number from 1: the band of each, its largest radius in mm, what follows it and what precedes it."""
 
-    def __init__(self, slices: Labels, band: Labels, depth: Array, thick_mm: float) -> None:
+    def __init__(self, slices: Labels, band: Labels, depth: Array, edges: Labels, thick_mm: float) -> None:
+        """slices, band, depth : (n,) of each voxel.     edges : of ``_touching``."""
         count = int(slices.max()) + 1
         self.thick_mm, self.band, self.radius = thick_mm, np.zeros(count, dtype=np.int64), np.zeros(count)
         kept = slices > 0
         self.band[slices[kept]] = band[kept]  # all voxels of a slice are in one band
         np.maximum.at(self.radius, slices[kept], depth[kept])
-        found = []
-        for axis in range(3):
-            low, high = (np.moveaxis(slices, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
-            touch = (low != high) & (low > 0) & (high > 0)
-            found.append(np.stack([low[touch], high[touch]], axis=1))
-        edges = np.unique(np.concatenate(found), axis=0)
         self.after: dict[int, set[int]] = {node: set() for node in range(1, count)}
         self.before: dict[int, set[int]] = {node: set() for node in range(1, count)}
         for a, b in edges.tolist():

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from skimage.graph import MCP_Geometric
 
+from pipeline.arrays.grids import indices_of
 from pipeline.arrays.polyline import at_arc, samples, smooth, to_length
 from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
@@ -61,9 +62,10 @@ class Clues:
 
     def _path(self, room_mm: float, cost: Callable[[Array], Array]) -> Array | None:
         """The cheapest path through voxels that are further from the wall than ``room_mm`` or half the greatest."""
-        clearance = -np.asarray(self.room.values, dtype=np.float64)
-        open_to = clearance > min(room_mm, 0.5 * float(clearance.max()))
-        costs = np.where(open_to, cost(clearance), np.inf)
+        depth = -self.room.values
+        open_to = depth > np.float64(min(room_mm, 0.5 * float(depth.max())))
+        costs = np.full(depth.shape, np.inf)
+        costs[open_to] = cost(depth[open_to].astype(np.float64))
         path = voxel_path(self.room, costs, self.clamp.entry_mm, self.deepest_mm[-1])
         return None if path is None else smooth(path, 0.5 * float(self.room.spacing_mm.mean()))
 
@@ -73,8 +75,12 @@ class Clues:
         return Way(self.centreline, branches_of(self.room, self.clamp.entry_mm))
 
     def known_ways(self) -> None:
-        """Compute once what all frames share, before these are shared among processes."""
-        _ = self.way, self.shortest, self.hard_wall
+        """Compute once what all frames share but ``shortest``, before these are shared among processes."""
+        _ = self.way, self.hard_wall
+
+    def take_shortest(self, path: Array | None) -> None:
+        """Keep the shortest path, which may have been found in another process."""
+        self.__dict__["shortest"] = path
 
     @cached_property
     def straight_wire(self) -> GuideWire:
@@ -188,7 +194,7 @@ def score(clues: Clues, depth_mm: float, seen: Seen, curve_mm: Array, config: Co
 
 def voxel_path(clearance: Grid, cost: Array, entry_mm: Array, target_mm: Array) -> Array | None:
     """Cheapest path (n, 3) LPS mm through voxels of finite cost, or None where the two ends are not joined."""
-    walkable = np.argwhere(cost < np.inf)
+    walkable = indices_of(cost < np.inf)
     if len(walkable) == 0:
         return None
     wanted = [clearance.to_index(p) for p in (entry_mm, target_mm)]

@@ -100,7 +100,8 @@ def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
 def anchor(reference: Volume, lumen: Lumen) -> Anchor:
     """The wire-free scan prepared once for all frames; ``reference`` may be the crop that holds the lumen."""
     distance = lumen.distance
-    band = np.abs(distance.values) < BAND_VOXELS * float(np.min(distance.spacing_mm))
+    reach = BAND_VOXELS * float(np.min(distance.spacing_mm))
+    band = (distance.values < reach) & (distance.values > -reach)  # without a second box of numbers
     return Anchor(reference, static_points(reference, _thinned(distance, band, POINTS)))
 
 

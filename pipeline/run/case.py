@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import solver
 from pipeline.compare.metrics import METRICS
@@ -19,8 +20,9 @@ from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
+from pipeline.run.stages.known import passed_over
 from pipeline.run.store import code_of, digest
-from pipeline.run.view import write_view
+from pipeline.run.view import LumenFiles, write_view
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -139,11 +141,15 @@ def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> No
         load_kernels(progress)
     clock = perf_counter()
     log = Log(progress)
-    store = Store(job.cache, progress.warn)
-    run = Context(job.case, job.settings.config, store, log, job.cores, job.simulates, hashed)
-    known = run_stages(run, job.until)
-    hashed()
-    _write(job, known, log, job.key, clock)
+    store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
+    begin = files.begin if job.pictures and job.cores > 1 else passed_over
+    run = Context(job.case, job.settings.config, store, log, job.cores, job.simulates, hashed, begin)
+    try:
+        known = run_stages(run, job.until)
+        hashed()
+        _write(job, known, log, files, clock)
+    finally:
+        files.end()
     if job.wants_pages:
         draw(job.folder, job.wants_pages, job.cores)
     progress.write(f"done in {perf_counter() - clock:.2f} s")
@@ -175,8 +181,8 @@ def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:
     ledger.record_pages(folder, pages)
 
 
-def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
-    """Write every file of the case but its pages; the ledger last, since it says that they are complete."""
+def _write_tables(job: Job, known: Known) -> tuple[dict[str, Any], str]:
+    """Write the tables of a case; returns its row of summary.csv, and its key, for which all sources are read."""
     errors = [outputs.error_row(frame) for frame in known.frames]
     summary = outputs.summary_row(job.case, known, errors)
     tables.write(job.folder / ERRORS.file, ERRORS, outputs.with_strongest(errors, summary))
@@ -186,11 +192,21 @@ def _write(job: Job, known: Known, log: Log, key: str, clock: float) -> None:
     for table, rows in ((BUDGET, known.sources), (ENTRIES, known.entries)):
         if rows:
             tables.write(job.folder / table.file, table, rows)
+    return summary, job.key
+
+
+def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) -> None:
+    """Write every file of the case but its pages; the ledger last, since it says that they are complete.
+
+    files : of the lumen, which may be written already.
+    """
+    write_tables = functools.cache(lambda: _write_tables(job, known))
     write_arrays = functools.partial(outputs.write_frames, job.folder / ledger.FRAMES, known)
     if job.pictures:
-        write_view(job.folder / "view", known, job.cores, write_arrays)
+        write_view(job.folder / "view", known, job.cores, write_arrays, files.there, write_tables)
     else:
         write_arrays()
+    summary, key = write_tables()
     spent = {"total_s": perf_counter() - clock, "peak_memory_MiB": peak_memory_mib()}
     tables.write(job.folder / TIMINGS.file, TIMINGS, outputs.timing_rows(job.case.id, log, **spent))
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})

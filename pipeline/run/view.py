@@ -4,7 +4,10 @@ The lumen, closed, as surface and label map; every frame's wires as lines with a
 the frames, and a scene that opens everything.
 """
 
+import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +17,7 @@ from skimage.measure import marching_cubes
 
 from pipeline.load.geometry import Header
 from pipeline.model import Array, Lumen, arc_length
-from pipeline.run.helpers import nothing, shared
+from pipeline.run.helpers import forked, nothing, shared
 from pipeline.run.stages import Known
 from pipeline.run.stages.known import Frame
 from reports import colours, export
@@ -24,10 +27,50 @@ _LEAST = 1e-3
 """Least distance, in voxels, from the padding voxels' centres to the surface: no triangle has zero area."""
 
 
-def write_view(folder: Path, known: Known, cores: int = 1, beside: Callable[[], object] = nothing) -> None:
+class LumenFiles:
+    """Writes the files of a lumen in a process of its own, while the case goes on: to fit a clamp keeps one core busy.
+
+    It only saves time: what that process does not write is written with the others.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._begun: tuple[Lumen, ForkProcess] | None = None
+
+    def begin(self, lumen: Lumen) -> None:
+        """Begin to write the files of a lumen."""
+
+        def write() -> None:
+            with suppress(Exception):
+                _write_lumen(self.folder, lumen)
+                return
+            sys.exit(1)  # without words: the case writes them itself, and says why it cannot
+
+        self._begun = lumen, forked(write)
+
+    def there(self, lumen: Lumen | None) -> bool:
+        """Whether the files of this very lumen are written; waits for them."""
+        self.end()
+        return self._begun is not None and self._begun[0] is lumen and self._begun[1].exitcode == 0
+
+    def end(self) -> None:
+        """Wait for the process, so that nothing is written later."""
+        if self._begun is not None:
+            self._begun[1].join()
+
+
+def write_view(
+    folder: Path,
+    known: Known,
+    cores: int = 1,
+    beside: Callable[[], object] = nothing,
+    lumen_there: Callable[[Lumen | None], bool] = lambda _: False,
+    first: Callable[[], object] = nothing,
+) -> None:
     """Write the lumen and every frame's wires, each into a file; then the collections and the scene that open them.
 
-    beside : writes other files, as one more part that shares the cores.
+    beside : writes other files, as one more part that shares the cores.     lumen_there : whether the lumen's files
+    are written already.     first : called by this process while helpers, if there are any, begin to write.
     """
 
     def one(number: int, _earlier: object) -> bool:
@@ -35,11 +78,12 @@ def write_view(folder: Path, known: Known, cores: int = 1, beside: Callable[[], 
             _write_wires(folder, known.frames[number - 2])
         elif number == 1:
             beside()
-        elif known.lumen is not None:
+        elif known.lumen is not None and not written:
             _write_lumen(folder, known.lumen)
         return True
 
-    shared(one, 2 + len(known.frames), cores)
+    written = lumen_there(known.lumen)
+    shared(one, 2 + len(known.frames), cores, first)
     for kind in ("traced", "simulated", "true"):
         export.write_collection(folder, f"wire_{kind}")
     with_wire = [frame.index for frame in known.frames if frame.simulated is not None]

@@ -4,6 +4,7 @@ However this process ends, even without a chance to clean up, its workers end wi
 """
 
 import fcntl
+import gc
 import math
 import multiprocessing
 import os
@@ -150,6 +151,7 @@ def _serve(pipe: Any, work: Callable[[J], R]) -> None:
     # Ctrl-C reaches every process of a terminal; this one is ended by its parent
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
+    gc.freeze()  # what is imported never becomes garbage: the collector need not go over it in every round
     with lasting(), suppress(EOFError, OSError):
         while True:
             pipe.send(guarded(work, pipe.recv()))

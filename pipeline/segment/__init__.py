@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pipeline.arrays.cores import side_by_side
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Lumen, Volume
 from pipeline.segment import bone, uneven
@@ -84,8 +85,9 @@ def segment(
     if wire_radius_mm is not None:
         found = _around_wire(grid, found, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur
-    open_ones = contacts(found.distance)
-    bright = bone.touching(grid, found.distance, site.corner, wall.levels)
+    open_ones, bright = side_by_side(
+        lambda: contacts(found.distance), lambda: bone.touching(grid, found.distance, site.corner, wall.levels)
+    )
     if len(region.thin):
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)

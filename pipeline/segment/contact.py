@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.contact import Cores, Inner, along_cores, meetings, nearest_core, runs_on, thickness
+from pipeline.segment._kernels.voxels import rebased
 from pipeline.segment.levels import Index
 from solver.grid import Array, Grid
 
@@ -87,6 +88,15 @@ def numbered(shape: tuple[int, ...], flat: Index) -> Inner:
     return Inner(ids, flat)
 
 
+def inside_of(values: NDArray[np.float32]) -> tuple[Index, Inner]:
+    """The voxels where a signed distance is negative: flat, ascending, and in a box with an empty layer around.
+
+    Kernels step to neighbours without checking for a box's border.
+    """
+    flat, shape = np.flatnonzero(values < 0), tuple(n + 2 for n in values.shape)
+    return flat, numbered(shape, rebased(flat, values.shape, np.ones(3, np.int64), shape))
+
+
 def _vessels_only(core: NDArray[np.bool_], cores: Cores, thick: Array, voxel: float) -> NDArray[np.bool_]:
     """The core (n,) without parts too short or too thin to be a vessel's."""
     part, steps = cores
@@ -103,13 +113,10 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     distance : signed distance, mm, negative inside; C-contiguous.
     """
     values, spacing = distance.values, np.asarray(distance.spacing_mm)
-    # kernels step to neighbours without checking for the box's border: an empty layer is put around
-    inside = np.pad(values < 0, 1)
-    inner = np.flatnonzero(inside)
+    inner, voxels = inside_of(values)
     if len(inner) == 0:
         return ()
-    voxels = numbered(inside.shape, inner)
-    depth = -values[values < 0].astype(np.float64)
+    depth = -values.reshape(-1)[inner].astype(np.float64)
     thick = thickness(voxels, depth, spacing)
     core = depth >= CORE * thick
     cores = along_cores(voxels, core)
@@ -128,7 +135,7 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     found = found[[passes[p] and passes[q] for _, p, q in found]]
     if len(found) == 0:
         return ()
-    places = np.stack(np.unravel_index(inner[found[:, 0]], inside.shape), axis=1) - 1
+    places = np.stack(np.unravel_index(inner[found[:, 0]], values.shape), axis=1)
     group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
     face = every * float(np.prod(spacing) ** (2 / 3))
     groups = [places[group == n] for n in range(group.max() + 1)]

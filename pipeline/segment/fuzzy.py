@@ -13,7 +13,7 @@ from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, connect_relative, estimate_affinity, neighbours
 from pipeline.segment.levels import GreyLevels, Index, Region, failed, levels_at, seed_voxels
 from pipeline.segment.necks import through_necks
-from pipeline.segment.thin import low_region, thin_branches
+from pipeline.segment.thin import beyond_vessel, low_region, thin_branches
 from solver.grid import Grid
 
 LEAST_CONTRAST = 2.0
@@ -75,8 +75,10 @@ def fuzzy_region(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> Regi
         "voxels_total": total, "voxels_read": read, "voxels_read_again": more, "voxels_skipped": total - read,
     }  # fmt: skip
     region = Region(order, np.zeros(0, np.int64), levels, affinity.taps, counters)
+    beyond, thin = None, np.zeros(0, np.int64)
     if not len(config.other_seeds_mm):  # what lies behind a neck might be what those seeds are to cut off
-        region = through_necks(grid, low, region, affinity, config)
-    thin = thin_branches(grid, low, region.voxels, levels, affinity)
+        region, beyond = through_necks(grid, low, region, affinity, config)
+    if len(low) > len(region.voxels):
+        thin = thin_branches(beyond or beyond_vessel(grid, low, region.voxels, levels, affinity))
     counters = {**region.counters, "voxels_visited": float(len(region.voxels)), "voxels_thin": float(len(thin))}
     return replace(region, thin=thin, counters=counters)

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.grids import indices_of, spread
+from pipeline.arrays.grids import spread
 from pipeline.model import Counters
+from pipeline.segment._kernels.voxels import rebased
 from pipeline.status import FrameStatus, StageError
 from solver.grid import Grid
 
@@ -141,19 +142,19 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     its plateau: its grey is divided by the profile of a blurred cylinder (non-central chi^2). What is too bright for
     the vessel does not count.
     """
-    inside = distance.values < 0
-    if not np.isfinite(blur_mm) or not inside.any():
+    inside = np.flatnonzero(distance.values < 0)
+    if not np.isfinite(blur_mm) or not len(inside):
         return levels
-    corner = np.rint(scan.to_index(distance.origin_mm)).astype(int)
-    window = tuple(slice(int(c), int(c) + n) for c, n in zip(corner, distance.shape, strict=True))
-    off_wall, grey = -distance.values[inside], scan.values[window][inside]
+    corner = np.rint(scan.to_index(distance.origin_mm)).astype(np.int64)
+    there = rebased(inside, distance.shape, corner, scan.shape)
+    off_wall, grey = -distance.values.reshape(-1)[inside], scan.values.reshape(-1)[there]
     depth, core = _deepest(off_wall)
     limit = _brightest(distance, corner, levels, blur_mm)
     some = core[:: max(1, len(core) // 500)]
-    foreign = float(np.mean(grey_around(scan, indices_of(inside)[some] + corner) > limit))
+    foreign = float(np.mean(grey_around(scan, _indices(there[some], scan)) > limit))
     if foreign > BRIGHT_SHARE:
         some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
-        some = some[grey_around(scan, indices_of(inside)[some] + corner) <= limit]
+        some = some[grey_around(scan, _indices(there[some], scan)) <= limit]
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
         levels = replace(levels, brightest=limit, foreign=foreign)
@@ -165,6 +166,10 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
     peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
     return replace(levels, inside=levels.outside + peak)
+
+
+def _indices(flat: Index, grid: Grid) -> Index:
+    return np.stack(np.unravel_index(flat, grid.shape), axis=1)
 
 
 def _deepest(off_wall: NDArray[Any]) -> tuple[float, Index]:

@@ -5,21 +5,25 @@ other part of the vessel is as bright, connected to it at a lower grey, and lies
 a bone that touches its flank does not.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
+from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.solids import cones
+from pipeline.segment._kernels.voxels import components, gaps, shell
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import connect, neighbours
+from pipeline.segment.contact import inside_of
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, Region
-from pipeline.segment.thin import CREST_VOXELS, FULL, LEAST_RADIUS, beyond_skirt
+from pipeline.segment.surface import boxed
+from pipeline.segment.thin import CREST_VOXELS, FULL, LEAST_RADIUS, Beyond, beyond_vessel
 from solver.grid import Array, Grid
 
 REACH = 14.0
@@ -47,12 +51,9 @@ def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
     return np.asarray(away, float), np.asarray(at, np.int64)
 
 
-def _shell(flat: Index, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which voxels (flat, ascending) have a 6-neighbour outside the set: the one nearest to the vessel is of these."""
-    steps = np.array([shape[1] * shape[2], shape[2], 1])
-    beside = (flat[:, None] + np.concatenate([steps, -steps])).ravel()
-    at = np.minimum(np.searchsorted(flat, beside), len(flat) - 1)
-    return np.asarray(~(flat[at] == beside).reshape(len(flat), 6).all(axis=1))
+def _shell(flat: Index, grid: Grid) -> Index:
+    """The voxels (flat) that have a 6-neighbour outside the set: the one nearest to a voxel outside is of these."""
+    return np.asarray(flat[shell(boxed(flat, grid))])
 
 
 def _runs_along(points: Array, end: Array, heading: Array) -> bool:
@@ -86,28 +87,32 @@ def _axis(grid: Grid, start: Array, stop: Array) -> Array:
     return np.concatenate([best[:1], inner, best[-1:]])
 
 
-def _next(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region | None:
+def _next(grid: Grid, beyond: Beyond, region: Region, affinity: Affinity, config: SegmentConfig) -> Region | None:
     """The region with what lies behind one neck; None where there is none."""
     levels, taps = region.levels, affinity.taps
-    bright = smooth_voxels(grid.values, taps, region.voxels)
-    found, _ = beyond_skirt(grid, region.voxels[bright >= levels.outside + FULL * levels.contrast], low)
-    share = (smooth_voxels(grid.values, taps, found) - levels.outside) / levels.contrast
-    left = found[share >= FULL]
+    left = beyond.voxels[beyond.share >= FULL]
     if not config.least_voxels <= len(left) <= MOST_BEYOND:
         return None
-    own = _points(region.voxels, grid)
-    tree = cKDTree(own)
-    gap, shell = np.full(len(left), np.inf), _shell(left, grid.shape)
-    gap[shell] = _nearest(tree, _points(left[shell], grid))[0]
+    edge = _shell(left, grid)
+    gap = gaps(edge, _shell(region.voxels, grid), grid.shape, REACH)
+    tried = sparse_zeros((int(np.prod(grid.shape)),), np.bool_)
+
+    @cache
+    def vessel() -> tuple[Array, cKDTree]:
+        """Made only for what is not bone."""
+        own = _points(region.voxels, grid)
+        return own, cKDTree(own)
+
     for _ in range(MOST_TRIED):
-        n = int(np.argmin(gap))
-        if not np.isfinite(gap[n]):
+        n = int(np.argmin(gap)) if len(gap) else -1
+        if n < 0 or not np.isfinite(gap[n]):
             break
-        seed = np.array(np.unravel_index(left[n : n + 1], grid.shape)).T
+        seed = np.array(np.unravel_index(edge[n : n + 1], grid.shape)).T
         more, read = connect(grid, seed, affinity, config.threshold, neighbours(config.adjacency))
-        gap[np.isin(left, more)] = np.inf
+        tried[more] = True
+        gap[tried[edge]] = np.inf
         gap[n] = np.inf
-        neck = _neck(grid, own, tree, more, levels, taps) if len(more) >= config.least_voxels else None
+        neck = _neck(grid, vessel, more, levels, taps) if len(more) >= config.least_voxels else None
         if neck is not None:
             counters = {**region.counters, "voxels_read_again": region.counters["voxels_read_again"] + read}
             both = np.concatenate([region.voxels, more])
@@ -116,26 +121,33 @@ def _next(grid: Grid, low: Index, region: Region, affinity: Affinity, config: Se
 
 
 def _neck(
-    grid: Grid, own: Array, tree: cKDTree, more: Index, levels: GreyLevels, taps: NDArray[np.float32]
+    grid: Grid, vessel: Callable[[], tuple[Array, cKDTree]], more: Index, levels: GreyLevels, taps: NDArray[np.float32]
 ) -> Array | None:
     """The axis of the neck from the vessel to what is beyond; None where that is no other part of it."""
     core = smooth_voxels(grid.values, taps, more[:: max(1, len(more) // 2000)])
     if np.quantile(core, 0.75) > levels.outside + BRIGHTER * levels.contrast:  # bone
         return None
+    own, tree = vessel()
     beyond = _points(more, grid)
     gap, at = _nearest(tree, beyond)
     n = int(np.argmin(gap))
     return _ahead(grid, (own, own[at[n]]), (beyond, beyond[n])) if np.isfinite(gap[n]) else None
 
 
-def through_necks(grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig) -> Region:
-    """The region with all that lies behind its necks. low : flat indices of what is connected to it at a lower grey."""
-    while len(region.necks) < MOST_NECKS:
-        grown = _next(grid, low, region, affinity, config)
+def through_necks(
+    grid: Grid, low: Index, region: Region, affinity: Affinity, config: SegmentConfig
+) -> tuple[Region, Beyond | None]:
+    """The region with all that lies behind its necks, and what is left beyond it, where that is known.
+
+    low : flat indices of what is connected to it at a lower grey.
+    """
+    while len(low) and len(region.necks) < MOST_NECKS:
+        beyond = beyond_vessel(grid, low, region.voxels, region.levels, affinity)
+        grown = _next(grid, beyond, region, affinity, config)
         if grown is None:
-            break
+            return region, beyond
         region = grown
-    return region
+    return region, None
 
 
 def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least: int) -> list[Array]:
@@ -144,13 +156,12 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
     The wall is looked for in smoothed grey: a neck of 1.0 to 1.4 voxels radius reaches half the contrast before the
     smoothing, and not after. distance : on the box that begins at ``corner``; least : voxels that a part must have.
     """
-    inside = distance < 0
-    numbers, _ = ndimage.label(inside)
-    number = numbers[inside]
-    large = np.flatnonzero(np.bincount(number, minlength=1) >= least)
+    flat, inner = inside_of(distance)
+    number = components(inner)
+    large = np.flatnonzero(np.bincount(number) >= least)
     if len(large) < 2:
         return []
-    voxels = np.argwhere(inside)
+    voxels = np.stack(np.unravel_index(flat, distance.shape), axis=1)
     necks: list[Array] = []
     pieces = sorted((voxels[number == n] + corner for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]

@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
+from pipeline.arrays.cores import in_parts
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
+from pipeline.segment._kernels.contact import Inner
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
+from pipeline.segment._kernels.voxels import extent, rebased
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
+from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
 from solver.grid import Array, Grid, read_only
 
@@ -37,6 +41,9 @@ INWARDS = 2.5
 """How far inside the wall, in voxels, the grey has reached its plateau."""
 THINNEST = 1.2
 """Radius over blur below which a blurred cylinder no longer reaches half its contrast (1.177), with a margin."""
+
+
+Shape = tuple[int, int, int]
 
 
 def _half_radius(radius: float) -> float:
@@ -107,19 +114,25 @@ class Site:
         return Grid(empty, self.volume.spacing_mm, self.volume.to_mm(self.corner), self.volume.direction)
 
 
-def padded_box(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, tuple[int, ...]]:
+def padded_box(voxels: Index, grid: Grid, margin_mm: float) -> tuple[Index, Shape]:
     """The box of the voxels (flat) with ``margin_mm`` around them: its first voxel, and its shape once padded."""
     margin = np.ceil(margin_mm / grid.spacing_mm).astype(np.int64)
-    index = np.unravel_index(voxels, grid.shape)
-    low = np.maximum(np.array([i.min() for i in index]) - margin, 0)
-    high = np.minimum(np.array([i.max() for i in index]) + margin + 1, grid.shape)
-    return low, tuple(int(n) + 2 * PAD for n in high - low)
+    first, last = extent(voxels, grid.shape)
+    low = np.maximum(first - margin, 0)
+    high = np.minimum(last + margin + 1, grid.shape)
+    a, b, c = (int(n) + 2 * PAD for n in high - low)
+    return low, (a, b, c)
 
 
-def into_box(voxels: Index, grid: Grid, corner: Index, shape: tuple[int, ...]) -> Index:
+def into_box(voxels: Index, grid: Grid, corner: Index, shape: Shape) -> Index:
     """Flat indices in a padded box of flat indices in the grid."""
-    index = np.unravel_index(voxels, grid.shape)
-    return np.asarray(np.ravel_multi_index(tuple(i - c + PAD for i, c in zip(index, corner, strict=True)), shape))
+    return np.asarray(rebased(voxels, grid.shape, PAD - corner, shape))
+
+
+def boxed(voxels: Index, grid: Grid) -> Inner:
+    """The voxels (flat) of a grid in a padded box of their own, in their order."""
+    corner, shape = padded_box(voxels, grid, 0.0)
+    return numbered(shape, into_box(voxels, grid, corner, shape))
 
 
 def prepare(volume: Grid, order: Index, taps: NDArray[np.float32], margin_mm: float, more: Index | None = None) -> Site:
@@ -140,7 +153,9 @@ def _half_level_wall(site: Site, level: float, inside: NDArray[np.uint8]) -> tup
     lattice = sparse_zeros(site.state.shape, np.float32)
     smooth_lattice(site.volume.values, site.corner, site.taps, site.state, site.near, lattice)
     voxels = surface_voxels(site.state, lattice, level, DEEP, site.near, inside)
-    return voxels, feet(lattice, level, np.asarray(site.volume.spacing_mm), voxels, inside)
+    spacing = np.asarray(site.volume.spacing_mm)
+    parts = in_parts(lambda part: feet(lattice, level, spacing, part, inside), voxels)
+    return voxels, Wall(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArray[np.bool_]:
@@ -158,7 +173,8 @@ def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: flo
     Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
     """
     bend = np.clip(wall.curvature, -1.0 / voxel, 1.0 / voxel)
-    bend = mean_around(owner, voxels, bend, np.isfinite(wall.distance), 2)
+    good, sharp = np.isfinite(wall.distance), bend
+    bend = np.concatenate(in_parts(lambda part: mean_around(owner, part, sharp, good, 2), voxels))
     offset = half_level_offset(bend, blur_mm)
     foot = wall.foot + offset[:, None] * wall.normal
     return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)

@@ -5,6 +5,9 @@ of 0.8 voxel leave half of it, one and a third a quarter. Connectedness at half 
 connected to the vessel at a lower grey, and beyond the vessel's blurred skirt it is long, thin and nowhere bright.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -17,6 +20,7 @@ from pipeline.segment._kernels.connect import Affinity
 from pipeline.segment._kernels.contact import Inner, along_cores
 from pipeline.segment._kernels.crests import crests
 from pipeline.segment._kernels.solids import cones
+from pipeline.segment._kernels.voxels import largest, rebased
 from pipeline.segment._kernels.wall import PAD, dilate
 from pipeline.segment.connect import connect, neighbours, noise_after
 from pipeline.segment.contact import numbered, parts
@@ -52,6 +56,20 @@ SHARP = 0.4
 """Least curvature of a crest over that of a Gaussian line of its height; half a blur off the middle it is still 0.7."""
 
 
+@dataclass(frozen=True, eq=False)
+class Beyond:
+    """What is connected to a vessel at the faintest grey and lies beyond the skirt of its blur.
+
+    voxels : flat, ascending.  inner : the same in a box.  share : their smoothed grey (n,) over the contrast.  thick :
+    whether any part of the vessel is thick enough for a surface at half height.
+    """
+
+    voxels: Index
+    inner: Inner
+    share: NDArray[Any]
+    thick: bool
+
+
 Balls = tuple[Array, Array]
 """Thin branches as balls: centres (n, 3) mm along the box's axes from its first voxel, radii (n,) mm."""
 
@@ -75,9 +93,16 @@ def beyond_skirt(volume: Grid, thick: Index, low: Index) -> tuple[Index, Inner]:
     state.reshape(-1)[main] = 1
     dilate(state, main, SKIRT, 2)
     inner = np.sort(wide[state.reshape(-1)[wide] == 0])
-    index = np.unravel_index(inner, shape)
-    found = np.ravel_multi_index(tuple(i - PAD + c for i, c in zip(index, corner, strict=True)), volume.shape)
-    return found, numbered(shape, inner)
+    return rebased(inner, shape, corner - PAD, volume.shape), numbered(shape, inner)
+
+
+def beyond_vessel(volume: Grid, low: Index, order: Index, levels: GreyLevels, affinity: Affinity) -> Beyond:
+    """What lies beyond the vessel ``order``, among the voxels of ``low_region``."""
+    bright = smooth_voxels(volume.values, affinity.taps, order)
+    thick = order[bright >= levels.outside + FULL * levels.contrast]
+    found, inner = beyond_skirt(volume, thick, low)
+    share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
+    return Beyond(found, inner, share, len(thick) > 0)
 
 
 def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinity) -> tuple[Index, float]:
@@ -86,26 +111,15 @@ def low_region(volume: Grid, seeds: Index, levels: GreyLevels, affinity: Affinit
     return (np.zeros(0, np.int64), 0.0) if tables is None else connect(volume, seeds, tables, 0.5, neighbours(6))
 
 
-def thin_branches(volume: Grid, low: Index, order: Index, levels: GreyLevels, affinity: Affinity) -> Index:
-    """Flat indices of the voxels of thin branches beyond the vessel ``order``, among those of ``low_region``."""
-    nothing = np.zeros(0, np.int64)
-    if len(low) <= len(order):
-        return nothing
-    bright = smooth_voxels(volume.values, affinity.taps, order)
-    thick = order[bright >= levels.outside + FULL * levels.contrast]
-    if len(thick) == 0:
-        return nothing
-    found, beyond = beyond_skirt(volume, thick, low)
-    if len(found) < SHORTEST:
-        return nothing
-    part, steps = along_cores(beyond, np.ones(len(found), bool))
-    share = (smooth_voxels(volume.values, affinity.taps, found) - levels.outside) / levels.contrast
+def thin_branches(beyond: Beyond) -> Index:
+    """Flat indices of the voxels of thin branches, among those beyond the vessel."""
+    if not beyond.thick or len(beyond.voxels) < SHORTEST:
+        return np.zeros(0, np.int64)
+    part, steps = along_cores(beyond.inner, np.ones(len(beyond.voxels), bool))
     count = np.bincount(part)
-    length, most = np.zeros(len(count)), np.zeros(len(count))
-    np.maximum.at(length, part, steps + 1)
-    np.maximum.at(most, part, share)
+    length, most = largest(part, steps + 1, len(count)), largest(part, beyond.share, len(count))
     good = (length >= SHORTEST) & (count <= FATTEST * length) & (most <= BRIGHTEST)
-    return np.asarray(found[good[part]], np.int64)
+    return np.asarray(beyond.voxels[good[part]], np.int64)
 
 
 def _highest(points: Array, share: Array) -> NDArray[np.bool_]:

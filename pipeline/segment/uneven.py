@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import indices_of, spread
+from pipeline.arrays.grids import spread
+from pipeline.segment._kernels.voxels import eroded, extent, rebased
+from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, Region
 from solver.grid import Array, Grid, read_only
 
@@ -49,16 +51,21 @@ class Filling:
     least: float
 
 
+def _core(voxels: Index, grid: Grid, low: Index, shape: tuple[int, ...]) -> Index:
+    """Indices (n, 3), in the box that begins at ``low``, of the voxels that lie CORE layers inside; ascending."""
+    wider = shape[0] + 2, shape[1] + 2, shape[2] + 2
+    flat = np.sort(rebased(voxels, grid.shape, 1 - low, wider))
+    return np.stack(np.unravel_index(eroded(numbered(wider, flat), CORE), wider), axis=1) - 1
+
+
 def filling(grid: Grid, region: Region) -> Filling:
     """The share of the contrast that the vessel has, block by block, measured in its core."""
-    index = np.stack(np.unravel_index(region.voxels, grid.shape), axis=1)
+    first, last = extent(region.voxels, grid.shape)
     margin = CARRIED_BLOCKS * BLOCK + CORE
-    low = np.maximum(index.min(axis=0) - margin, 0)
-    high = np.minimum(index.max(axis=0) + margin + 1, grid.shape)
-    inside = np.zeros(tuple(high - low), bool)
-    inside[tuple((index - low).T)] = True
-    core = indices_of(ndimage.binary_erosion(inside, iterations=CORE))
-    shape = tuple(-(-inside.shape[a] // BLOCK) for a in range(3))
+    low = np.maximum(first - margin, 0)
+    high = np.minimum(last + margin + 1, grid.shape)
+    core = _core(region.voxels, grid, low, tuple(int(n) for n in high - low))
+    shape = tuple(int(-(-n // BLOCK)) for n in high - low)
     if len(core) == 0:
         return Filling(np.ones(shape), low, 1.0)
     grey = (grid.values[tuple((core + low).T)].astype(float) - region.levels.outside) / region.levels.contrast

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future
@@ -14,6 +15,7 @@ import pytest
 
 from pipeline.run import batch
 from pipeline.run.batch import LOST, run_all
+from pipeline.run.launch import imports_set_aside
 
 
 def work(folder: Path, job: int) -> None:
@@ -76,3 +78,10 @@ def test_one_worker_runs_here_and_in_order(tmp_path: Path) -> None:
     outcomes = list(run_all([3, 1, 2], seen.append))
     assert seen == [3, 1, 2]
     assert all(not outcome.error for outcome in outcomes)
+
+
+def test_while_cases_run_the_collector_passes_over_what_was_imported_and_afterwards_no_more() -> None:
+    assert gc.get_freeze_count() == 0
+    with imports_set_aside():
+        assert gc.get_freeze_count() > 10_000
+    assert gc.get_freeze_count() == 0

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from pipeline.run.view import closed_surface
+from pipeline.model import Lumen
+from pipeline.run.view import LumenFiles, closed_surface
 from solver import Grid
 
 SPACING = np.array([0.5, 0.4, 0.6])
@@ -45,3 +48,20 @@ def test_what_lies_exactly_on_a_voxel_of_the_edge_is_closed_too() -> None:
     vertices, triangles = closed_surface(Grid(distance, np.ones(3), np.zeros(3), np.eye(3)))
     assert open_edges(triangles) == 0
     assert np.all(vertices <= 3.5 + 1e-6)
+
+
+def test_a_lumen_is_written_beside_the_case_and_what_fails_is_left_to_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    one, other = (Lumen(Grid(np.full((4, 4, 4), -1.0), np.ones(3), np.zeros(3), np.eye(3))) for _ in range(2))
+    files = LumenFiles(tmp_path / "view")
+    assert not files.there(None)
+    files.begin(one)
+    assert files.there(one)
+    assert not files.there(other)
+    assert sorted(p.name for p in (tmp_path / "view").iterdir()) == ["lumen.seg.nrrd", "lumen.stl", "lumen.vtp"]
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
+    lost = LumenFiles(tmp_path / "file" / "view")
+    lost.begin(one)
+    assert not lost.there(one)
+    assert capfd.readouterr().err == ""

@@ -1,6 +1,6 @@
 """compare: errors of every frame beside those of the trivial predictors."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,37 +27,50 @@ def compare_frames(run: Context, known: Known) -> Known:
             return replace(known, frames=compare_in_views(run, known))
     clues = _clues(run, known)
     if clues is None:
-        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {})))
+        return budgeted(run, replace(known, frames=_all_compared(run, known, None, {}, ())[0]))
     with run.log.timed("compare"):
-        entered, simulated = _simulated_otherwise(run, known, clues.known_ways)
+        entered, simulated = _simulated_otherwise(run, known, clues)
         clues.known_ways()
-    known = replace(known, frames=_all_compared(run, known, clues, simulated))
+    frames, entries = _all_compared(run, known, clues, simulated, entered)
+    known = replace(known, frames=frames, entries=entries)
     run.log.warnings += _too_near(known.frames)
-    with run.log.timed("compare"):
-        known = replace(known, entries=four_entries(run, known, entered, clues.way) if entered else ())
     return budgeted(run, known)
 
 
 def _simulated_otherwise(
-    run: Context, known: Known, first: Callable[[], object]
+    run: Context, known: Known, clues: Clues
 ) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
     """The wires from four entries (``entries``), and by frame those of the simulated predictors (``rivals``).
 
-    first : what this process can do while helpers simulate.
+    While helpers simulate, this process finds what the clues need; the shortest path, which is small to send, is left
+    to whoever is done first.
     """
     ways = rival_ways(run, known)
 
     def one(number: int, _earlier: object) -> Any:
+        if number > len(ways):
+            return (clues.shortest,)
         return rival_wires(run, known, *ways[number - 1]) if number else replayed_entries(run, known)
 
-    entered, *wires = run.share("compare", one, 1 + len(ways), first)
+    entered, *wires, (shortest,) = run.share("compare", one, 2 + len(ways), clues.known_ways)
+    clues.take_shortest(shortest)
     return entered, simulated_rivals(run, known, wires)
 
 
+Row = dict[str, Any]
+
+
 def _all_compared(
-    run: Context, known: Known, clues: Clues | None, simulated: Mapping[int, Mapping[str, Array]]
-) -> tuple[Frame, ...]:
-    """The frames with their errors. simulated : by frame, the wires of the simulated predictors."""
+    run: Context,
+    known: Known,
+    clues: Clues | None,
+    simulated: Mapping[int, Mapping[str, Array]],
+    entered: Sequence[Sequence[Solution]],
+) -> tuple[tuple[Frame, ...], tuple[Row, ...]]:
+    """The frames with their errors, and the rows of the four entries, which take as long as a dozen frames.
+
+    simulated : by frame, the wires of the simulated predictors.     entered : the wires from four entries, if any.
+    """
     before = [*_trusted_before(known.frames)]
     after = [*_trusted_before(known.frames[::-1])][::-1]
 
@@ -72,10 +85,20 @@ def _all_compared(
                 done = replace(done, truth=truth)
         return done, part.log
 
-    parts = run.share("compare", one, len(known.frames), inherited=(known.lumen, clues and clues.way))
-    for _, log in parts:
+    def entries(part: Context) -> tuple[tuple[Row, ...], Log]:
+        with part.log.timed("compare"):
+            rows = four_entries(part, known, entered, clues.way) if clues and entered else ()
+        return rows, part.log
+
+    def both(number: int, earlier: object) -> Any:
+        """The entries first: a part so long would keep one core busy at the end."""
+        return one(number - 1, earlier) if number else entries(run.part())
+
+    found = run.share("compare", both, 1 + len(known.frames), inherited=(known.lumen, clues and clues.way))
+    for _, log in found:
         run.log.add(log)
-    return tuple(frame for frame, _ in parts)
+    (rows, _), *parts = found
+    return tuple(frame for frame, _ in parts), rows
 
 
 def _clues(run: Context, known: Known) -> Clues | None:

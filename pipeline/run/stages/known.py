@@ -104,6 +104,10 @@ class Frame:
         return replace(self, status=status.identifier, sentence=status.value, stage=stage, message=text)
 
 
+def passed_over(_: Lumen) -> None:
+    """Do nothing with a lumen."""
+
+
 Result = TypeVar("Result", Lumen, Curve)
 
 
@@ -135,6 +139,7 @@ class Context:
 
     cores : that the case may use.     simulates : it will be simulated after it is traced.
     hashed : waits until the files are hashed, so that forked processes inherit the hashes.
+    lumen_known : called as soon as the lumen is what it will be, before the case is simulated.
     """
 
     case: Case
@@ -144,6 +149,7 @@ class Context:
     cores: int = 1
     simulates: bool = False
     hashed: Callable[[], object] = nothing
+    lumen_known: Callable[[Lumen], object] = passed_over
 
     def part(self) -> "Context":
         """The same for a part of the case that may be done in another process."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.arrays.cores import on_cores
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
 from pipeline.run.projections import slabs
@@ -30,7 +31,8 @@ def segment_vessel(run: Context, known: Known) -> Known:
         log.assumptions.append("no reference scan: the lumen was segmented from frame 0, which has a wire in it")
     crop = Crop(scan, scan.box, config.load)
     radius_mm = case.wire.radius_mm if with_wire else None
-    lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment, radius_mm)
+    with on_cores(run.cores):
+        lumen = run.stored("segment", segment, crop, case.lumen_seed_mm, config.segment, radius_mm)
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)

@@ -59,6 +59,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     lumen = opened(known.lumen, curves, run.case.wire.radius_mm, given=run.case.lumen is not None)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
+    run.lumen_known(lumen)
     return replace(known, frames=tuple(frames), lumen=lumen)
 
 

@@ -29,18 +29,25 @@ class Cores(NamedTuple):
 
 
 @kernel
-def _covered(ids: NDArray[Any], spacing: NDArray[Any], depth: NDArray[Any], n: int, at: tuple[int, int, int]) -> bool:
-    """Whether the ball of voxel n, at indices ``at``, lies within that of a neighbour, to a tenth of a voxel."""
-    i, j, k = at
-    covered = False
-    for a in range(i - 1, i + 2):
-        for b in range(j - 1, j + 2):
-            for c in range(k - 1, k + 2):
-                m = ids[a, b, c] - 1
-                if m >= 0 and m != n:
-                    x, y, z = (a - i) * spacing[0], (b - j) * spacing[1], (c - k) * spacing[2]
-                    covered = covered or depth[m] >= depth[n] + 0.9 * np.sqrt(x**2 + y**2 + z**2)
-    return covered
+def _lengths(spacing: NDArray[Any]) -> NDArray[Any]:
+    """The lengths (27,) of the steps of ``steps_around``, less a tenth."""
+    out = np.empty(27)
+    for n in range(27):
+        a, b, c = unravelled(n, (3, 3, 3))
+        x, y, z = (a - 1) * spacing[0], (b - 1) * spacing[1], (c - 1) * spacing[2]
+        out[n] = 0.9 * np.sqrt(x**2 + y**2 + z**2)
+    return out
+
+
+@kernel
+def _covered(voxels: Inner, depth: NDArray[Any], n: int, steps: NDArray[Any], lengths: NDArray[Any]) -> bool:
+    """Whether the ball of voxel n lies within that of a neighbour, to a tenth of a voxel."""
+    ids, at = voxels.ids.reshape(-1), voxels.flat[n]
+    for s in range(27):
+        m = ids[at + steps[s]] - 1
+        if m >= 0 and m != n and depth[m] >= depth[n] + lengths[s]:
+            return True
+    return False
 
 
 @entry_point
@@ -51,11 +58,11 @@ def thickness(voxels: Inner, depth: NDArray[Any], spacing: NDArray[Any]) -> NDAr
     """
     (ids, inner), (hx, hy, hz) = voxels, (spacing[0], spacing[1], spacing[2])
     ni, nj, nk = ids.shape
-    out = depth.copy()
+    out, steps, lengths = depth.copy(), steps_around(ids.shape, 1), _lengths(spacing)
     for n in range(inner.shape[0]):
         i, j, k = unravelled(inner[n], ids.shape)
         d = depth[n]
-        if _covered(ids, spacing, depth, n, (i, j, k)):
+        if _covered(voxels, depth, n, steps, lengths):
             continue
         ri, rj, rk = int(d / hx), int(d / hy), int(d / hz)
         for a in range(max(0, i - ri), min(ni, i + ri + 1)):

@@ -76,28 +76,24 @@ def value_gradient(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float
 
 
 @kernel
-def _contracted(c: NDArray[Any], at: tuple[int, int, int], wx: Four, wy: Four, wz: Four) -> float:
-    """The 4^3 nodes around ``at``, weighted along each axis and added up."""
-    i, j, k = at
-    total = 0.0
-    for a in range(4):
-        plane = 0.0
-        for b in range(4):
-            plane += wy[b] * _row(c, i + a - 1, j + b - 1, k - 1, wz)
-        total += wx[a] * plane
-    return total
-
-
-@kernel
 def hessian(c: NDArray[Any], x: float, y: float, z: float) -> tuple[float, float, float, float, float, float]:
     """Second derivatives xx, yy, zz, xy, xz, yz (per voxel^2) at a point in index coordinates."""
-    at = int(x), int(y), int(z)
-    x, y, z = x - at[0], y - at[1], z - at[2]
-    wx, dx, wy, dy, wz, dz = basis(x), slope(x), basis(y), slope(y), basis(z), slope(z)
-    return (
-        _contracted(c, at, bend(x), wy, wz), _contracted(c, at, wx, bend(y), wz), _contracted(c, at, wx, wy, bend(z)),
-        _contracted(c, at, dx, dy, wz), _contracted(c, at, dx, wy, dz), _contracted(c, at, wx, dy, dz),
-    )  # fmt: skip
+    i, j, k = int(x), int(y), int(z)
+    x, y, z = x - i, y - j, z - k
+    wx, dx, bx = basis(x), slope(x), bend(x)
+    wy, dy, by = basis(y), slope(y), bend(y)
+    wz, dz, bz = basis(z), slope(z), bend(z)
+    xx = yy = zz = xy = xz = yz = 0.0
+    for a in range(4):
+        p = py = pyy = pz = pyz = pzz = 0.0
+        for b in range(4):
+            n, m = i + a - 1, j + b - 1
+            r, rz, rzz = _row(c, n, m, k - 1, wz), _row(c, n, m, k - 1, dz), _row(c, n, m, k - 1, bz)
+            p, py, pyy = p + wy[b] * r, py + dy[b] * r, pyy + by[b] * r
+            pz, pyz, pzz = pz + wy[b] * rz, pyz + dy[b] * rz, pzz + wy[b] * rzz
+        xx, yy, zz = xx + bx[a] * p, yy + wx[a] * pyy, zz + wx[a] * pzz
+        xy, xz, yz = xy + dx[a] * py, xz + dx[a] * pz, yz + wx[a] * pyz
+    return xx, yy, zz, xy, xz, yz
 
 
 class Wall(NamedTuple):
