@@ -3,6 +3,7 @@
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +32,9 @@ def _is_mask(values: Array, least: float, largest: float) -> bool:
         return least in (0.0, 1.0)
     if least == 0.0 and largest == 1.0 and bool(np.all((values == 0.0) | (values == 1.0))):
         return True
-    few = np.unique(values[::3, ::3, ::3])
-    return min(values.shape) > 3 and few.size <= 3 and np.unique(values).size <= 3
+    # each look is at more of them: two are there to be left early, with most grids after the first
+    looks = values.reshape(-1)[:: max(1, values.size // 4096)], values[::3, ::3, ::3], values
+    return min(values.shape) > 3 and all(np.unique(few).size <= 3 for few in looks)
 
 
 def _checked(grid: Grid) -> Array:
@@ -43,8 +45,8 @@ def _checked(grid: Grid) -> Array:
     values = np.array(grid.values, dtype=np.float64, order="C")
     if min(values.shape) < 2:
         refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
-    bad = ~np.isfinite(values)
-    if bad.any():
+    # whatever is undefined is so in the sum, which takes no memory
+    if not np.isfinite(values.sum()) and (bad := ~np.isfinite(values)).any():
         where = [int(i) for i in np.argwhere(bad)[0]]
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")
@@ -57,8 +59,17 @@ def _checked(grid: Grid) -> Array:
 
 
 def _padded(coefficients: Array) -> NDArray[np.float32]:
-    """Coefficients with their ghost layers: c[-1] = 2 c[0] - c[1], which goes on linearly beyond the grid."""
-    return np.pad(coefficients, 1, mode="reflect", reflect_type="odd").astype(np.float32)
+    """Coefficients with their ghost layers: c[-1] = 2 c[0] - c[1], which goes on linearly beyond the grid.
+
+    Each layer is made from the two outermost ones: a padded copy of all, in float64, took twice as long as the filter.
+    """
+    out = np.empty([n + 2 for n in coefficients.shape], np.float32)
+    out[1:-1, 1:-1, 1:-1] = coefficients
+    for axis, (two, layer) in product(range(3), ((slice(0, 2), 0), (slice(-2, None), -1))):
+        all_of = [slice(None)] * axis
+        outermost = np.pad(coefficients[(*all_of, two)], 1, mode="reflect", reflect_type="odd")
+        out[(*all_of, layer)] = outermost[(*all_of, layer)]
+    return out
 
 
 @dataclass(frozen=True, eq=False)
