@@ -114,8 +114,8 @@ def steps_of(mutant: Mutant, known: Executed) -> list[list[str]]:
     """Its tests, those first that are likely to notice it soon."""
     own = known.of(mutant.file, mutant.line)
     if not own:
-        named = tests_of(mutant.file)
-        return [behind(mutant.file, mutant.line, known)[:MOST], *([name] for name in named)]
+        found = behind(mutant.file, mutant.line, known)
+        return [found[:MOST], found[MOST:], *([name] for name in tests_of(mutant.file))]
     # first the few quickest, then all that execute the line, then all in their files: these may share a fixture
     first = spread(own, known)[:FEW]
     return [first, [test for test in own if test not in first][:MOST], known.files(own)]
