@@ -35,7 +35,7 @@ NEIGHBOUR: dict[type, type] = {
     ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
 FEW, MOST = 8, 200
-PLAIN = "tests/numbers/test_solver.py"
+SOLVER, PLAIN = "solver/_kernels/", "tests/numbers/test_solver.py"
 MEANT = b"was that meant?"
 """What the kept numbers say of a difference. An index beyond an array, which compiled code does not see, says more."""
 LONG_S = 300.0
@@ -114,8 +114,8 @@ def steps_of(mutant: Mutant, known: Executed) -> list[list[str]]:
     """Its tests, those first that are likely to notice it soon."""
     own = known.of(mutant.file, mutant.line)
     if not own:
-        found = behind(mutant.file, mutant.line, known)
-        return [found[:MOST], found[MOST:], *([name] for name in tests_of(mutant.file))]
+        found, first = behind(mutant.file, mutant.line, known), [PLAIN] if mutant.file.startswith(SOLVER) else []
+        return [first, found[:MOST], found[MOST:], *([name] for name in tests_of(mutant.file))]
     # first the few quickest, then all that execute the line, then all in their files: these may share a fixture
     first = spread(own, known)[:FEW]
     return [first, [test for test in own if test not in first][:MOST], known.files(own)]
@@ -130,7 +130,7 @@ def killed(mutant: Mutant, known: Executed) -> str:
         (tree / "wireval").symlink_to(tree / "pipeline/wireval")
         path = tree / mutant.file
         path.write_bytes(mutant.apply(path.read_bytes()))
-        if mutant.file.startswith("solver/_kernels") and (by := fails([PLAIN], tree, LONG_S, compiled=False)):
+        if mutant.file.startswith(SOLVER) and (by := fails([PLAIN], tree, LONG_S, compiled=False)):
             return f"{by} (not compiled)"
         left_s = LONG_S
         for step in steps_of(mutant, known):
