@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants shuffled cluster clean formats fuzz audit
+.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants numbers shuffled cluster clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -89,6 +89,10 @@ budget: setup
 # the golden errors of the small catalogue, written anew: look at the difference before committing it
 baseline: setup
 	$(BIN)/python -m tests.studies.catalogue
+
+# the kept numbers of small scenes, written anew: look at the difference, and say why, before committing it
+numbers: setup
+	$(BIN)/python -m tests.numbers
 
 # five BraVa trees and the aorta-to-cranial tree (needs WIREVAL_DATA): errors and statuses frame by frame
 anatomies: setup

@@ -212,3 +212,14 @@ def test_a_tree_too_wide_everywhere_has_no_way() -> None:
     edges = np.column_stack([np.arange(len(TRUNK) - 1), np.arange(1, len(TRUNK))])
     with pytest.raises(ValueError, match=r"no path with radii from 3\.0 down to 0\.7 mm"):
         widest_path(Tree(TRUNK, np.full(len(TRUNK), 4.0), edges))
+
+
+def test_a_jagged_centreline_is_smoothed_until_its_tube_does_not_fold_and_no_further() -> None:
+    """Begun anywhere on the way there, the smoothing ends in the same tube; begun beyond, in a smoother one."""
+    z = np.arange(0.0, 40.0, 1.0)
+    jagged, radii = np.column_stack([1.5 * (-1.0) ** np.arange(len(z)), 8.0 * np.sin(z / 6.0), z]), np.full(len(z), 2.0)
+    first, *same, beyond = (smooth_tube("v", jagged, radii, 0.8 * 1.4**n) for n in range(6))
+    sharpest = [np.max(np.linalg.norm(np.gradient(t.tangents, t.step_mm, axis=0), axis=1)) for t in (first, beyond)]
+    assert sharpest[1] < sharpest[0] < 1.0 / 2.0, "a tube of 2 mm folds where it bends more"
+    for tube in same:
+        np.testing.assert_allclose(tube.points_mm, first.points_mm, atol=1e-9)

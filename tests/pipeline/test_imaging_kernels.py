@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.jets import Blurred, jet
+from pipeline.arrays.jets import Blurred, jet, ridge_frame, ridge_step
 from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.surface import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
@@ -111,3 +111,33 @@ def test_blur_is_read_off_a_curved_wall():
     half = float(np.interp(-0.5 * contrast, -grey, r))
     steep = -float(np.interp(half, r, np.gradient(grey, r)))
     assert blur_of_wall(np.array([steep]), np.array([1 / half]), contrast) == pytest.approx(sigma, rel=0.02)
+
+
+def crest_jet(seed):
+    """The ten numbers of a quadratic ridge with a tilted crest, in ``jet``'s order, its tangent and its offset."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    curved = turn @ np.diag([-3.0 - rng.random(), -1.0 - rng.random(), 0.2 * rng.random()]) @ turn.T
+    across = turn[:, :2] @ rng.uniform(-0.5, 0.5, 2)
+    gradient, second = -curved @ across, curved[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return np.concatenate([[1.0], gradient, second]), curved, turn[:, 2], across
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_ridge_has_the_curvatures_and_the_direction_of_its_hessian(seed):
+    ten, curved, along, _ = crest_jet(seed)
+    tangent = along + 0.3
+    low, middle = ridge_frame(ten, tangent)
+    # the closed form takes an arccosine, which costs half the digits where two curvatures are alike
+    np.testing.assert_allclose([low, middle], np.linalg.eigvalsh(curved)[:2], rtol=1e-7)
+    np.testing.assert_allclose(tangent, along * np.sign(along @ (along + 0.3)), atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_one_newton_step_leads_from_beside_a_quadratic_ridge_onto_its_crest(seed):
+    ten, _, along, across = crest_jet(seed)
+    step = np.empty(3)
+    ridge_step(ten, along, 10.0, step)
+    np.testing.assert_allclose(step, across, atol=1e-12)
+    ridge_step(ten, along, 0.1, step)
+    np.testing.assert_allclose(step, 0.1 * across / np.linalg.norm(across), atol=1e-12)

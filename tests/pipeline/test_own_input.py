@@ -8,12 +8,14 @@ import struct
 import numpy as np
 import pytest
 import SimpleITK as sitk
+from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from pipeline.load import LoadError
 from pipeline.load.curves import read_curve
 from pipeline.load.geometry import Mask
 from pipeline.load.lumens import read_lumen
+from pipeline.model import Shapes
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.given import given_lumen
 from reports.export import write_markups_curve, write_polyline_vtp, write_surface_vtp
@@ -247,3 +249,18 @@ def test_ascii_and_compressed_vtp(tmp_path):
         text += f"<DataArray type='{kind}' Name='p' NumberOfComponents='3' {body}</DataArray></Points>{cells}"
         (tmp_path / name).write_text(text + "</Piece></PolyData></VTKFile>", encoding="utf-8")
         np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points)
+
+
+def test_the_distance_to_a_surface_of_large_triangles_is_that_to_the_solid_it_encloses():
+    """A brick of twelve triangles, turned: its distance is known, and every triangle of it is many voxels wide."""
+    half, turn = np.array([3.0, 2.0, 4.0]), Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix()
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    found = given_lumen(Shapes(corners @ turn.T + 7.0, triangles), SegmentConfig()).distance
+    index = np.stack(np.meshgrid(*(np.arange(n) for n in found.shape), indexing="ij"), axis=-1)
+    away = np.abs((index * found.spacing_mm + found.origin_mm - 7.0) @ turn) - half
+    exact = np.linalg.norm(np.maximum(away, 0.0), axis=-1) + np.minimum(away.max(axis=-1), 0.0)
+    near = np.abs(exact) < 1.5
+    # a spline of the distance rounds the edges, a tenth of a voxel here; a triangle that is missed leaves voxels
+    np.testing.assert_allclose(found.values[near], exact[near], atol=0.05)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.morphology import reconstruction
 
+from pipeline.segment._kernels.tiles import GREY_STEPS
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.connect import (
     Affinity,
@@ -164,3 +165,12 @@ def test_cost_follows_the_object_and_not_the_volume():
 
     # in pairs, one beside the other: what else the machine does must not decide
     assert min(seconds(300) / seconds(60) for _ in range(12)) < 3
+
+
+def test_every_pair_of_voxels_has_its_entry_in_the_tables():
+    """Kernels look them up unchecked: by a difference of two quantised greys, and by a sum, of a wire's too."""
+    tables = estimate_affinity(LEVELS)
+    brightest = GREY_STEPS - 1
+    assert tables.homogeneity.shape == (brightest + 1,)
+    assert tables.feature.shape == (2 * brightest + 1,)
+    assert tables.feature[-1] == 1.0, "brighter than the vessel belongs to it"

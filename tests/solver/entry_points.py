@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from solver._kernels import blocks, closed_form, energy, forks, newton, rollout, rotation, start
+from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
@@ -81,3 +81,8 @@ def least_curvature(q: Any, twisting: bool) -> float:
 @entry_point
 def solve_stiffened(q: Any, more: float, twisting: bool) -> Any:
     return blocks.solve_block(blocks.stiffened(q, more), twisting)
+
+
+@entry_point
+def outside_by(field: Any, x: Any, k: int) -> float:
+    return forces.furthest_outside(field, x, k)

@@ -220,6 +220,18 @@ def test_closed_form_turns_against_the_exact_gradient(hull: str) -> None:
             assert slope[i, a] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-5)
 
 
+def test_closed_form_reads_nothing_of_a_wire_that_was_deeper() -> None:
+    """Stiffness and angles of segments that were pulled out stay in memory; eq. 10 has no term of them."""
+    b, found = workspace(WIRES["curved tip"], VesselWall(bend_grid(0.5), 1.0), 30.0), []
+    assert len(b.problem.chain.bend) > b.k
+    energy_of(b, 0.02 * np.sin(np.arange(3.0 * b.k)).reshape(-1, 3) * [1, 1, 0])
+    for left in (0.0, 0.7):
+        b.problem.chain.bend[b.k :] = b.problem.state.u[0, b.k :] = left
+        gradients(b.problem, 0, b.k)
+        found.append(b.problem.scratch.gain[: b.k, :, :2].copy())
+    np.testing.assert_array_equal(*found)
+
+
 def turned(b: Workspace, segment: int, axis: int, angle: float) -> float:
     """Energy with one segment turned about its own axis 1 or 2, the others keeping their directions."""
     s = b.problem.state

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Grid, GuideWire, Insertion, Status, VesselWall, relax
+from tests.solver.entry_points import outside_by
 from tests.solver.scenes import sampled, tube_distance, tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
@@ -123,3 +124,18 @@ def test_iteration_limit_is_a_status() -> None:
     solution = relax(WIRE, depth_mm=100.0, load_N=[0.05, 0, 0], max_iterations=1)
     assert solution.status is Status.MAX_ITERATIONS
     assert "max_iterations" in solution.sentence
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_how_far_outside_is_measured_in_millimetres_in_a_turned_grid_of_uneven_voxels(seed: int) -> None:
+    """Against the distance to the box of whole voxels, worked out in the grid's own axes."""
+    rng = np.random.default_rng(seed)
+    turn, spacing, shape = np.linalg.qr(rng.normal(size=(3, 3)))[0], np.array([0.5, 0.8, 1.1]), (6, 7, 8)
+    turn[:, 0] *= np.sign(np.linalg.det(turn))
+    wall = VesselWall(Grid(rng.normal(size=shape), spacing, [3.0, -2.0, 5.0], turn), 1.0)
+    local = rng.uniform(-3.0, 12.0, (9, 3))
+    outside = np.maximum(np.maximum(-0.5 * spacing - local, local - (np.array(shape) - 0.5) * spacing), 0.0)
+    joints = wall.distance.origin_mm + local @ turn.T
+    for k in (1, 4, 8):
+        expected = np.linalg.norm(outside[1 : k + 1], axis=1).max()
+        assert outside_by(wall.field, joints, k) == pytest.approx(expected, rel=1e-12)

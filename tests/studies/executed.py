@@ -49,12 +49,8 @@ class Executed:
 def executed(site: str, words: list[str], kept: Path = MAP) -> Executed:
     """From one run of pytest with these arguments, which is kept. site : where the package coverage is installed."""
     if not kept.exists():
-        with tempfile.TemporaryDirectory() as folder:
-            pytest = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.studies.covering"]
-            env = os.environ | {"PYTHONPATH": site, "COVERING": f"{folder}/data", "COVERAGE_CORE": "ctrace"}
-            subprocess.run([*pytest, f"--junit-xml={folder}/junit.xml", *words], cwd=ROOT, env=env, check=False)
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            kept.write_text(json.dumps(read_run(Path(folder), site)), encoding="utf-8")
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps(run_tests(site, words)), encoding="utf-8")
     newer = [p for name in PACKAGES for p in (ROOT / name).rglob("*.py") if p.stat().st_mtime > kept.stat().st_mtime]
     if newer:
         print(
@@ -62,6 +58,30 @@ def executed(site: str, words: list[str], kept: Path = MAP) -> Executed:
             flush=True,
         )
     return Executed(**json.loads(kept.read_text(encoding="utf-8")))
+
+
+def run_tests(site: str, words: list[str]) -> dict[str, Any]:
+    """What pytest with these arguments executes."""
+    with tempfile.TemporaryDirectory() as folder:
+        pytest = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.studies.covering"]
+        env = os.environ | {"PYTHONPATH": site, "COVERING": f"{folder}/data", "COVERAGE_CORE": "ctrace"}
+        subprocess.run([*pytest, f"--junit-xml={folder}/junit.xml", *words], cwd=ROOT, env=env, check=False)
+        return read_run(Path(folder), site)
+
+
+def merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """Two runs: a test that is in both is that of the second. Of a module's lines the larger count is taken."""
+    again = new["seconds"].keys()
+    tests = {
+        file: {line: [test for test in found if test not in again] for line, found in lines.items()}
+        for file, lines in old["tests"].items()
+    }
+    for file, lines in new["tests"].items():
+        for line, found in lines.items():
+            tests.setdefault(file, {}).setdefault(line, []).extend(found)
+    both = old["lines"].keys() | new["lines"].keys()
+    lines = {file: max(run["lines"].get(file, (0, 0)) for run in (old, new)) for file in both}
+    return {"tests": tests, "seconds": old["seconds"] | new["seconds"], "lines": lines}
 
 
 def read_run(folder: Path, site: str) -> dict[str, Any]:
@@ -96,15 +116,20 @@ def main() -> int:
     """Run the tests; print a line for each module of which little is executed, and the share of all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--site", default="", help="where the package coverage is installed")
+    parser.add_argument("--more", action="store_true", help="these tests are new or changed: keep what is known else")
     parser.add_argument("words", nargs="*", default=["tests"], help="arguments of pytest")
     given = parser.parse_args()
-    MAP.unlink(missing_ok=True)
-    known = executed(given.site, given.words).lines
-    for name, (run, count) in sorted(known.items()):
+    if given.more:
+        known = json.loads(MAP.read_text(encoding="utf-8"))
+        MAP.write_text(json.dumps(merged(known, run_tests(given.site, given.words))), encoding="utf-8")
+    else:
+        MAP.unlink(missing_ok=True)
+    lines = executed(given.site, given.words).lines
+    for name, (run, count) in sorted(lines.items()):
         if count and run < LITTLE * count:
             print(f"{100 * run / count:3.0f} %  {run:4d} of {count:4d}  {name}")
-    run, count = (sum(pair[i] for pair in known.values()) for i in (0, 1))
-    print(f"{100 * run / count:.1f} % of {count} lines of {len(known)} modules")
+    run, count = (sum(pair[i] for pair in lines.values()) for i in (0, 1))
+    print(f"{100 * run / count:.1f} % of {count} lines of {len(lines)} modules")
     return 0
 
 

@@ -2,8 +2,10 @@
 
 A change is drawn with a fixed seed: a comparison, a sum, a product, a condition, a truth value or a number of one line
 becomes its neighbour. One run of the tests with coverage tells which of them execute the line: the quickest of these
-run first, up to the first that fails. Kernels, which coverage does not see, have the tests that name them or what is
-around them. A change that none of its tests fails on has survived, and is printed to be looked at.
+run first, up to the first that fails. Kernels, which coverage does not see, have the tests that execute what calls them
+(see ``callers``), and those that name them. The solver's are first tried without a compiler, on the kept numbers of its
+scenes: that takes seconds, compiling it minutes. A change that none of its tests fails on has survived, and is printed
+to be looked at.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import os
 import random
 import re
 import shutil
@@ -23,6 +26,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from tests.studies.callers import behind, spread
 from tests.studies.executed import PACKAGES, ROOT, Executed, executed
 
 NEIGHBOUR: dict[type, type] = {
@@ -31,6 +35,9 @@ NEIGHBOUR: dict[type, type] = {
     ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
 FEW, MOST = 8, 200
+SOLVER, PLAIN = "solver/_kernels/", "tests/numbers/test_solver.py"
+MEANT = b"was that meant?"
+"""What the kept numbers say of a difference. An index beyond an array, which compiled code does not see, says more."""
 LONG_S = 300.0
 """Tests are asked for so long, by what they take without a change; a kernel's take its compilation beside that."""
 ENDLESS = 10.0
@@ -103,23 +110,35 @@ def tests_of(file: str) -> list[str]:
     return found or [f"tests/{module}"]
 
 
-def killed(mutant: Mutant, known: Executed) -> str:
-    """The tests that noticed it, by how they were found; empty where none did."""
+def steps_of(mutant: Mutant, known: Executed) -> list[list[str]]:
+    """Its tests, those first that are likely to notice it soon."""
     own = known.of(mutant.file, mutant.line)
+    if not own:
+        found, first = behind(mutant.file, mutant.line, known), [PLAIN] if mutant.file.startswith(SOLVER) else []
+        return [first, found[:MOST], found[MOST:], *([name] for name in tests_of(mutant.file))]
     # first the few quickest, then all that execute the line, then all in their files: these may share a fixture
-    steps = [own[:FEW], own[FEW:MOST], known.files(own)] if own else [[name] for name in tests_of(mutant.file)]
+    first = spread(own, known)[:FEW]
+    return [first, [test for test in own if test not in first][:MOST], known.files(own)]
+
+
+def killed(mutant: Mutant, known: Executed) -> str:
+    """The test that noticed it; empty where none did."""
     with tempfile.TemporaryDirectory() as folder:
         # a tree of its own, machine code included: what a change compiles stays out of the next one's way
         tree = Path(folder) / "tree"
         shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "out", ".*_cache"))
+        (tree / "wireval").symlink_to(tree / "pipeline/wireval")
         path = tree / mutant.file
         path.write_bytes(mutant.apply(path.read_bytes()))
+        if mutant.file.startswith(SOLVER) and (by := fails([PLAIN], tree, LONG_S, compiled=False)):
+            return f"{by} (not compiled)"
         left_s = LONG_S
-        for step in steps:
+        for step in steps_of(mutant, known):
             asked = within(step, left_s, known)
-            left_s -= sum(map(known.seconds_of, asked))
-            if asked and fails(asked, tree, sum(map(known.seconds_of, asked))):
-                return asked[0]
+            taken_s = sum(map(known.seconds_of, asked))
+            left_s -= taken_s
+            if asked and (by := fails(asked, tree, taken_s)):
+                return by
     return ""
 
 
@@ -133,19 +152,23 @@ def within(tests: list[str], seconds: float, known: Executed) -> list[str]:
     return found
 
 
-def fails(tests: list[str], tree: Path, seconds: float) -> bool:
-    """Whether one of these tests fails, or takes for ever. No test to be found is no failure."""
+def fails(tests: list[str], tree: Path, seconds: float, compiled: bool = True) -> str:
+    """The first of these tests that fails, or takes for ever; empty for none. No test to be found is no failure."""
     words = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
+    env = os.environ | {"PYTHONPATH": str(tree)} | ({} if compiled else {"NUMBA_DISABLE_JIT": "1"})
     try:
         limit_s = 300.0 + ENDLESS * seconds
-        done = subprocess.run(words, cwd=tree, capture_output=True, check=False, timeout=limit_s)
+        done = subprocess.run(words, cwd=tree, env=env, capture_output=True, check=False, timeout=limit_s)
     except subprocess.TimeoutExpired:
-        return True
+        return f"{tests[0]} (endless)" if compiled else ""
     # a file that cannot even be imported any more is a failure, too
     if done.returncode == 4 and b"ERROR tests" not in done.stdout:
         raise SystemExit(f"{tests[:3]}: {done.stdout.decode()[-500:]}")
     # 5: all of a file's tests are skipped or belong to slow studies
-    return done.returncode not in (0, 5)
+    if done.returncode in (0, 5) or not (compiled or MEANT in done.stdout):
+        return ""
+    named = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout.decode(errors="replace"), re.MULTILINE)
+    return named[1] if named else tests[0]
 
 
 def drawn(count: int, seed: int, below: str) -> tuple[list[Mutant], int]:
@@ -172,8 +195,8 @@ def main() -> int:
     with ThreadPoolExecutor(given.jobs) as pool:
         for mutant, by in zip(chosen, pool.map(partial(killed, known=known), chosen), strict=True):
             noticed += bool(by)
-            unseen = "" if known.of(mutant.file, mutant.line) else ", executed by no test that coverage sees"
-            verdict = "noticed " if by else "SURVIVED" + unseen
+            unseen = not (known.of(mutant.file, mutant.line) or behind(mutant.file, mutant.line, known))
+            verdict = "noticed " if by else "SURVIVED" + ", executed by no test that coverage sees" * unseen
             print(f"{verdict}  {mutant.file}:{mutant.line}  {mutant.before}  ->  {mutant.after}  {by}", flush=True)
     print(f"{noticed} of {len(chosen)} noticed (seed {given.seed}, of {possible} possible changes)")
     return 0 if noticed >= 0.85 * len(chosen) else 1

@@ -1,0 +1,26 @@
+"""The parts of the package whose numbers are kept, and how exactly they are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from tests.numbers import benchmark, imaging, solver, synthetic
+from tests.numbers.kept import Scene
+
+
+class Part(NamedTuple):
+    """Scenes, and how far a number may move, relative to the largest of its quantity."""
+
+    scenes: Mapping[str, Scene]
+    relative: float
+
+
+PARTS = {
+    # another processor fuses other products and sums: 1e-14, which a wire near a snap makes larger
+    "solver": Part(solver.SCENES, 1e-6),
+    "benchmark": Part(benchmark.SCENES, 1e-6),
+    "synthetic": Part(synthetic.SCENES, 1e-6),
+    # single precision (6e-8) is summed over voxels there, and fits end where they change little
+    "imaging": Part(imaging.SCENES, 1e-4),
+}
