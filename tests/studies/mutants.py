@@ -16,7 +16,9 @@ import copy
 import os
 import random
 import re
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -41,7 +43,8 @@ MEANT = b"was that meant?"
 LONG_S = 300.0
 """Tests are asked for so long, by what they take without a change; a kernel's take its compilation beside that."""
 ENDLESS = 10.0
-"""Times that, and five minutes: a change that makes a test go on for ever is noticed."""
+"""Times that, and five minutes, of processor time: a change that makes a test go on for ever is noticed."""
+HANGING_S = 7200.0
 
 
 @dataclass(frozen=True)
@@ -156,18 +159,24 @@ def fails(tests: list[str], tree: Path, seconds: float, compiled: bool = True) -
     """The first of these tests that fails, or takes for ever; empty for none. No test to be found is no failure."""
     words = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
     env = os.environ | {"PYTHONPATH": str(tree)} | ({} if compiled else {"NUMBA_DISABLE_JIT": "1"})
-    try:
-        limit_s = 300.0 + ENDLESS * seconds
-        done = subprocess.run(words, cwd=tree, env=env, capture_output=True, check=False, timeout=limit_s)
-    except subprocess.TimeoutExpired:
+    limit_s = int(300.0 + ENDLESS * seconds)
+    with subprocess.Popen(words, cwd=tree, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as done:
+        # processor time: others may keep the machine busy
+        resource.prlimit(done.pid, resource.RLIMIT_CPU, (limit_s, limit_s))
+        try:
+            text, _ = done.communicate(timeout=HANGING_S)
+        except subprocess.TimeoutExpired:
+            done.kill()
+            return f"{tests[0]} (hanging)"
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
         return f"{tests[0]} (endless)" if compiled else ""
     # a file that cannot even be imported any more is a failure, too
-    if done.returncode == 4 and b"ERROR tests" not in done.stdout:
-        raise SystemExit(f"{tests[:3]}: {done.stdout.decode()[-500:]}")
+    if done.returncode == 4 and b"ERROR tests" not in text:
+        raise SystemExit(f"{tests[:3]}: {text.decode()[-500:]}")
     # 5: all of a file's tests are skipped or belong to slow studies
-    if done.returncode in (0, 5) or not (compiled or MEANT in done.stdout):
+    if done.returncode in (0, 5) or not (compiled or MEANT in text):
         return ""
-    named = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout.decode(errors="replace"), re.MULTILINE)
+    named = re.search(r"^(?:FAILED|ERROR) (\S+)", text.decode(errors="replace"), re.MULTILINE)
     return named[1] if named else tests[0]
 
 

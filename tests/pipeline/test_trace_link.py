@@ -1,0 +1,57 @@
+"""Pieces of crest made one path: where a wire lies twice, whichever way a piece runs, and what is bridged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.model import arc_length
+from pipeline.trace.crests import Tracklet
+from pipeline.trace.link import extended, link, with_doubles
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def piece(low, high, grey=100.0):
+    """A straight crest along z."""
+    z = np.arange(low, high + 1e-9, 0.25)
+    return Tracklet(np.outer(z, UP), np.tile(UP, (len(z), 1)), np.full(len(z), grey))
+
+
+@pytest.mark.parametrize("others", [1, 2, 5])
+def test_a_short_bright_piece_may_hold_two_strands_and_is_offered_twice(others):
+    dim, bright = [piece(0.0, 20.0)] * others, piece(20.0, 22.0, 200.0)
+    assert with_doubles([*dim, bright]) == [*dim, bright, bright]
+    assert len(with_doubles([*dim, piece(20.0, 22.0, 110.0)])) == others + 1, "hardly brighter than the others"
+    assert len(with_doubles([piece(0.0, 200.0), piece(0.0, 60.0, 200.0)])) == 2, "long: a brighter wire"
+
+
+def test_a_piece_alone_is_offered_once():
+    assert len(with_doubles([piece(0.0, 5.0)])) == 1
+
+
+@pytest.mark.parametrize("turned", [(), (0,), (1,), (0, 1)])
+def test_a_path_goes_on_over_a_gap_whichever_way_its_pieces_run(turned):
+    pieces = [piece(0.0, 8.0), piece(9.5, 20.0)]
+    pieces = [p.reversed() if n in turned else p for n, p in enumerate(pieces)]
+    path = link(pieces, np.array([0.1, 0.0, 0.5]), UP, 3.0, 1.0)
+    assert path.bridges == 1
+    assert np.all(np.diff(path.points[:, 2]) > -1e-9)
+    assert path.points[[0, -1], 2] == pytest.approx([0.0, 20.0])
+    inside = path.points[path.bridged, 2]
+    assert inside.min() > 8.0 - 1e-9
+    assert inside.max() < 9.5 + 1e-9
+    assert np.ptp(inside) > 1.0
+    np.testing.assert_allclose(path.points[:, :2], 0.0, atol=1e-12)
+
+
+def test_no_path_begins_far_from_the_entry_or_across_it():
+    assert link([piece(0.0, 8.0)], np.array([2.0, 0.0, 4.0]), UP, 3.0, 1.0) is None
+    assert link([piece(0.0, 8.0)], np.array([0.0, 0.0, 4.0]), np.array([1.0, 0.0, 0.0]), 3.0, 1.0) is None
+
+
+def test_a_path_is_continued_straight_by_what_is_asked():
+    points = np.outer(np.arange(0.0, 5.0, 0.1), [0.6, 0.0, 0.8])
+    longer = extended(points, 2.0, 0.25)
+    assert arc_length(longer)[-1] == pytest.approx(arc_length(points)[-1] + 2.0, abs=0.25)
+    np.testing.assert_allclose(longer[-1] / np.linalg.norm(longer[-1]), [0.6, 0.0, 0.8], atol=1e-12)
