@@ -64,7 +64,12 @@ def sampled(grid: Grid, like: Grid, outside: float) -> Grid:
 
 def indices_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices (n, 3) where a contiguous mask is set, as ``np.argwhere``, in a fifth of its time where little is set."""
-    return np.stack(np.unravel_index(np.flatnonzero(mask), mask.shape), axis=1)
+    return unflattened(np.flatnonzero(mask), mask.shape)
+
+
+def unflattened(flat: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Indices (n, 3) of flat ones (n,)."""
+    return np.stack(np.unravel_index(flat, shape), axis=1)
 
 
 def spread(values: NDArray[Any]) -> float:

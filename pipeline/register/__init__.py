@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import StaticPoints, fit_motion, static_points
@@ -94,7 +95,7 @@ def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
     """At most ``count`` of the mask's voxels, evenly taken, as LPS mm."""
     flat = np.flatnonzero(mask)
     flat = flat[:: max(1, len(flat) // count)]
-    return grid.to_mm(np.stack(np.unravel_index(flat, mask.shape), axis=1))
+    return grid.to_mm(unflattened(flat, mask.shape))
 
 
 def anchor(reference: Volume, lumen: Lumen) -> Anchor:

@@ -15,12 +15,11 @@ from pipeline.compare.nulls import NULLS
 from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
 from pipeline.run.hashing import hashing
-from pipeline.run.helpers import shared
+from pipeline.run.helpers import nothing, shared
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
-from pipeline.run.stages.known import passed_over
 from pipeline.run.store import code_of, digest
 from pipeline.run.view import LumenFiles, write_view
 from pipeline.study.manifest import Case
@@ -142,7 +141,7 @@ def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> No
     clock = perf_counter()
     log = Log(progress)
     store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
-    begin = files.begin if job.pictures and job.cores > 1 else passed_over
+    begin = files.begin if job.pictures and job.cores > 1 else nothing
     run = Context(job.case, job.settings.config, store, log, job.cores, job.simulates, hashed, begin)
     try:
         known = run_stages(run, job.until)

@@ -37,8 +37,8 @@ class _LostError(Exception):
     """A helper has ended before its work was done."""
 
 
-def nothing() -> None:
-    """Do nothing: the default of a callback."""
+def nothing(*_: object) -> None:
+    """Do nothing: the default of a callback, whatever it is called with."""
 
 
 def forked(work: Callable[[], object]) -> ForkProcess:

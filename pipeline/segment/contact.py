@@ -15,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.contact import Cores, Inner, along_cores, meetings, nearest_core, runs_on, thickness
 from pipeline.segment._kernels.voxels import rebased
@@ -135,7 +136,7 @@ def contacts(distance: Grid) -> tuple[Contact, ...]:
     found = found[[passes[p] and passes[q] for _, p, q in found]]
     if len(found) == 0:
         return ()
-    places = np.stack(np.unravel_index(inner[found[:, 0]], values.shape), axis=1)
+    places = unflattened(inner[found[:, 0]], values.shape)
     group = parts(places.astype(float), 2.0 * float(np.median(thick[found[:, 1]])) / voxel)
     face = every * float(np.prod(spacing) ** (2 / 3))
     groups = [places[group == n] for n in range(group.max() + 1)]

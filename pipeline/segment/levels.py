@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from scipy.stats import ncx2
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import spread, unflattened
 from pipeline.model import Counters
 from pipeline.segment._kernels.voxels import rebased
 from pipeline.status import FrameStatus, StageError
@@ -151,10 +151,10 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     depth, core = _deepest(off_wall)
     limit = _brightest(distance, corner, levels, blur_mm)
     some = core[:: max(1, len(core) // 500)]
-    foreign = float(np.mean(grey_around(scan, _indices(there[some], scan)) > limit))
+    foreign = float(np.mean(grey_around(scan, unflattened(there[some], scan.shape)) > limit))
     if foreign > BRIGHT_SHARE:
         some = np.arange(0, len(grey), max(1, len(grey) // 20_000))
-        some = some[grey_around(scan, _indices(there[some], scan)) <= limit]
+        some = some[grey_around(scan, unflattened(there[some], scan.shape)) <= limit]
         off_wall, grey = off_wall[some], grey[some]
         depth, core = _deepest(off_wall)
         levels = replace(levels, brightest=limit, foreign=foreign)
@@ -166,10 +166,6 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
     peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
     return replace(levels, inside=levels.outside + peak)
-
-
-def _indices(flat: Index, grid: Grid) -> Index:
-    return np.stack(np.unravel_index(flat, grid.shape), axis=1)
 
 
 def _deepest(off_wall: NDArray[Any]) -> tuple[float, Index]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.jets import Blurred, smooth_voxels, values_at
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.segment._kernels.connect import Affinity
@@ -42,7 +43,7 @@ SIDE_VOXELS = 2.0
 
 def _points(flat: Index, grid: Grid) -> Array:
     """Indices (n, 3) of flat voxels, as floats."""
-    return np.stack(np.unravel_index(flat, grid.shape), axis=1).astype(float)
+    return unflattened(flat, grid.shape).astype(float)
 
 
 def _nearest(tree: cKDTree, points: Array) -> tuple[Array, Index]:
@@ -107,7 +108,7 @@ def _next(grid: Grid, beyond: Beyond, region: Region, affinity: Affinity, config
         n = int(np.argmin(gap)) if len(gap) else -1
         if n < 0 or not np.isfinite(gap[n]):
             break
-        seed = np.array(np.unravel_index(edge[n : n + 1], grid.shape)).T
+        seed = unflattened(edge[n : n + 1], grid.shape)
         more, read = connect(grid, seed, affinity, config.threshold, neighbours(config.adjacency))
         tried[more] = True
         gap[tried[edge]] = np.inf
@@ -161,7 +162,7 @@ def closed_necks(distance: NDArray[np.float32], corner: Index, grid: Grid, least
     large = np.flatnonzero(np.bincount(number) >= least)
     if len(large) < 2:
         return []
-    voxels = np.stack(np.unravel_index(flat, distance.shape), axis=1)
+    voxels = unflattened(flat, distance.shape)
     necks: list[Array] = []
     pieces = sorted((voxels[number == n] + corner for n in large), key=len, reverse=True)
     whole, left = pieces[0].astype(float), [p.astype(float) for p in pieces[1:]]

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from pipeline.arrays.cores import in_parts
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.contact import Inner
@@ -162,7 +163,7 @@ def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArra
     """Which surface voxels (flat box indices) have vessel, not bone, INWARDS of them: the wall of bone is steeper."""
     if not np.isfinite(levels.brightest):
         return np.ones(len(voxels), bool)
-    index = np.stack(np.unravel_index(voxels, site.state.shape), axis=1) - PAD + site.corner
+    index = unflattened(voxels, site.state.shape) - PAD + site.corner
     inwards = np.rint(index - INWARDS * normal).astype(np.int64)
     return np.asarray(grey_around(site.volume, inwards) <= levels.brightest)
 

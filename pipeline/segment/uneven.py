@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import spread, unflattened
 from pipeline.segment._kernels.voxels import eroded, extent, rebased
 from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, Region
@@ -55,7 +55,7 @@ def _core(voxels: Index, grid: Grid, low: Index, shape: tuple[int, ...]) -> Inde
     """Indices (n, 3), in the box that begins at ``low``, of the voxels that lie CORE layers inside; ascending."""
     wider = shape[0] + 2, shape[1] + 2, shape[2] + 2
     flat = np.sort(rebased(voxels, grid.shape, 1 - low, wider))
-    return np.stack(np.unravel_index(eroded(numbered(wider, flat), CORE), wider), axis=1) - 1
+    return unflattened(eroded(numbered(wider, flat), CORE), wider) - 1
 
 
 def filling(grid: Grid, region: Region) -> Filling:

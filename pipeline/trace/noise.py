@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
+from pipeline.arrays.grids import unflattened
 from pipeline.model import Array
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
@@ -63,7 +64,7 @@ def _spread(square: Array) -> float:
 def _places(image: Subtraction, curve: Array) -> NDArray[np.int64]:
     """Voxels of the lumen (n, 3) away from the curve, with room for a template around them."""
     box = image.region.box
-    index = np.stack(np.unravel_index(image.region.within[::7], box.shape), axis=1)
+    index = unflattened(image.region.within[::7], box.shape)
     inner = np.all((index >= HALF) & (index < np.array(box.shape) - HALF), axis=1)
     index = index[inner]
     if len(index) and len(curve):

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.tube import active_voxels
@@ -32,7 +33,7 @@ def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Arra
     """
     slot, h = sparse_zeros(image.grey.shape, np.int32), image.voxel
     voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(line), WINDOW * sigma)
-    index = np.stack(np.unravel_index(voxels, image.grey.shape), axis=1) * image.spacing
+    index = unflattened(voxels, image.grey.shape) * image.spacing
     square = np.sum((index[:, None] - line[None]) ** 2, axis=2)
     keep = np.argmin(square, axis=1) * STEP_VOXELS * h > WINDOW * sigma
     share = np.exp(-0.5 * square[keep] / sigma**2) * STEP_VOXELS * h / (np.sqrt(2.0 * np.pi) * sigma)

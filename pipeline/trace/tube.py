@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays.grids import unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
@@ -166,7 +167,7 @@ def _claim(image: Subtraction, tube: Tube, curve: Array, slot: NDArray[np.int32]
     if tube.start_plane is None:
         return Claim(voxels, slot, np.ones(len(voxels)))
     point, direction = tube.start_plane
-    index = np.stack(np.unravel_index(voxels, image.grey.shape), axis=1) * image.spacing
+    index = unflattened(voxels, image.grey.shape) * image.spacing
     # a wire may come back past the plane elsewhere
     at_start = np.sum((index - point) ** 2, axis=1) < (START_VOXELS * image.voxel) ** 2
     return Claim(voxels, slot, np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0))

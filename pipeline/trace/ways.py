@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from pipeline.arrays.grids import spread
+from pipeline.arrays.grids import spread, unflattened
 from pipeline.model import Array
 from pipeline.trace.subtraction import Subtraction
 
@@ -72,7 +72,7 @@ def _noise(image: Subtraction) -> float:
     deep = within[box.values.reshape(-1)[within] < -image.voxel]
     places = deep if len(deep) > PLACES else within
     rng = np.random.default_rng(0)
-    index = np.stack(np.unravel_index(rng.choice(places, PLACES), box.shape), axis=1)
+    index = unflattened(rng.choice(places, PLACES), box.shape)
     heading = rng.normal(size=(PLACES, 3))
     heading /= np.linalg.norm(heading, axis=1)[:, None]
     s = (np.arange(SAMPLES) - 0.5 * (SAMPLES - 1)) * PIECE_VOXELS / SAMPLES * image.voxel

@@ -33,7 +33,7 @@ def other_side(handle: Any, k: int) -> float:
     if not turned_aside(handle, k):
         return 0.0
     outcome, _, _, other = relax_with_friction(problem, CURRENT, k, handle.limits, report)
-    return back_again(handle, k, outcome == CONVERGED and abs(other - energy) < tol.AS_LOW * abs(energy))
+    return back_again(handle, k, outcome, energy, other)
 
 
 @kernel
@@ -49,10 +49,13 @@ def turned_aside(handle: Any, k: int) -> bool:
 
 
 @kernel
-def back_again(handle: Any, k: int, as_low: bool) -> float:
-    """Put back what the step led to; return the result of ``other_side``. as_low : whether that is at rest as low."""
+def back_again(handle: Any, k: int, outcome: int, energy: float, other: float) -> float:
+    """Put back what the step led to; return the result of ``other_side``.
+
+    outcome : of the relaxation on the other side, which led to the energy ``other``; ``energy`` : the step's own, N mm.
+    """
     problem, state, apart = handle.problem, handle.problem.state, 0.0
-    if as_low:
+    if outcome == CONVERGED and abs(other - energy) < tol.AS_LOW * abs(energy):
         apart = farthest(state.x[CURRENT], 0, state.x[SPARE], 0, k + 1)
     if apart > tol.APART_MM and through_wall(problem.field, state.x[CURRENT], k, handle.introducer.margin):
         apart = 0.0

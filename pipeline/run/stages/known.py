@@ -104,10 +104,6 @@ class Frame:
         return replace(self, status=status.identifier, sentence=status.value, stage=stage, message=text)
 
 
-def passed_over(_: Lumen) -> None:
-    """Do nothing with a lumen."""
-
-
 Result = TypeVar("Result", Lumen, Curve)
 
 
@@ -149,7 +145,7 @@ class Context:
     cores: int = 1
     simulates: bool = False
     hashed: Callable[[], object] = nothing
-    lumen_known: Callable[[Lumen], object] = passed_over
+    lumen_known: Callable[[Lumen], object] = nothing
 
     def part(self) -> "Context":
         """The same for a part of the case that may be done in another process."""

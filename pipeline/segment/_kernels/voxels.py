@@ -40,31 +40,41 @@ def rebased(
     return out
 
 
+@kernel
+def _faces(shape: tuple[int, int, int]) -> NDArray[Any]:
+    """Steps of a flat index to the 6-neighbours."""
+    across = shape[1] * shape[2]
+    return np.array([-across, -shape[2], -1, 1, shape[2], across])
+
+
+@kernel
+def _surrounded(ids: NDArray[Any], at: int, steps: NDArray[Any]) -> bool:
+    """Whether all neighbours of a voxel belong to the set."""
+    whole = True
+    for step in steps:
+        whole = whole and ids[at + step] > 0
+    return whole
+
+
 @entry_point
 def shell(voxels: Inner) -> NDArray[Any]:
     """Which voxels (n,) have a 6-neighbour outside the set: the one nearest to anything outside is of these."""
-    inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
+    inner, ids, steps = voxels.flat, voxels.ids.reshape(-1), _faces(voxels.ids.shape)
     out = np.empty(inner.shape[0], np.bool_)
     for n in range(inner.shape[0]):
-        at = inner[n]
-        across = ids[at - nj * nk] == 0 or ids[at + nj * nk] == 0
-        out[n] = across or ids[at - nk] == 0 or ids[at + nk] == 0 or ids[at - 1] == 0 or ids[at + 1] == 0
+        out[n] = not _surrounded(ids, inner[n], steps)
     return out
 
 
 @entry_point
 def eroded(voxels: Inner, layers: int) -> NDArray[Any]:
     """The voxels left, flat, once so many 6-neighbour layers are taken off; takes them out of ``voxels.ids``."""
-    ids, (_, nj, nk) = voxels.ids.reshape(-1), voxels.ids.shape
-    left, steps = voxels.flat, np.array([-nj * nk, -nk, -1, 1, nk, nj * nk])
+    ids, left, steps = voxels.ids.reshape(-1), voxels.flat, _faces(voxels.ids.shape)
     for _ in range(layers):
         kept, gone = np.empty(left.shape[0], np.int64), np.empty(left.shape[0], np.int64)
         stay = go = 0
         for at in left:
-            whole = True
-            for step in steps:
-                whole = whole and ids[at + step] > 0
-            if whole:
+            if _surrounded(ids, at, steps):
                 kept[stay] = at
                 stay += 1
             else:
@@ -79,9 +89,8 @@ def eroded(voxels: Inner, layers: int) -> NDArray[Any]:
 @entry_point
 def components(voxels: Inner) -> NDArray[Any]:
     """The 6-connected part of each voxel (n,), numbered from 0 in the order of their first voxels."""
-    inner, ids, (_, nj, nk) = voxels.flat, voxels.ids.reshape(-1), voxels.ids.shape
+    inner, ids, steps = voxels.flat, voxels.ids.reshape(-1), _faces(voxels.ids.shape)
     part, queue = np.full(inner.shape[0], -1, np.int32), np.empty(inner.shape[0], np.int32)
-    steps = np.array([-nj * nk, -nk, -1, 1, nk, nj * nk])
     parts = 0
     for first in range(inner.shape[0]):
         if part[first] >= 0:

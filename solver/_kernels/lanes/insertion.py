@@ -190,8 +190,8 @@ def end_step(me: Any, now: Any, wire: Any, problem: Problem) -> bool:
             return True
     other = 0.0
     if me.aside:
-        as_low = me.outcome == data.CONVERGED and abs(now.energy - me.energy) < tol.AS_LOW * abs(me.energy)
-        me.aside, me.outcome, other = 0, data.CONVERGED, back_again(wire, me.k, as_low)
+        other = back_again(wire, me.k, me.outcome, me.energy, now.energy)
+        me.aside, me.outcome = 0, data.CONVERGED
     outcome = settle(wire, (me.depth, me.roll, me.energy), me.k, me.outcome, 0, me.used, other)
     goes_on, me.outcome = judge(wire, outcome, me.iterations, me.limit)
     me.phase = READY if goes_on else STOPPED
