@@ -15,7 +15,7 @@ from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
 from pipeline.trace.explain import explained, missed_mm
 from pipeline.trace.stated import Opacity
-from pipeline.trace.subtraction import subtracted
+from pipeline.trace.subtraction import subtracting
 from pipeline.trace.verdict import near_rotation_plane
 from pipeline.trace.whose_end import DIM_FROM_TIP, cleared
 
@@ -76,13 +76,14 @@ def _seen(
 ) -> Curve:
     """The wire of a frame, by its reference and lumen. stated : in LPS."""
     frame, reference, lumen = scans
-    image = subtracted(frame, lumen, reference)
-    entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
-    curve = BACK_END(image, entry, previous, config)
+    with subtracting(frame, lumen, reference) as image:
+        entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
+        curve = BACK_END(image, entry, previous, config)
     if reference is None or not image.correlated or curve.status is not FrameStatus.TRACE_LOW_CONTRAST:
         return curve
     # smoothing removes the reference's white noise; correlated noise stays and adds to the frame's: 1.4 times as much
-    alone = BACK_END(subtracted(frame, lumen, None), entry, previous, config)
+    with subtracting(frame, lumen, None) as unaided:
+        alone = BACK_END(unaided, entry, previous, config)
     return alone if alone.status is FrameStatus.OK and _same(alone, curve, image.voxel, 2.0) else curve
 
 

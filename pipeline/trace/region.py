@@ -4,7 +4,7 @@ The grey is a reference scan's, or a model of the lumen's wall.
 """
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -38,7 +38,8 @@ class SearchRegion:
 
     box : float32 signed distance on the frames' lattice.  corner : index in the frame of its voxel (0, 0, 0).
     runs : (n, 4) rows of voxels near the lumen: i, j, first k, stop k.  allowed : uint8 box, 1 where the wire's axis
-    may lie.  within : flat indices of a sample of those.
+    may lie.  within : flat indices of a sample of those.  spare : memory for a frame's grey that no frame is using:
+    to write to fresh memory takes longer than to subtract.
     """
 
     box: Grid
@@ -46,6 +47,7 @@ class SearchRegion:
     runs: NDArray[np.int64]
     within: NDArray[np.int64]
     allowed: NDArray[np.uint8]
+    spare: list[NDArray[np.float32]] = field(default_factory=list)
 
     @cached_property
     def sample(self) -> NDArray[np.int64]:

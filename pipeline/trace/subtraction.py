@@ -162,7 +162,8 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
     background, still = background_of(grid, reference, region, lumen, axes)
-    grey = sparse_zeros(region.box.shape, np.float32)
+    # what an earlier frame left on the region's runs is overwritten; off them it is 0
+    grey = region.spare.pop() if region.spare else sparse_zeros(region.box.shape, np.float32)
     subtract(grid.values, background, region.corner, region.runs, grey)
     gain = 1.0 if still is None else matched(grey, background, region, grid, still)
     noise = spread(grey.reshape(-1)[region.within])
@@ -172,6 +173,16 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     modelled, levels = reference is None or gain != 1.0, {"noise": noise, "gain": gain}
     uneven = modelled and lumen.levels.get("least_filling", 1.0) < UNEVEN
     return Subtraction(region, grey, max(noise, 1e-6), modelled, blur, grid, uneven, counters, levels)
+
+
+@contextmanager
+def subtracting(frame: Volume, lumen: Lumen, reference: Volume | None) -> Iterator[Subtraction]:
+    """:func:`subtracted` for a ``with`` block, after which its grey is the next frame's."""
+    image = subtracted(frame, lumen, reference)
+    try:
+        yield image
+    finally:
+        image.region.spare.append(image.grey)
 
 
 def _smooth(sums: Array, counts: Array) -> Array:

@@ -21,7 +21,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace import of_catheter, of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
-from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted
+from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
 from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
 from tests.bench.imaging.topology import earlier, plain
@@ -181,6 +181,17 @@ def test_the_lumens_level_is_found_under_the_wire_and_leaves_an_even_lumen_alone
     assert untouched < 6.0
     assert after < 25.0
     assert before > 3 * after
+
+
+def test_a_frame_sees_nothing_of_the_one_whose_memory_it_takes_over():
+    frame, reference, lumen = scans(16)
+    fresh = subtracted(reference, lumen, reference).grey
+    with subtracting(frame, lumen, reference) as first, subtracting(reference, lumen, reference) as second:
+        assert not np.shares_memory(first.grey, second.grey)
+        taken = [first.grey, second.grey]
+    with subtracting(reference, lumen, reference) as image:
+        assert any(image.grey is one for one in taken)
+        assert np.array_equal(image.grey, fresh)
 
 
 def test_correlated_noise_that_hides_the_wire_is_a_named_status():
