@@ -79,8 +79,8 @@ def _seen(
     with subtracting(frame, lumen, reference) as image:
         entry = replace(stated, point=image.local(stated.point[None])[0], direction=image.turned(stated.direction))
         curve = BACK_END(image, entry, previous, config)
-    if reference is None or not image.correlated or curve.status is not FrameStatus.TRACE_LOW_CONTRAST:
-        return curve
+        if reference is None or not image.correlated or curve.status is not FrameStatus.TRACE_LOW_CONTRAST:
+            return curve
     # smoothing removes the reference's white noise; correlated noise stays and adds to the frame's: 1.4 times as much
     with subtracting(frame, lumen, None) as unaided:
         alone = BACK_END(unaided, entry, previous, config)

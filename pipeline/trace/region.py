@@ -54,6 +54,13 @@ class SearchRegion:
         """Voxels (n, 3) of 2000 runs or so: enough for a median."""
         return voxels_of(self.runs[:: max(1, len(self.runs) // 2000)])
 
+    def memory(self) -> NDArray[np.float32]:
+        """Memory on the box for a frame's grey: 0 off the runs, on them whatever an earlier frame left."""
+        try:
+            return self.spare.pop()
+        except IndexError:  # to ask first would not do: another thread may take the last one meanwhile
+            return sparse_zeros(self.box.shape, np.float32)
+
 
 def voxels_of(runs: NDArray[np.int64]) -> NDArray[np.int64]:
     """The voxels (n, 3) of runs."""

@@ -162,8 +162,7 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
     background, still = background_of(grid, reference, region, lumen, axes)
-    # what an earlier frame left on the region's runs is overwritten; off them it is 0
-    grey = region.spare.pop() if region.spare else sparse_zeros(region.box.shape, np.float32)
+    grey = region.memory()
     subtract(grid.values, background, region.corner, region.runs, grey)
     gain = 1.0 if still is None else matched(grey, background, region, grid, still)
     noise = spread(grey.reshape(-1)[region.within])
