@@ -57,7 +57,10 @@ def assert_same(together: list[list[Solution]], alone: list[list[Solution]]) -> 
             assert a.least_pivot == pytest.approx(b.least_pivot, abs=1e2 * same), where
             assert a.dissipated_N_mm == pytest.approx(b.dissipated_N_mm, abs=1e3 * same * forces), where
             assert (a.uncertain, len(a.snaps)) == (b.uncertain, len(b.snaps)), where
-            np.testing.assert_allclose(a.snaps, b.snaps, rtol=1e-6, atol=1e2 * same, err_msg=where)
+            for ours_is, theirs_is in zip(a.snaps, b.snaps, strict=True):
+                # a wire about to snap lies where its energy is flat: a place is known to the root of what an energy is
+                np.testing.assert_allclose(ours_is[:3], theirs_is[:3], rtol=1e-8, atol=1e2 * same, err_msg=where)
+                np.testing.assert_allclose(ours_is[3:], theirs_is[3:], rtol=1e-4, atol=1e2 * same, err_msg=where)
             assert a.max_penetration_mm == pytest.approx(b.max_penetration_mm, abs=same)
             # how often a wire is held back hangs on the last place of its numbers where that takes many iterations
             if not straight and b.work["levenberg"] < 20:
