@@ -28,7 +28,8 @@ class Totals:
     """The numbers of the last line. Errors are those of all points of the frames that are pooled, as in overall.csv.
 
     unscored : why there are no errors.     mixed : whether the reason is that settings differ.     sweep_lost : cases
-    that crashed at a point of a sweep; they are not counted in ``cases``.
+    that crashed at a point of a sweep; they are not counted in ``cases``.     frames_fitted : scans that a roll was
+    fitted on; they are not counted in ``frames``.
     """
 
     cases: int
@@ -42,6 +43,7 @@ class Totals:
     unscored: str = ""
     mixed: bool = False
     sweep_lost: int = 0
+    frames_fitted: int = 0
 
     @property
     def all_ok(self) -> bool:
@@ -81,6 +83,7 @@ def aggregate(out: Path, run_info: dict[str, Any] | None = None, name: str = "ru
         whole,
         mixed or unscored((result.role, result.status) for result in found) or not_reached(out),
         bool(mixed),
+        frames_fitted=sum(row.get("frames_fitted") or 0 for row in rows),
     )
 
 

@@ -63,7 +63,8 @@ def _next(plan: Plan, cases: Sequence[str]) -> str:
 
 def last_line(totals: Totals, index: Path) -> str:
     """Counts, median error, time of the simulate stage, and where the sweep's table and the report lie."""
-    parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}: {totals.frames_ok} ok"]
+    fitted = f" (and {totals.frames_fitted} used for the roll)" * bool(totals.frames_fitted)
+    parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}{fitted}: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
         parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
     elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted

@@ -81,6 +81,16 @@ def test_one_population_everywhere(study: Path) -> None:
     assert whole["within_1mm"] == pytest.approx(7 / 9)
 
 
+def test_the_last_line_names_scans_that_a_roll_was_fitted_on(study: Path) -> None:
+    totals = aggregate(study)
+    assert "used for the roll" not in last_line(totals, study)
+    result = study / "cases" / "a" / "result.json"
+    told = json.loads(result.read_text(encoding="utf-8"))
+    told["summary"]["frames_fitted"] = 1
+    result.write_text(json.dumps(told), encoding="utf-8")
+    assert f", {totals.frames} frames (and 1 used for the roll): " in last_line(aggregate(study), study)
+
+
 def test_leaving_frames_out_cannot_improve_the_share(study: Path) -> None:
     before = overall(found_cases(study))["within_1mm"]
     write_case(study, "e", [GOOD, BAD, BAD], ["ok", "no_wire", "no_wire"])
