@@ -2,6 +2,7 @@
 
 import base64
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -15,7 +16,7 @@ from reports.figures import declared, figures_of
 from reports.figures._drawing import DOTS_PER_INCH, save
 
 R = TypeVar("R")
-LONGEST = "projections"
+LONGEST = "projections", "run_time"
 _NIGHT = "0.52 -0.64 -0.48 0 0.69  -0.48 0.36 -0.48 0 0.69  -0.48 -0.64 0.52 0 0.69  0 0 0 1 0"
 """The matrix by which paper becomes the dark page and ink light, while colours stay theirs."""
 
@@ -34,7 +35,7 @@ def one_by_one(work: Callable[[int], R], count: int) -> list[R]:
 
 def longest(entries: Sequence[Mapping[str, Any]]) -> list[int]:
     """Numbers, from 1, of the figures that take as long as many others."""
-    return [number for number, entry in enumerate(entries, 1) if entry["figure"] == LONGEST]
+    return [number for number, entry in enumerate(entries, 1) if entry["figure"] in LONGEST]
 
 
 def begun_first(first: Sequence[int], work: Callable[[int], R], count: int, each: Each) -> list[R]:
@@ -74,6 +75,13 @@ def section(page: str, entry: Mapping[str, Any], data: Any, folder: Path, embed:
 
 def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
     """Render a template of this package with everything escaped; a name it misses is an error, not a gap."""
+    write_text(path, _templates().get_template(template).render(page))
+    return path
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    """The templates, each compiled once a process: that takes as long as filling it in."""
     templates = Path(__file__).parent / "templates"
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
@@ -86,8 +94,7 @@ def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
     }
     environment.filters["of_what"] = of_what
     environment.globals.update(fixed)  # macros see these, and nothing of the page
-    write_text(path, environment.get_template(template).render(page))
-    return path
+    return environment
 
 
 def _link(path: Path, folder: Path, kind: str, embed: bool) -> str:

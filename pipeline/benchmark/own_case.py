@@ -20,7 +20,7 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         msg = f"bench: case {case.id!r}: insertion_mm: got none; allowed: a list of depths in mm; "
         raise NoScene(msg + "the benchmark does not trace: give the deepest insertion to time")
     silent = Log(lambda *_: None)
-    known = run_stages(Context(case, config, Store(default_root()), silent), until="segment")
+    known = run_stages(Context(case, config, Store(default_root()), silent, until="segment"))
     if known.failure is not None or known.lumen is None:
         raise NoScene(f"bench: case {case.id!r}: {known.failure}")
     return BenchScene(

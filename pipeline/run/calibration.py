@@ -75,8 +75,8 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
     kept, trials, stated, voxels, left_out, notes = [], [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
-        run = Context(case, config, store, log)
-        known = run_stages(run, "trace")
+        run = Context(case, config, store, log, until="trace")
+        known = run_stages(run)
         frames = [frame for frame in known.frames if frame.trusted_curve is not None]
         notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
         if known.failure is not None or len(frames) < LEAST_FRAMES:
@@ -132,8 +132,10 @@ def design(cases: Sequence[Case], config: Config, store: Store) -> tuple[list[Pr
     for case in cases:
         if case.insertion_mm is None:
             raise CalibrationError([f"case {case.id!r}: insertion_mm is missing: which depths are planned?"])
-        run = Context(case.model_copy(update={"frames": (), "traces": ()}), config, store, Log(lambda *_: None))
-        known = run_stages(run, "segment")
+        run = Context(
+            case.model_copy(update={"frames": (), "traces": ()}), config, store, Log(lambda *_: None), until="segment"
+        )
+        known = run_stages(run)
         if known.failure is not None:
             raise CalibrationError([f"case {case.id!r}: {known.failure}"])
         trial = trial_of(run, known, (), roll_free=case.roll_deg == "fit")

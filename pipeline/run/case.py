@@ -142,9 +142,9 @@ def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> No
     log = Log(progress)
     store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
     begin = files.begin if job.pictures and job.cores > 1 else nothing
-    run = Context(job.case, job.settings.config, store, log, job.cores, job.simulates, hashed, begin)
+    run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, begin)
     try:
-        known = run_stages(run, job.until)
+        known = run_stages(run)
         hashed()
         _write(job, known, log, files, clock)
     finally:

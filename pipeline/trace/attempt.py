@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, Curve, arc_length
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
@@ -247,14 +246,15 @@ def warm(image: Subtraction, entry: EntryPose, previous: Curve, crests_voxel: fl
 def misfit(image: Subtraction, attempts: list[Attempt]) -> list[float]:
     """Sum of squares of what each attempt leaves, over the voxels that any of them claims, in noise variances."""
     radius = 3.0 * max(a.tube.sigma for a in attempts)
-    slot = sparse_zeros(image.grey.shape, np.int32)
     curve = np.concatenate([dense(a.tube, image.voxel) for a in attempts])
-    voxels = active_voxels(slot, image.spacing, curve, radius)
     out = []
-    for attempt in attempts:
-        left = image.grey.reshape(-1)[voxels].astype(float)
-        own, model = predicted(image, attempt.tube)
-        at = slot.reshape(-1)[own] - 1
-        left[at[at >= 0]] -= model[at >= 0]
-        out.append(float(np.sum(left**2)) / image.noise**2)
+    with image.region.numbers.lent() as slot:
+        voxels = active_voxels(slot, image.spacing, curve, radius)
+        for attempt in attempts:
+            left = image.grey.reshape(-1)[voxels].astype(float)
+            own, model = predicted(image, attempt.tube)
+            at = slot.reshape(-1)[own] - 1
+            left[at[at >= 0]] -= model[at >= 0]
+            out.append(float(np.sum(left**2)) / image.noise**2)
+        slot.reshape(-1)[voxels] = 0
     return out

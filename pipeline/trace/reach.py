@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.grids import unflattened
-from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.attempt import dense
@@ -31,8 +30,10 @@ def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Arra
 
     Voxels that wire before the line lights up, too, are left out.
     """
-    slot, h = sparse_zeros(image.grey.shape, np.int32), image.voxel
-    voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(line), WINDOW * sigma)
+    h = image.voxel
+    with image.region.numbers.lent() as slot:
+        voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(line), WINDOW * sigma)
+        slot.reshape(-1)[voxels] = 0
     index = unflattened(voxels, image.grey.shape) * image.spacing
     square = np.sum((index[:, None] - line[None]) ** 2, axis=2)
     keep = np.argmin(square, axis=1) * STEP_VOXELS * h > WINDOW * sigma

@@ -4,7 +4,7 @@ The grey is a reference scan's, or a model of the lumen's wall.
 """
 
 import weakref
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ from scipy.special import ndtr
 
 from pipeline.arrays.grids import contiguous, corners_mm, integer_offset, reorder, sampled, spread
 from pipeline.arrays.lattice import sparse_zeros
+from pipeline.arrays.spare import Spare
 from pipeline.model import Lumen, Volume
 from pipeline.trace._kernels.runs import WallModel, denoised, modelled, subtract
 from solver.grid import Grid
@@ -38,8 +39,7 @@ class SearchRegion:
 
     box : float32 signed distance on the frames' lattice.  corner : index in the frame of its voxel (0, 0, 0).
     runs : (n, 4) rows of voxels near the lumen: i, j, first k, stop k.  allowed : uint8 box, 1 where the wire's axis
-    may lie.  within : flat indices of a sample of those.  spare : memory for a frame's grey that no frame is using:
-    to write to fresh memory takes longer than to subtract.
+    may lie.  within : flat indices of a sample of those.
     """
 
     box: Grid
@@ -47,19 +47,21 @@ class SearchRegion:
     runs: NDArray[np.int64]
     within: NDArray[np.int64]
     allowed: NDArray[np.uint8]
-    spare: list[NDArray[np.float32]] = field(default_factory=list)
 
     @cached_property
     def sample(self) -> NDArray[np.int64]:
         """Voxels (n, 3) of 2000 runs or so: enough for a median."""
         return voxels_of(self.runs[:: max(1, len(self.runs) // 2000)])
 
-    def memory(self) -> NDArray[np.float32]:
+    @cached_property
+    def greys(self) -> Spare:
         """Memory on the box for a frame's grey: 0 off the runs, on them whatever an earlier frame left."""
-        try:
-            return self.spare.pop()
-        except IndexError:  # to ask first would not do: another thread may take the last one meanwhile
-            return sparse_zeros(self.box.shape, np.float32)
+        return Spare(self.box.shape, np.float32)
+
+    @cached_property
+    def numbers(self) -> Spare:
+        """Memory on the box for the numbers of voxels in a list: zeros, which their user puts back."""
+        return Spare(self.box.shape, np.int32)
 
 
 def voxels_of(runs: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -162,7 +162,7 @@ def subtracted(frame: Volume, lumen: Lumen, reference: Volume | None) -> Subtrac
     grid, axes = in_memory_order(frame)
     region = region_of(grid, lumen, axes)
     background, still = background_of(grid, reference, region, lumen, axes)
-    grey = region.memory()
+    grey = region.greys.take()
     subtract(grid.values, background, region.corner, region.runs, grey)
     gain = 1.0 if still is None else matched(grey, background, region, grid, still)
     noise = spread(grey.reshape(-1)[region.within])
@@ -181,7 +181,7 @@ def subtracting(frame: Volume, lumen: Lumen, reference: Volume | None) -> Iterat
     try:
         yield image
     finally:
-        image.region.spare.append(image.grey)
+        image.region.greys.give_back(image.grey)
 
 
 def _smooth(sums: Array, counts: Array) -> Array:
@@ -203,9 +203,10 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     distance, grey = image.region.box.values[at], image.grey[at].astype(float)
     # a blur is wider than half the halo only where the wall was not found; its step is not carried further than that
     share = ndtr(-distance / min(image.wall_blur_mm, 0.5 * HALO_VOXELS * voxel))
-    wire = sparse_zeros(image.grey.shape, np.int32)
-    active_voxels(wire, image.spacing, np.ascontiguousarray(curve), CLEAR_BLURS * sigma)
-    clear = (wire[at] == 0) & (distance < -DEEP_VOXELS * voxel)
+    with image.region.numbers.lent() as wire:
+        near = active_voxels(wire, image.spacing, np.ascontiguousarray(curve), CLEAR_BLURS * sigma)
+        clear = (wire[at] == 0) & (distance < -DEEP_VOXELS * voxel)
+        wire.reshape(-1)[near] = 0
     shape = tuple(-(-n // BLOCK) for n in image.grey.shape)
     block = np.ravel_multi_index(tuple(index[:, clear] // BLOCK), shape)
     counts = np.bincount(block, minlength=int(np.prod(shape))).reshape(shape).astype(float)

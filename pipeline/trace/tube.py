@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays.grids import unflattened
-from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Array, arc_length
 from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
@@ -173,14 +172,13 @@ def _claim(image: Subtraction, tube: Tube, curve: Array, slot: NDArray[np.int32]
     return Claim(voxels, slot, np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0))
 
 
-def _equations(
-    image: Subtraction, tube: Tube, samples: Samples, prior: Array, slot: NDArray[np.int32]
-) -> tuple[Equations, Claim, Line]:
+def _equations(image: Subtraction, tube: Tube, samples: Samples, prior: Array) -> tuple[Equations, Claim, Line]:
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
-    claim = _claim(image, tube, line.curve, slot)
-    e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
-    slot.reshape(-1)[claim.voxels] = 0
+    with image.region.numbers.lent() as slot:
+        claim = _claim(image, tube, line.curve, slot)
+        e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
+        slot.reshape(-1)[claim.voxels] = 0
     e.right[: 3 * k] -= prior @ tube.controls.ravel()
     e.normal[: 3 * k, : 3 * k] += prior
     return e, claim, line
@@ -249,18 +247,17 @@ def fit_tube(image: Subtraction, tube: Tube, iterations: int = 12, tolerance: fl
     columns (controls, amplitudes, blur, offset), for the noise of the image.
     """
     samples, prior = sampling(tube, image.voxel), _prior(tube, image)
-    slot = sparse_zeros(image.grey.shape, np.int32)
     # a bright piece is off a Gaussian by a few hundredths, which the offset takes up; a dim end would drown in that
     stepped = [-1] if tube.steps.levels[-1] < DIM_END * tube.steps.levels.max() else []
     done = 0
     for done in range(1, iterations + 1):
-        found, _, line = _equations(image, tube, samples, prior, slot)
+        found, _, line = _equations(image, tube, samples, prior)
         normal, right = _damped(found.normal, tube, SLIDING), found.right
         _hold(normal, right, [-2] * (done <= BLUR_HELD) + stepped)
         tube, size = _moved(tube, substitute(*_factors(normal), right), image.voxel, line)
         if size < tolerance * image.voxel and done > BLUR_HELD:
             break
-    found, claim, _ = _equations(image, tube, samples, prior, slot)
+    found, claim, _ = _equations(image, tube, samples, prior)
     rms = float(np.sqrt(found.square / max(1.0, claim.weight.sum())))
     normal = _damped(found.normal, tube, POLISHED)
     _hold(normal, found.right, stepped)
@@ -289,6 +286,8 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
 def predicted(image: Subtraction, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     """Voxels (flat) that the tube lights up and the grey it gives them."""
     line, blob = sampled(tube, sampling(tube, image.voxel)), tube.blob(image.voxel)
-    slot = sparse_zeros(image.grey.shape, np.int32)
-    voxels = kernels.active_voxels(slot, image.spacing, line.curve, blob.radius)
-    return voxels, kernels.render(slot, image.spacing, len(voxels), line, blob)
+    with image.region.numbers.lent() as slot:
+        voxels = kernels.active_voxels(slot, image.spacing, line.curve, blob.radius)
+        grey = kernels.render(slot, image.spacing, len(voxels), line, blob)
+        slot.reshape(-1)[voxels] = 0
+    return voxels, grey

@@ -358,7 +358,7 @@ def test_other_simulators_are_scored_with_parameters_too(study, capsys):
 def test_what_was_assumed_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     """Information used to be counted among the problems where every case was left out."""
 
-    def no_wire(run: Context, until: str) -> SimpleNamespace:
+    def no_wire(run: Context) -> SimpleNamespace:
         run.log.assumptions.append("the phantom did not move")
         return SimpleNamespace(frames=(), failure="no wire")
 

@@ -10,6 +10,7 @@ from scipy import ndimage
 from scipy.stats import ncx2
 
 from pipeline.arrays.jets import Blurred, jet, ridge_frame, ridge_step
+from pipeline.arrays.spare import Spare
 from pipeline.segment._kernels.wall import hessian, value_gradient
 from pipeline.segment.surface import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
@@ -81,7 +82,8 @@ def test_tube_fit_finds_a_noise_free_tube_again():
     truth = Tube(controls, np.full(tint_nodes(6), 700.0), 0.27, 0.0)
     shape = (30, 30, 40)
     grey = np.zeros(shape, np.float32)
-    image = SimpleNamespace(grey=grey, spacing=spacing, noise=1.0, voxel=0.3)
+    region = SimpleNamespace(numbers=Spare(shape, np.int32))
+    image = SimpleNamespace(grey=grey, spacing=spacing, noise=1.0, voxel=0.3, region=region)
     voxels, model = predicted(image, truth)
     grey.reshape(-1)[voxels] = model
     start = Tube(controls + 0.2 * np.sin(np.arange(27)).reshape(9, 3), truth.tint * 0.8, 0.3, 0.0)

@@ -10,6 +10,7 @@ import pytest
 from scipy import ndimage
 from scipy.special import ndtr
 
+from pipeline.arrays.spare import Spare
 from pipeline.model import Volume
 from pipeline.segment import segment
 from pipeline.status import FrameStatus
@@ -208,10 +209,11 @@ def line_in_noise(seed, height, last_mm, size=(40, 40, 90), h=0.3, blur=0.95):
     grey += height * across[:, :, None] * ndtr((last_mm - z) / (blur * h))
     smooth = ndimage.gaussian_filter(grey, CREST_VOXELS)
     sd = float(np.std(ndimage.gaussian_filter(np.random.default_rng(0).normal(size=size), CREST_VOXELS)))
+    box, within = SimpleNamespace(shape=size, values=0 * smooth - 1.0), np.arange(grey.size)
     return SimpleNamespace(
         voxel=h, spacing=np.full(3, h), grey=grey, noise=1.0, correlation=1.0, noise_in=lambda blur: sd,
         along=lambda points: ndimage.map_coordinates(smooth, np.asarray(points).T / h, order=1),
-        region=SimpleNamespace(within=np.arange(grey.size), box=SimpleNamespace(shape=size, values=0 * smooth - 1.0)),
+        region=SimpleNamespace(within=within, box=box, numbers=Spare(size, np.int32)),
     )  # fmt: skip
 
 

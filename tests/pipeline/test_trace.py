@@ -21,6 +21,7 @@ from pipeline.status import FrameStatus
 from pipeline.trace import of_catheter, of_length, trace
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
+from pipeline.trace.region import _regions
 from pipeline.trace.subtraction import BLOCK, _smooth, levelled, subtracted, subtracting
 from pipeline.trace.verdict import near_rotation_plane
 from solver.grid import Grid
@@ -192,6 +193,18 @@ def test_a_frame_sees_nothing_of_the_one_whose_memory_it_takes_over():
     with subtracting(reference, lumen, reference) as image:
         assert any(image.grey is one for one in taken)
         assert np.array_equal(image.grey, fresh)
+
+
+@pytest.mark.parametrize("has_reference", [True, False])
+def test_memory_for_the_numbers_of_voxels_is_left_as_it_was(has_reference):
+    """What one fit left in it would be voxels of the next one's wire."""
+    frame, reference, lumen = scans(16)
+    trace(frame, lumen, *vessel()[4:], reference=reference if has_reference else None)
+    _, region = _regions[lumen]
+    used = region.numbers.take()
+    assert len(region.numbers._free) > 0, "fits work on one box each at least, a comparison of two on two"
+    region.numbers.give_back(used)
+    assert not any(array.any() for array in region.numbers._free)
 
 
 def test_correlated_noise_that_hides_the_wire_is_a_named_status():

@@ -47,8 +47,8 @@ BARS = {
 
 def squares(case: Case, config: Config) -> tuple[float, int]:
     """Sum of squares of the simulated wires' distances to the true ones, mm^2, and how many points they are of."""
-    run = Context(case, config, Store(default_root()), Log(lambda *_: None))
-    known = simulate_frames(run, run_stages(run, "trace"))
+    run = Context(case, config, Store(default_root()), Log(lambda *_: None), until="trace")
+    known = simulate_frames(run, run_stages(run))
     total, count = 0.0, 0
     for frame in known.frames:
         if frame.ok and frame.simulated is not None and frame.truth_mm is not None:

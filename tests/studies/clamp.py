@@ -81,8 +81,8 @@ def traced(name: str, cnr: float, seed: int, folder: Path) -> Traced:
     study = catalogue.build(scene, frames=min(FRAMES, scene.frames), seed=seed, truth_step_mm=TRUTH_STEP_MM)
     with tempfile.TemporaryDirectory() as scratch:
         (case,) = read_manifest(write_study(study, scratch)).cases
-        context = Context(case, Config(), Store(None), Log(lambda *_: None))
-        known = run_stages(context, "trace")
+        context = Context(case, Config(), Store(None), Log(lambda *_: None), until="trace")
+        known = run_stages(context)
     true = tuple(frame.points_mm for frame in study.truth)
     frames = tuple(replace(frame, projections=()) for frame in known.frames)
     failure = str(known.failure or "")

@@ -6,7 +6,7 @@ A step takes what is known of the case and returns more; what it writes down on 
 from collections.abc import Callable
 from dataclasses import replace
 
-from pipeline.run.log import STAGES, Stage
+from pipeline.run.log import Stage
 from pipeline.run.stages.compare import compare_frames
 from pipeline.run.stages.known import Context, Known
 from pipeline.run.stages.load import open_case
@@ -26,11 +26,11 @@ STEPS: dict[Stage, Callable[[Context, Known], Known]] = {
 }
 
 
-def run_stages(run: Context, until: Stage = "report") -> Known:
-    """Run the stages up to ``until``; a StageError, which is of the whole case, ends them and becomes the failure."""
+def run_stages(run: Context) -> Known:
+    """Run the stages of a case; a StageError, which is of the whole case, ends them and becomes the failure."""
     known = Known()
     for stage, step in STEPS.items():
-        if STAGES.index(stage) > STAGES.index(until):
+        if not run.goes_to(stage):
             break
         run.log.begins(stage)
         try:

@@ -25,7 +25,7 @@ def compare_frames(run: Context, known: Known) -> Known:
     if run.case.projections:
         with run.log.timed("compare"):
             return replace(known, frames=compare_in_views(run, known))
-    clues = _clues(run, known)
+    clues = known.clues
     if clues is None:
         return budgeted(run, replace(known, frames=_all_compared(run, known, None, {}, ())[0]))
     with run.log.timed("compare"):
@@ -42,18 +42,14 @@ def _simulated_otherwise(
 ) -> tuple[list[list[Solution]], Mapping[int, Mapping[str, Array]]]:
     """The wires from four entries (``entries``), and by frame those of the simulated predictors (``rivals``).
 
-    While helpers simulate, this process finds what the clues need; the shortest path, which is small to send, is left
-    to whoever is done first.
+    While helpers simulate, this process finds what the clues of all frames share.
     """
     ways = rival_ways(run, known)
 
     def one(number: int, _earlier: object) -> Any:
-        if number > len(ways):
-            return (clues.shortest,)
         return rival_wires(run, known, *ways[number - 1]) if number else replayed_entries(run, known)
 
-    entered, *wires, (shortest,) = run.share("compare", one, 2 + len(ways), clues.known_ways)
-    clues.take_shortest(shortest)
+    entered, *wires = run.share("compare", one, 1 + len(ways), clues.known_ways)
     return entered, simulated_rivals(run, known, wires)
 
 
@@ -99,17 +95,6 @@ def _all_compared(
         run.log.add(log)
     (rows, _), *parts = found
     return tuple(frame for frame, _ in parts), rows
-
-
-def _clues(run: Context, known: Known) -> Clues | None:
-    """What predictors may know; None where no trace is to be trusted."""
-    assert known.lumen is not None
-    assert known.clamp is not None
-    curves = [curve for frame in known.frames if (curve := frame.trusted_curve) is not None]
-    if not curves:
-        return None
-    deepest = max(curves, key=lambda curve: curve.length_mm)
-    return Clues(known.lumen, known.clamp, run.case.wire.radius_mm, deepest.points_mm)
 
 
 NEAREST = 0.2

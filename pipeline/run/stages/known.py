@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from pipeline.budget import Budget
 from pipeline.compare import Comparison
+from pipeline.compare.nulls import Clues
 from pipeline.load import Crop, Scans
 from pipeline.load.views import View
 from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.cache import Store
 from pipeline.run.helpers import R, Work, nothing, said, shared
-from pipeline.run.log import Log, Stage
+from pipeline.run.log import STAGES, Log, Stage
 from pipeline.run.stages.before import ASKS, Before, is_asks
 from pipeline.run.store import key_of
 from pipeline.simulate.resolution import AGREED_MM
@@ -111,7 +112,8 @@ Result = TypeVar("Result", Lumen, Curve)
 class Known:
     """What is known of a case so far.
 
-    clamp, segment_mm : what was simulated with.     sources, entries : rows of budget.csv and entries.csv.
+    clamp, segment_mm : what was simulated with.     clues : see ``clues_of``.
+    sources, entries : rows of budget.csv and entries.csv.
     ends_rank : of the real insertion in the budget's ensemble (see ``budget.joint``).
     failure : why the case went no further.     at_entry : the scan around the entry, where no lumen was found.
     """
@@ -119,6 +121,7 @@ class Known:
     scans: Scans | None = None
     lumen: Lumen | None = None
     clamp: Clamp | None = None
+    clues: Clues | None = None
     segment_mm: float = float("nan")
     frames: tuple[Frame, ...] = ()
     sources: tuple[dict[str, Any], ...] = ()
@@ -133,7 +136,7 @@ class Known:
 class Context:
     """A case, its settings, the store of earlier results and the log.
 
-    cores : that the case may use.     simulates : it will be simulated after it is traced.
+    cores : that the case may use.     until : the last stage that it goes through.
     hashed : waits until the files are hashed, so that forked processes inherit the hashes.
     lumen_known : called as soon as the lumen is what it will be, before the case is simulated.
     """
@@ -143,9 +146,13 @@ class Context:
     store: Store
     log: Log
     cores: int = 1
-    simulates: bool = False
+    until: Stage = "report"
     hashed: Callable[[], object] = nothing
     lumen_known: Callable[[Lumen], object] = nothing
+
+    def goes_to(self, stage: Stage) -> bool:
+        """Whether the case goes through a stage."""
+        return STAGES.index(stage) <= STAGES.index(self.until)
 
     def part(self) -> "Context":
         """The same for a part of the case that may be done in another process."""

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.model import Clamp
 from pipeline.run.log import Log
 from pipeline.run.stages.clamp import clamp_of
+from pipeline.run.stages.clues import beside_clues, clues_of
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.others import frames_of_others
 from pipeline.run.stages.roll import with_fitted_roll
@@ -31,6 +32,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         known = with_fitted_roll(run, known)
         clamp = clamp_of(run, known)
     known = replace(known, frames=_with_depths(run, known, clamp), clamp=clamp)
+    known = replace(known, clues=clues_of(run, known))
     if run.case.simulated is None:
         return _replayed(run, known)
     try:
@@ -68,10 +70,10 @@ def _resolved(run: Context, known: Known, frames: Sequence[Frame]) -> Resolved:
     config = run.config
     assert known.lumen is not None
     lengths = lengths_mm(config.solver.segment_mm, altered(run.case.wire, config.simulate).rest_curvature_per_mm)
-    # the first two lengths are needed in any case: side by side, where there are cores
-    tries = [(lengths[0], len(lengths) == 1), *((shorter, True) for shorter in lengths[1:2])]
+    # the first two lengths are needed in any case: side by side, where there are cores, the longer work first
+    tries = [*((shorter, True) for shorter in lengths[1:2]), (lengths[0], len(lengths) == 1)]
     wall_of(known.lumen.distance, config.solver.hull)  # made here, so that helpers inherit it
-    found = run.share("simulate", lambda i, _: _inserted(run, known, frames, *tries[i]), len(tries))
+    found = beside_clues(run, known, lambda i: _inserted(run, known, frames, *tries[i]), len(tries))
     ahead = dict(zip(tries, found, strict=True))
 
     def insert(segment_mm: float, refined: bool) -> list[Solution]:

@@ -40,7 +40,7 @@ def trace_frames(run: Context, known: Known) -> Known:
         return replace(known, frames=tuple(_as_given(run, *pair) for pair in pairs) or known.frames)
     work = _Tracing(run, known, given)
     # the wall takes a second and more with 256^3 voxels: it is made while the helpers trace
-    wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.simulates else nothing
+    wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.goes_to("simulate") else nothing
     parts = run.share("trace", work.part, len(known.frames), wall)
     for part in parts:
         run.log.add(part.log)
