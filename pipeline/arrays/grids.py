@@ -18,6 +18,17 @@ def reorder(grid: Grid, axes: tuple[int, int, int]) -> Grid:
     return Grid(grid.values.transpose(axes), grid.spacing_mm[order], grid.origin_mm, grid.direction[:, order])
 
 
+def towards_lps(grid: Grid) -> NDArray[Any]:
+    """Its values with axes in the order and the sense of x, y and z, as nearly as they go; a view, never a copy."""
+    along, order = np.abs(grid.direction), [0, 0, 0]
+    for _ in range(3):
+        x, axis = divmod(int(np.argmax(along)), 3)
+        order[x] = axis
+        along[x], along[:, axis] = -1.0, -1.0
+    back = tuple(x for x in range(3) if grid.direction[x, order[x]] < 0.0)
+    return np.asarray(np.flip(grid.values.transpose(order), back))
+
+
 def contiguous(grid: Grid) -> Grid:
     """The grid itself if its values are C-contiguous, otherwise one with a contiguous copy of them (of a crop, say)."""
     return grid if grid.values.flags.c_contiguous else grid.with_values(read_only(np.ascontiguousarray(grid.values)))

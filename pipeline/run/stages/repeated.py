@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.arrays.grids import towards_lps
 from pipeline.model import Volume
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
@@ -33,9 +34,11 @@ def _repeated(frame: Frame, whose: str) -> Frame:
 
 
 def known_by(volume: Volume) -> str:
-    """A hash (16 bytes) of the sums over the rows in memory, whatever type the voxels are kept in.
+    """A hash (16 bytes) of the sums over the rows along x, whatever type the voxels are kept in and in which order.
 
     In scans with noise it tells as much as a hash of all voxels, in a fifth of the time.
     """
-    rows = volume.values.sum(axis=int(np.argmin(volume.values.strides)), dtype=np.float64)
-    return hashlib.blake2b(np.ascontiguousarray(rows).data, digest_size=16).hexdigest()
+    values = towards_lps(volume)
+    if not 0 < values.strides[0] <= min(values.strides, key=abs):  # sums of real numbers hang on their order
+        values = np.array(values, order="F")
+    return hashlib.blake2b(values.sum(axis=0, dtype=np.float64).tobytes(), digest_size=16).hexdigest()
