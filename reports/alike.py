@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.case_files import counted
+from reports.case_files import counted, listed
 
 _SCAN = re.compile(r" \(scan [^()]*\)$")
 _FILE = re.compile(r"^(\S.*?): ")
@@ -39,8 +39,7 @@ def _files(rows: Sequence[Mapping[str, Any]]) -> str:
     paths = list(dict.fromkeys(head[1] for head in heads if head and re.search(r"[/\\]|\.\w+$", head[1])))
     names = [re.split(r"[/\\]", path)[-1] for path in paths]
     shown = names if len(set(names)) == len(names) else paths
-    rest = len(shown) - _MOST_FILES
-    return ", ".join(shown[:_MOST_FILES]) + f" and {rest} more" * (rest > 0) if len(shown) > 1 else ""
+    return listed(shown, _MOST_FILES) if len(shown) > 1 else ""
 
 
 def in_words(frames: Sequence[int]) -> str:

@@ -187,10 +187,10 @@ def _without_result(out_dir: Path) -> dict[str, bool]:
     return {name: asked for name, asked in named.items() if not (out_dir / "cases" / name / "result.json").exists()}
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     """Names in a sentence, no more than a few."""
-    rest = len(names) - _MOST_NAMED
-    return ", ".join(names[:_MOST_NAMED]) + f" and {rest} more" * (rest > 0)
+    rest = len(names) - most
+    return ", ".join(names[:most]) + f" and {rest} more" * (rest > 0)
 
 
 def counted(count: int, noun: str) -> str:

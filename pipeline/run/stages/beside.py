@@ -9,6 +9,7 @@ from pipeline.model import Curve
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
 from pipeline.trace.config import TraceConfig
+from reports.case_files import listed
 
 OFF_VOXELS, OFF_SIGMAS = 0.75, 3.0
 """Median distance from a traced wire, in voxels and in its own standard deviations, above which a curve is not its."""
@@ -34,9 +35,8 @@ def beside_what_is_seen(
             said[frame.index] = f"{abs(longer):.1f} mm {'longer' if longer > 0 else 'shorter'}"
     if not said:
         return []
-    each = ", ".join(f"frame {index}: {what}" for index, what in [*said.items()][:MOST_NAMED])
-    more = f" and {len(said) - MOST_NAMED} more" * (len(said) > MOST_NAMED)
+    each = listed([f"frame {index}: {what}" for index, what in said.items()], MOST_NAMED)
     return [
-        f"the manifest's own curves are not where the scans show the wire ({each}{more}): check which curve belongs to "
+        f"the manifest's own curves are not where the scans show the wire ({each}): check which curve belongs to "
         "which frame, its units and LPS; without the key traces the scans are traced"
     ]
