@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,8 +12,15 @@ from pipeline.commands import add_settings, add_verbosity, resolved_settings, sa
 from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
+    from collections.abc import Set
+
     from pipeline.run.launch import Plan
     from pipeline.run.workers import Limits
+    from pipeline.study.manifest import Case, Manifest
+    from pipeline.study.settings import Resolved
+
+ADDRESS = re.compile(r"(\w+://)?[^/\s]+:\d+")
+"""Of a scheduler; dask takes tcp:// where none is said."""
 
 HELP = "the whole pipeline: scans in, errors and a report out"
 
@@ -47,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
     from pipeline.run.aggregate import write_tests
+    from pipeline.run.batch import require_cluster
     from pipeline.run.gate import gate
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import intention, launch
@@ -58,6 +67,9 @@ def main(args: argparse.Namespace) -> int:
 
     gates = [gate(text) for text in args.fail_if]
     plan = _plan(args)
+    if not plan.cases:
+        say(_nothing(args.shard, plan))
+        return 0
     problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
     if problems:
         raise InputError(problems)
@@ -65,6 +77,7 @@ def main(args: argparse.Namespace) -> int:
         for line in intention(plan):
             say(line)
         return 0
+    require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
     held = {one.asked: one.closed(totals.pooled) for one in gates}
     closed = [why for why in held.values() if why]
@@ -81,10 +94,9 @@ def main(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.cache import default_root
-    from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.guards import guard_apart, guard_kept, guard_out, guard_stages
-    from pipeline.run.launch import Plan, chosen
+    from pipeline.run.guards import guard_apart
+    from pipeline.run.launch import Plan
     from pipeline.run.sweep import points_of
     from pipeline.study.sources import files_of
 
@@ -99,22 +111,50 @@ def _plan(args: argparse.Namespace) -> "Plan":
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    picked = chosen(manifest.cases, args.only, args.shard)
-    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used)
-    manifest = manifest.without({case.id for case in picked} - {case.id for case in cases})
+    manifest, cases, notes = _to_score(args, manifest)
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
     for note in notes:
         say(note)
-    if not (args.resume or args.fresh):
-        guard_out(args.out, manifest.path, settings)
-    guard_kept(args.out, {case.id for case in manifest.cases} - {case.id for case in cases}, settings)
-    if not args.fresh:
-        guard_stages(args.out, args.until)
+    if cases:  # else nothing is written
+        _guard(args, manifest, {case.id for case in cases}, settings)
     folder = args.manifest if manifest.path.name == INFERRED else None
     left_out = tuple(case.id for case in manifest.cases if args.only and case.id not in args.only)
     return Plan(
         manifest, cases, template, points, args.jobs, args.executor, limits, args.shard, notes, left_out, folder
     )
+
+
+def _to_score(args: argparse.Namespace, manifest: "Manifest") -> "tuple[Manifest, tuple[Case, ...], tuple[str, ...]]":
+    """The study less what was calibrated with, the cases of it to compute here, and sentences for the report."""
+    from pipeline.run.calibrated import as_calibrated
+    from pipeline.run.launch import chosen
+
+    picked = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used, part=bool(args.shard))
+    unscored = {case.id for case in picked} - {case.id for case in cases}
+    if args.shard:  # what other shards leave out is not missed after the merge
+        beside = [case for case in manifest.cases if case.role == "calibration" and case not in picked]
+        kept, _ = as_calibrated(beside, args.parameters, own=args.score_used, part=True)
+        unscored |= {case.id for case in beside} - {case.id for case in kept}
+    return manifest.without(unscored), cases, notes
+
+
+def _guard(args: argparse.Namespace, manifest: "Manifest", computed: "Set[str]", settings: "Resolved") -> None:
+    """Refuse to write into an OUT that holds what the cases to be computed may not stand beside."""
+    from pipeline.run.guards import guard_kept, guard_out, guard_stages
+
+    if not (args.resume or args.fresh):
+        guard_out(args.out, manifest.path, settings)
+    guard_kept(args.out, {case.id for case in manifest.cases} - computed, settings)
+    if not args.fresh:
+        guard_stages(args.out, args.until)
+
+
+def _nothing(shard: str, plan: "Plan") -> str:
+    """The line of a shard that got no case, or only some that were calibrated with."""
+    count = len(plan.manifest.cases) - len(plan.left_out)
+    of = f"holds none of the {count} cases" if count != 1 else "does not hold the only case"
+    return f"shard {shard} {of}: nothing to do"
 
 
 def _limits(args: argparse.Namespace) -> "Limits":
@@ -130,6 +170,10 @@ def _limits(args: argparse.Namespace) -> "Limits":
         raise UsageError(["--resume and --fresh: keep what fits, or compute again; give one of them"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    if args.executor and not ADDRESS.fullmatch(args.executor):
+        raise UsageError(
+            [f"--executor {args.executor!r}: expected the address of a dask scheduler, as tcp://host:8786"]
+        )
     limits = Limits(args.case_timeout, args.case_memory)
     for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
         if not value > 0:
