@@ -49,9 +49,10 @@ def main(args: argparse.Namespace) -> int:
     from reports.verdict import OURS, remarks
 
     plans = _plans(args)
-    problems = [text for plan in plans.values() for text in check(plan.cases, plan.template.settings.config)]
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+    found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
+    theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
+    if found[OURS] or theirs:
+        raise InputError([*found[OURS], *theirs])
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     done = {}
     for name, plan in plans.items():

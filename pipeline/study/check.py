@@ -146,7 +146,9 @@ def _others_problems(case: Case, count: int) -> list[str]:
     wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
     if not files or not case.simulated.files or not all(wrong):
         return []
-    return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
+    shown = next((n for n, file in enumerate(files) if not file.missing), 0)
+    what = f"{files[shown].where or files[shown].name}: {wrong[shown]}"
+    return [f"none of the other simulator's {count} wires can be used; {what}"]
 
 
 def entry_problems(case: Case, scans: Scans) -> list[str]:
