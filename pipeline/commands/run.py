@@ -62,6 +62,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.results import found_results
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.coarse import too_coarse
     from reports.inside import links_out
     from reports.verdict import remarks, warned
 
@@ -71,8 +72,9 @@ def main(args: argparse.Namespace) -> int:
         say(_nothing(args.shard, plan))
         return 0
     problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
+    problems += [p for point in plan.points for p in too_coarse(plan.cases, point.cheap.config)]
     if problems:
-        raise InputError(problems)
+        raise InputError(list(dict.fromkeys(problems)))
     if args.dry_run:
         for line in intention(plan):
             say(line)
