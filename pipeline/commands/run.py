@@ -12,8 +12,9 @@ from pipeline.commands import add_settings, add_verbosity, resolved_settings, sa
 from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
-    from collections.abc import Set
+    from collections.abc import Sequence, Set
 
+    from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
     from pipeline.run.workers import Limits
     from pipeline.study.manifest import Case, Manifest
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 ADDRESS = re.compile(r"(\w+://)?[^/\s]+:\d+")
 """Of a scheduler; dask takes tcp:// where none is said."""
 
+GATES = "exit 1 where a number of overall.csv is so, or missing; >, <, >= or <=; may be repeated"
 HELP = "the whole pipeline: scans in, errors and a report out"
 
 
@@ -46,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame and gate")
     add_calibrated(parser)
-    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
+    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=GATES)
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_verbosity(parser)
@@ -54,9 +56,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
+    from pipeline.run.gate import gate
+
+    # first of all: what the run itself imports takes seconds
+    return _run(args, [gate(text) for text in args.fail_if])
+
+
+def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.aggregate import write_tests
     from pipeline.run.batch import require_cluster
-    from pipeline.run.gate import gate
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
@@ -66,7 +74,6 @@ def main(args: argparse.Namespace) -> int:
     from reports.inside import links_out
     from reports.verdict import remarks, warned
 
-    gates = [gate(text) for text in args.fail_if]
     plan = _plan(args)
     if not plan.cases:
         say(_nothing(args.shard, plan))
@@ -161,10 +168,9 @@ def _nothing(shard: str, plan: "Plan") -> str:
 
 def _limits(args: argparse.Namespace) -> "Limits":
     """What a case may take; UsageError for this and other numbers and names that are none."""
-    from pipeline.run.launch import UsageError
     from pipeline.run.log import STAGES
     from pipeline.run.workers import Limits, resident_mib
-    from pipeline.status import did_you_mean
+    from pipeline.status import UsageError, did_you_mean
 
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])

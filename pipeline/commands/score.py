@@ -74,7 +74,8 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError
+    from pipeline.run.launch import Plan
+    from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
     from reports.verdict import OURS

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from pipeline.run.outcome import LOST, Outcome, guarded
 from pipeline.run.workers import NO_LIMITS, Limits, in_processes
-from pipeline.status import InputError
+from pipeline.status import UsageError
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -73,14 +73,8 @@ def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -
             future.cancel()
 
 
-class ClusterError(InputError):
-    """The dask cluster that the command line names cannot be used."""
-
-    place = "the command line"
-
-
 def require_cluster(address: str) -> None:
-    """Raise ClusterError where no dask scheduler answers at an address, or dask is missing; empty: none is asked."""
+    """Raise UsageError where no dask scheduler answers at an address, or dask is missing; empty: none is asked."""
     if address:
         _client(address).close()
 
@@ -91,14 +85,14 @@ def _client(address: str) -> Any:
 
         return Client(address)
     except ImportError:
-        raise ClusterError([f"--executor {address}: needs dask; pip install wireval[cluster]"]) from None
+        raise UsageError([f"--executor {address}: needs dask; pip install wireval[cluster]"]) from None
     except (OSError, ValueError) as error:
-        raise ClusterError([f"--executor {address}: no dask scheduler answers there ({error})"]) from None
+        raise UsageError([f"--executor {address}: no dask scheduler answers there ({error})"]) from None
 
 
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
-    """The executor of the dask scheduler at an address; raises ClusterError where there is none."""
+    """The executor of the dask scheduler at an address; raises UsageError where there is none."""
     with _client(address) as client:
         if not client.scheduler_info()["workers"]:
             sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")

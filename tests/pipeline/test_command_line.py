@@ -276,6 +276,14 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 
 
+def test_a_wrong_gate_is_refused_before_what_takes_seconds_is_imported() -> None:
+    words = ["run", "study", "-o", "out", "--fail-if", "foo>1"]
+    code = f"import sys; from pipeline.cli import main; print(main({words}), 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2", "False"]
+    assert "no number 'foo'" in done.stderr
+
+
 def test_other_settings_ask_before_they_overwrite(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
