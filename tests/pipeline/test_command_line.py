@@ -421,6 +421,9 @@ def test_a_folder_that_is_no_output_is_told_with_what_is(tmp_path: Path, capsys:
         assert f"give {tmp_path / 'out'}" in capsys.readouterr().err
     assert main(["report", str(tmp_path)]) == 2
     assert "this is not an output of wireval run" in capsys.readouterr().err
+    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "the run into it has finished no case: run it again" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("verb", "kept"), [("run", True), ("synth", False)])
