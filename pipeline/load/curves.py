@@ -62,10 +62,9 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     head = [c.strip().lower() for c in rows[0]]
     columns = next(([head.index(c) for c in names] for names in _NAMES if set(names) <= set(head)), None)
     if columns is None and any(c and not _is_number(c) for c in head[:3]):
-        raise unusable(
-            path,
-            f"has columns {', '.join(head)}; needs x_mm, y_mm, z_mm (or x, y, z), separated by commas; write them so",
-        )
+        shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
+        needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"
+        raise unusable(path, f"has columns {shown}; needs {needed}; write them so")
     try:
         if columns is None:
             return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
