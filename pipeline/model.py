@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, WithJsonSchema
 
-from pipeline.ranges import FiniteProfile, NonNegative, Number, OpacityProfile, Positive, PositiveProfile, Radius
+from pipeline.ranges import (
+    FiniteProfile,
+    Friction,
+    NonNegative,
+    Number,
+    OpacityProfile,
+    Positive,
+    PositiveProfile,
+    Radius,
+)
 from pipeline.status import FrameStatus
 from pipeline.wording import WRITTEN_HERE
 from solver.grid import Grid, read_only
@@ -54,7 +63,7 @@ class Wall:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
     stiffness_N_mm2: Positive = 2.0
-    friction: NonNegative = 0.0
+    friction: Friction = 0.0
 
 
 @dataclass(frozen=True)

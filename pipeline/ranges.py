@@ -28,6 +28,10 @@ Reach = Annotated[float, Field(ge=0.1, le=50, allow_inf_nan=False), Number]
 Depth = Annotated[float, Field(gt=0, le=5000, allow_inf_nan=False), Number]
 """Insertion depth, mm: no wire is longer than 5 m."""
 Factor = Annotated[float, Field(ge=1e-6, le=1e6, allow_inf_nan=False), Number]
+Friction = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False), Number]
+"""Coulomb's coefficient: a hydrophilic wire has 0.01 to 0.1."""
+Turn = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False), Number]
+"""An angle, degrees."""
 Step = Annotated[float, Field(ge=0.01, le=100, allow_inf_nan=False), Number]
 """Step along a curve, mm: below 10 µm a run would hang instead of getting more accurate."""
 Radius = Annotated[float, Field(ge=1e-3, le=20, allow_inf_nan=False), Number]

@@ -78,6 +78,12 @@ class InputError(Exception):
         self.problems = problems
 
 
+class UsageError(InputError):
+    """A command line that cannot be carried out."""
+
+    place = "the command line"
+
+
 def did_you_mean(key: str, allowed: Iterable[str]) -> str:
     """Sentence naming the nearest allowed key, whatever its capitals, or all of them."""
     names = sorted(allowed)

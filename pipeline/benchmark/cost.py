@@ -46,14 +46,14 @@ def settings(*, quick: bool = False) -> list[SolverSetting]:
 def costs(
     scenes: Iterable[BenchScene], chosen: Sequence[SolverSetting], repeats: int = 3, fine_mm: float = FINE_MM
 ) -> Iterator[dict[str, Any]]:
-    """One row per scene and setting; see ``_row``.
+    """One row per scene and setting whose segments can follow the wire; see ``_row``.
 
     The walls of a scene are made once. Every kernel is compiled before it is timed: the reference runs them all.
     """
     for scene in scenes:
         limit = reference(scene, fine_mm)
         walls = {hull: scene.wall(hull) for hull in dict.fromkeys(s.hull for s in chosen)}
-        for setting in chosen:
+        for setting in (one for one in chosen if scene.follows(one.segment_mm)):
             seconds, run = timed(partial(insert, scene, setting, walls[setting.hull]), repeats)
             yield _row(scene, setting, run, seconds, limit)
 
@@ -83,8 +83,13 @@ def _row(scene: BenchScene, setting: SolverSetting, run: Run, seconds: float, li
 
 def measure_cost(scenes: Sequence[BenchScene], out: Path, say: Callable[[str], None], *, quick: bool) -> None:
     """Run time against error: a line and a row for each scene and setting, then the settings to use."""
-    rows = []
-    for row in costs(scenes, settings(quick=quick), 1 if quick else 3):
+    rows, chosen = [], settings(quick=quick)
+    for scene in scenes:
+        long = [s for s in dict.fromkeys(setting.segment_mm for setting in chosen) if not scene.follows(s)]
+        if long:
+            lengths = ", ".join(f"{s:g}" for s in long)
+            say(f"{scene.name}: left out: segments of {lengths} mm cannot follow the wire's rest curvature")
+    for row in costs(scenes, chosen, 1 if quick else 3):
         rows.append(row)
         say(
             f"{row['scene']:18s} {row['method']:12s} {row['segment_mm']:5g} mm {row['hull']:11s} {row['quadrature']:9s}"

@@ -6,6 +6,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.load import each_frame
 from pipeline.simulate import guide_wire
+from pipeline.simulate.resolution import lengths_mm
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
@@ -23,6 +24,7 @@ def scene_of(case: Case, config: Config) -> BenchScene:
     known = run_stages(Context(case, config, Store(default_root()), silent, until="segment"))
     if known.failure is not None or known.lumen is None:
         raise NoScene(f"bench: case {case.id!r}: {known.failure}")
+    longest = lengths_mm(config.solver.segment_mm, case.wire.rest_curvature_per_mm)[0]
     return BenchScene(
         case.id,
         max(case.insertion_mm),
@@ -31,7 +33,7 @@ def scene_of(case: Case, config: Config) -> BenchScene:
         direction=case.entry_direction,
         material_axis=case.material_axis,
         roll_deg=each_frame(case.stated_roll_deg, len(case.insertion_mm))[-1] + config.simulate.roll_offset_deg,
-        guide_wire=guide_wire(case.wire, config.solver.segment_mm, config.simulate.bending_scale),
+        guide_wire=guide_wire(case.wire, longest, config.simulate.bending_scale),
         wall_stiffness=case.wall.stiffness_N_mm2,
         friction=case.wall.friction,
         ready=known.lumen.distance,

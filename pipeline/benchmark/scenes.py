@@ -62,6 +62,14 @@ class BenchScene:
         """The wire in segments of this length."""
         return replace(self.guide_wire, segment_mm=segment_mm)
 
+    def follows(self, segment_mm: float) -> bool:
+        """Whether segments of this length can follow the wire's rest curvature."""
+        try:
+            self.wire(segment_mm)
+        except ValueError:
+            return False
+        return True
+
     def depths(self) -> list[float]:
         """Depths in steps of step_mm, the last one depth_mm."""
         count = max(1, round(self.depth_mm / self.step_mm))

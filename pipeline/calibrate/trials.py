@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.calibrate.unknowns import FRICTION, ROLL, bent, wall_factor
+from pipeline.calibrate.unknowns import FRICTION, MOST_CURVED, REST, ROLL, bent, wall_factor
 from pipeline.model import Array, Clamp, OverWire, Wall, Wire
 from pipeline.simulate import inserted
 from pipeline.simulate.clamp import STEP_MM, STEP_RAD, TIP_VOXELS, Prior, Seen, depth_from, moved
@@ -72,7 +72,9 @@ def insertion_at(trial: Trial, point: Point, solver: SolverConfig) -> Insertion:
     vessel = trial.vessel.like(stiffness_N_mm2=stiffness, friction=point.shared.get(FRICTION, trial.wall.friction))
     # a wall that is nearer by some length is the same as a wire with a radius larger by it
     wire = replace(trial.wire, radius_mm=max(trial.wire.radius_mm + float(point.own[5]), 1e-3))
-    length = lengths_mm(solver.segment_mm, wire.rest_curvature_per_mm)[0]
+    # a length that is asked for is not doubled where the strongest curvature that is tried would not fit
+    strongest = wire if solver.segment_mm == "auto" else bent(wire, {REST: float(np.log(MOST_CURVED))})
+    length = lengths_mm(solver.segment_mm, strongest.rest_curvature_per_mm)[0]
     settings = replace(solver, segment_mm=length, finest_mm=solver.step_mm)
     return inserted(vessel, bent(wire, point.shared), moved(trial.given, point.own[:5]), settings, 1.0, trial.catheter)
 

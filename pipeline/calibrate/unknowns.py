@@ -12,6 +12,8 @@ import numpy as np
 from pipeline.model import Wire
 from pipeline.ranges import Profile
 
+MOST_CURVED = 4.0
+"""Largest factor on the rest curvature that is tried."""
 ROLL, REST, TAPER, WALL, FRICTION, BENDING = "roll_offset_deg", "rest_curvature", "taper", "wall", "friction", "bending"
 SEEN_LOG = 0.2
 """A factor whose logarithm is known no better than this is not seen."""
@@ -59,7 +61,7 @@ def unknowns(walls_N_mm2: Sequence[float], friction: float, *, weighed: bool) ->
         Unknown(
             ROLL, 0.0, 100.0, -180.0, 180.0, 1.0, 5.0, "degrees added to the stated roll: the plane of the tip's curve"
         ),
-        _factor(REST, 0.5, 4.0, 0.02, "factor on the rest curvature"),
+        _factor(REST, 0.5, MOST_CURVED, 0.02, "factor on the rest curvature"),
         _factor(TAPER, 0.7, 5.0, 0.05, "factor on the shaft's stiffness relative to the tip's"),
     ]
     for stiffness in sorted(set(walls_N_mm2)):

@@ -38,11 +38,13 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.calibration import chosen
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.coarse import too_coarse
     from pipeline.study.manifest import read_manifest
 
     manifest, settings = read_manifest(file_of(args.manifest)), resolved_settings(args)
     cases, store = chosen(manifest.cases), Store(None if args.no_cache else default_root())
-    problems = [] if args.design else check(cases, settings.config)
+    problems = too_coarse(cases, settings.config, calibrates=True)
+    problems += [] if args.design else [p for p in check(cases, settings.config) if p not in problems]
     if problems:
         raise InputError(problems)
     return (_design if args.design else _fit)(args, cases, settings.config, store)

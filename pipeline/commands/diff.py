@@ -38,7 +38,7 @@ def main(args: argparse.Namespace) -> int:
 
     InputError on wrong input.
     """
-    from pipeline.run.launch import UsageError
+    from pipeline.status import UsageError
     from pipeline.toml_words import not_toml
     from reports.case_files import find_cases
     from reports.two_runs_files import write

@@ -95,7 +95,7 @@ def assumed_in(cases: "Sequence[Case]") -> tuple[str, ...]:
 
 def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:
     """A manifest for a folder of scans. beside : it will lie there, and names the scans from there."""
-    from pipeline.run.launch import UsageError
+    from pipeline.status import UsageError
     from pipeline.study.infer import infer_manifest
 
     seen = _vector(args.entry, "--entry"), _vector(args.direction, "--direction"), args.wire_radius
@@ -108,7 +108,7 @@ def inferred(args: argparse.Namespace, beside: bool = False) -> Inferred:
 def _vector(text: str | None, name: str) -> Any:
     import numpy as np
 
-    from pipeline.run.launch import UsageError
+    from pipeline.status import UsageError
 
     if text is None:
         return None

@@ -21,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0; raises InputError or StageError where there is nothing to go by, or a manifest is there already."""
     from pipeline.load import read_headers
-    from pipeline.run.launch import UsageError
-    from pipeline.status import InputError, StageError
+    from pipeline.status import InputError, StageError, UsageError
     from pipeline.study.check import entry_problems
     from pipeline.study.manifest import read_manifest
     from reports.atomic import write_text

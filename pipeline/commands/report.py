@@ -43,7 +43,9 @@ def main(args: argparse.Namespace) -> int:
     found = found_results(args.out)
     if not found:
         above = [f"give {one}" for one in args.out.absolute().parents[:2] if found_results(one)]
-        hint = next(iter(above), "this is not an output of wireval run")
+        begun = any(args.out.glob("run*.json"))
+        why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
+        hint = next(iter(above), why)
         return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
     if links_out(args.out):
         return complain(links_out(args.out), str(args.out), "; nothing was drawn")

@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +12,18 @@ from pipeline.commands import add_settings, add_verbosity, resolved_settings, sa
 from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assumed_in, given
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence, Set
+
+    from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
     from pipeline.run.workers import Limits
+    from pipeline.study.manifest import Case, Manifest
+    from pipeline.study.settings import Resolved
 
+ADDRESS = re.compile(r"(\w+://)?[^/\s]+:\d+")
+"""Of a scheduler; dask takes tcp:// where none is said."""
+
+GATES = "exit 1 where a number of overall.csv is so, or missing; >, <, >= or <=; may be repeated"
 HELP = "the whole pipeline: scans in, errors and a report out"
 
 
@@ -38,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--sweep", action="append", default=[], metavar="TABLE.KEY=V1,V2", help="also run with each of these values")
     add("--junit", type=Path, metavar="FILE", help="write a JUnit summary, one test per frame and gate")
     add_calibrated(parser)
-    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help="exit 1 where overall.csv says so")
+    add("--fail-if", action="append", default=[], metavar="COLUMN>VALUE", help=GATES)
     add("--embed", action="store_true", help="put the pictures into the pages: one file a page")
     add("--no-cache", action="store_true", help="neither take lumens and traces of earlier runs nor keep them")
     add_verbosity(parser)
@@ -46,25 +56,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0 all ok, 1 some case failed or a gate closed; raises InputError where the input is wrong."""
-    from pipeline.run.aggregate import write_tests
     from pipeline.run.gate import gate
+
+    # first of all: what the run itself imports takes seconds
+    return _run(args, [gate(text) for text in args.fail_if])
+
+
+def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
+    from pipeline.run.aggregate import write_tests
+    from pipeline.run.batch import require_cluster
     from pipeline.run.last_words import failure_lines, last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.coarse import too_coarse
     from reports.inside import links_out
     from reports.verdict import remarks, warned
 
-    gates = [gate(text) for text in args.fail_if]
     plan = _plan(args)
+    if not plan.cases:
+        if args.junit and not args.dry_run:
+            write_tests(args.junit, (), {})  # a build server expects the file
+        say(_nothing(args.shard, plan))
+        return 0
     problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
+    problems += [p for point in plan.points for p in too_coarse(plan.cases, point.cheap.config)]
     if problems:
-        raise InputError(problems)
+        raise InputError(list(dict.fromkeys(problems)))
     if args.dry_run:
         for line in intention(plan):
             say(line)
         return 0
+    require_cluster(plan.address)  # before OUT is claimed
     totals, index = launch(plan)
     held = {one.asked: one.closed(totals.pooled) for one in gates}
     closed = [why for why in held.values() if why]
@@ -81,10 +105,9 @@ def main(args: argparse.Namespace) -> int:
 def _plan(args: argparse.Namespace) -> "Plan":
     """What the command line asks for; raises where it cannot be carried out."""
     from pipeline.run.cache import default_root
-    from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.guards import guard_apart, guard_kept, guard_out, guard_stages
-    from pipeline.run.launch import Plan, chosen
+    from pipeline.run.guards import guard_apart
+    from pipeline.run.launch import Plan
     from pipeline.run.sweep import points_of
     from pipeline.study.sources import files_of
 
@@ -99,17 +122,12 @@ def _plan(args: argparse.Namespace) -> "Plan":
     how = {"embed": args.embed, "quiet": args.quiet, "verbose": args.verbose}
     template = Job(manifest.cases[0], settings, args.out, args.until, cache, args.fresh, **how)
     points = tuple(points_of(args.sweep, settings_of(args)))
-    picked = chosen(manifest.cases, args.only, args.shard)
-    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used)
-    manifest = manifest.without({case.id for case in picked} - {case.id for case in cases})
+    manifest, cases, notes = _to_score(args, manifest)
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
     for note in notes:
         say(note)
-    if not (args.resume or args.fresh):
-        guard_out(args.out, manifest.path, settings)
-    guard_kept(args.out, {case.id for case in manifest.cases} - {case.id for case in cases}, settings)
-    if not args.fresh:
-        guard_stages(args.out, args.until)
+    if cases:  # else nothing is written
+        _guard(args, manifest, {case.id for case in cases}, settings)
     folder = args.manifest if manifest.path.name == INFERRED else None
     left_out = tuple(case.id for case in manifest.cases if args.only and case.id not in args.only)
     return Plan(
@@ -117,12 +135,44 @@ def _plan(args: argparse.Namespace) -> "Plan":
     )
 
 
+def _to_score(args: argparse.Namespace, manifest: "Manifest") -> "tuple[Manifest, tuple[Case, ...], tuple[str, ...]]":
+    """The study less what was calibrated with, the cases of it to compute here, and sentences for the report."""
+    from pipeline.run.calibrated import as_calibrated
+    from pipeline.run.launch import chosen
+
+    picked = chosen(manifest.cases, args.only, args.shard)
+    cases, notes = as_calibrated(picked, args.parameters, own=args.score_used, part=bool(args.shard))
+    unscored = {case.id for case in picked} - {case.id for case in cases}
+    if args.shard:  # what other shards leave out is not missed after the merge
+        beside = [case for case in manifest.cases if case.role == "calibration" and case not in picked]
+        kept, _ = as_calibrated(beside, args.parameters, own=args.score_used, part=True)
+        unscored |= {case.id for case in beside} - {case.id for case in kept}
+    return manifest.without(unscored), cases, notes
+
+
+def _guard(args: argparse.Namespace, manifest: "Manifest", computed: "Set[str]", settings: "Resolved") -> None:
+    """Refuse to write into an OUT that holds what the cases to be computed may not stand beside."""
+    from pipeline.run.guards import guard_kept, guard_out, guard_stages
+
+    if not (args.resume or args.fresh):
+        guard_out(args.out, manifest.path, settings)
+    guard_kept(args.out, {case.id for case in manifest.cases} - computed, settings)
+    if not args.fresh:
+        guard_stages(args.out, args.until)
+
+
+def _nothing(shard: str, plan: "Plan") -> str:
+    """The line of a shard that got no case, or only some that were calibrated with."""
+    count = len(plan.manifest.cases) - len(plan.left_out)
+    of = f"holds none of the {count} cases" if count != 1 else "does not hold the only case"
+    return f"shard {shard} {of}: nothing to do"
+
+
 def _limits(args: argparse.Namespace) -> "Limits":
     """What a case may take; UsageError for this and other numbers and names that are none."""
-    from pipeline.run.launch import UsageError
     from pipeline.run.log import STAGES
     from pipeline.run.workers import Limits, resident_mib
-    from pipeline.status import did_you_mean
+    from pipeline.status import UsageError, did_you_mean
 
     if args.until not in STAGES:
         raise UsageError([f"--until {args.until!r}: {did_you_mean(args.until, STAGES)}"])
@@ -130,6 +180,10 @@ def _limits(args: argparse.Namespace) -> "Limits":
         raise UsageError(["--resume and --fresh: keep what fits, or compute again; give one of them"])
     if args.jobs < 1:
         raise UsageError([f"-j {args.jobs}: expected 1 or more"])
+    if args.executor and not ADDRESS.fullmatch(args.executor):
+        raise UsageError(
+            [f"--executor {args.executor!r}: expected the address of a dask scheduler, as tcp://host:8786"]
+        )
     limits = Limits(args.case_timeout, args.case_memory)
     for name, value in (("--case-timeout", limits.seconds), ("--case-memory", limits.memory_mib)):
         if not value > 0:

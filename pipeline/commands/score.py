@@ -49,9 +49,10 @@ def main(args: argparse.Namespace) -> int:
     from reports.verdict import OURS, remarks
 
     plans = _plans(args)
-    problems = [text for plan in plans.values() for text in check(plan.cases, plan.template.settings.config)]
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+    found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
+    theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
+    if found[OURS] or theirs:
+        raise InputError([*found[OURS], *theirs])
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     done = {}
     for name, plan in plans.items():
@@ -73,7 +74,8 @@ def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job
-    from pipeline.run.launch import Plan, UsageError
+    from pipeline.run.launch import Plan
+    from pipeline.status import UsageError
     from pipeline.study.manifest import Manifest, read_manifest
     from pipeline.study.others import Others, found_for, named
     from reports.verdict import OURS

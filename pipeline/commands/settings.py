@@ -14,8 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Exit 0; raises UsageError for a name that there is none of."""
-    from pipeline.run.launch import UsageError
-    from pipeline.status import did_you_mean
+    from pipeline.status import UsageError, did_you_mean
     from pipeline.study.explain import described
 
     known = list(described())

@@ -61,6 +61,10 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         raise refused(path, "an empty file", "points", "columns x_mm, y_mm, z_mm")
     head = [c.strip().lower() for c in rows[0]]
     columns = next(([head.index(c) for c in names] for names in _NAMES if set(names) <= set(head)), None)
+    if columns is None and any(c and not _is_number(c) for c in head[:3]):
+        shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
+        needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"
+        raise unusable(path, f"has columns {shown}; needs {needed}; write them so")
     try:
         if columns is None:
             return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
@@ -68,6 +72,14 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     except (ValueError, IndexError) as error:
         allowed = "columns x_mm, y_mm, z_mm of numbers"
         raise refused(path, f"{error} (header {head})", allowed, "name the columns") from error
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def read_vtp_points(path: Path) -> NDArray[np.float64]:

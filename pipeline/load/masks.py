@@ -81,7 +81,12 @@ def _chosen(path: Path, values: NDArray[Any], value: int | None, names: dict[str
     if value is None and "" in names:
         value = names[""][1]
     if value is not None:
-        return np.asarray(values == value).astype(np.uint8)
+        chosen = np.asarray(values == value)
+        if not chosen.any():
+            kinds = _different(values)
+            others = f"{', '.join(f'{kind:g}' for kind in kinds[:MOST_NAMED])}{' ...' * (len(kinds) > MOST_NAMED)}"
+            raise refused(path, f"no voxel of label {value}", f"one of its values, {others}", "name another label")
+        return chosen.astype(np.uint8)
     low, high = float(values.min()), float(values.max())
     whole = values.dtype.kind in "iu" or bool(np.all(values == np.rint(values)))
     if not whole:

@@ -6,7 +6,7 @@ or RAS that is taken for mm and LPS is another wire. A frame without a usable wi
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import h5py
@@ -31,13 +31,16 @@ _UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-z]+)|lengt
 class OtherFile:
     """A frame's wire as it was read. points_mm : (n, 3) LPS, or None where ``problem`` says why there is none.
 
-    missing : the simulator wrote nothing for the frame.
+    missing : the simulator wrote nothing for the frame.     unclear : nobody says what its numbers mean, or two say
+    different things.     where : the file with its folder, empty where there is none.
     """
 
     name: str
     points_mm: Array | None = None
     problem: str = ""
     missing: bool = False
+    unclear: bool = False
+    where: str = ""
 
 
 def kind_of(path: Path) -> str:
@@ -48,8 +51,8 @@ def kind_of(path: Path) -> str:
 def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str = "") -> list[OtherFile]:
     """The wire of each of ``count`` frames. space, unit : of coordinates that no file states.
 
-    Raises LoadError where it is not known which file belongs to which frame, or what the numbers mean: then all would
-    be wrong. A file that is missing or cannot be read concerns its frame alone.
+    Raises LoadError where it is not known which file belongs to which frame, or of no file what its numbers mean: then
+    all would be wrong. A file that is missing, cannot be read or alone does not state this concerns its frame alone.
     """
     if len(files) == 1 and kind_of(files[0].path) in IN_HDF5:
         return _in_hdf5(files[0].path, count, space, unit)
@@ -58,7 +61,11 @@ def read_wires(files: Sequence[Source], count: int, space: str = "", unit: str =
         raise refused(wrong, repr(wrong.suffix), ", ".join(KINDS), "export the wire in one of these")
     numbered = numbered_frames([file.path for file in files], count)
     missing = OtherFile("no file", problem="there is none for this frame", missing=True)
-    return [_read(numbered[i], space, unit) if i in numbered else missing for i in range(count)]
+    read = {i: replace(_read(path, space, unit), where=str(path)) for i, path in numbered.items()}
+    unclear = next((file for file in read.values() if file.unclear), None)
+    if unclear and all(file.points_mm is None for file in read.values()):
+        raise LoadError(f"{unclear.where}: {unclear.problem}")
+    return [read.get(i, missing) for i in range(count)]
 
 
 def numbered_frames(paths: Sequence[Path], count: int) -> dict[int, Path]:
@@ -91,19 +98,23 @@ def _in_hdf5(path: Path, count: int, space: str, unit: str) -> list[OtherFile]:
     if beyond:
         raise unusable(path, f"got frame {beyond[0]} for {count} frames; number them from 0 to {count - 1}")
     missing = OtherFile(path.name, problem="it has no simulated_mm for this frame", missing=True)
-    return [_checked(f"{path.name}#{n}", points[n]) if n in points else missing for n in range(count)]
+    found = {n: replace(_checked(f"{path.name}#{n}", wire), where=f"{path}#{n}") for n, wire in points.items()}
+    return [found.get(n, missing) for n in range(count)]
 
 
 def _read(path: Path, space: str, unit: str) -> OtherFile:
-    """One file; raises LoadError where nothing says what its numbers mean, or two statements differ."""
+    """One file."""
     if not path.exists() or path.stat().st_size == 0:
         return OtherFile(path.name, problem="the file is empty, or not there", missing=True)
     kind = kind_of(path)
-    in_space, in_unit = _agreed(path, kind, space, unit)
     try:
         points = OF_KIND[kind](path)
     except (LoadError, ValueError, TypeError, KeyError, IndexError) as error:
-        return OtherFile(path.name, problem=str(error))
+        return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "))
+    try:
+        in_space, in_unit = _agreed(path, kind, space, unit)
+    except LoadError as error:
+        return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "), unclear=True)
     # all readers but that of tables convert a file that states RAS by themselves
     turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not _stated(path, kind)[0])
     factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself

@@ -9,11 +9,11 @@ import sys
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import closing, contextmanager
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pipeline.run.outcome import LOST, Outcome, guarded
 from pipeline.run.workers import NO_LIMITS, Limits, in_processes
-from pipeline.status import InputError
+from pipeline.status import UsageError
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -73,18 +73,27 @@ def _on_cluster(executor: Executor, jobs: Sequence[J], work: Callable[[J], R]) -
             future.cancel()
 
 
-@contextmanager
-def _cluster(address: str) -> Iterator[Executor]:
-    """The executor of the dask scheduler at an address; raises InputError where there is none."""
+def require_cluster(address: str) -> None:
+    """Raise UsageError where no dask scheduler answers at an address, or dask is missing; empty: none is asked."""
+    if address:
+        _client(address).close()
+
+
+def _client(address: str) -> Any:
     try:
         from distributed import Client
 
-        client = Client(address)
+        return Client(address)
     except ImportError:
-        raise InputError([f"--executor {address}: needs dask; pip install wireval[cluster]"]) from None
+        raise UsageError([f"--executor {address}: needs dask; pip install wireval[cluster]"]) from None
     except (OSError, ValueError) as error:
-        raise InputError([f"--executor {address}: no dask scheduler answers there ({error})"]) from None
-    with client:
+        raise UsageError([f"--executor {address}: no dask scheduler answers there ({error})"]) from None
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    """The executor of the dask scheduler at an address; raises UsageError where there is none."""
+    with _client(address) as client:
         if not client.scheduler_info()["workers"]:
             sys.stderr.write(f"{address}: the scheduler has no worker yet; waiting for one\n")
         # pure: dask would answer a repeated job with its earlier error instead of running it again

@@ -15,12 +15,13 @@ def data_of(case: Case) -> tuple[str, ...]:
 
 
 def as_calibrated(
-    cases: Sequence[Case], given: Path | None, *, own: bool = False
+    cases: Sequence[Case], given: Path | None, *, own: bool = False, part: bool = False
 ) -> tuple[tuple[Case, ...], tuple[str, ...]]:
     """The cases with their parameters, and sentences for the report; ParametersError lists every problem.
 
     given : parameters for all cases, in place of those that the manifest names.     own : also score cases that were
     calibrated with. Without it those of role calibration are left out, and one of role validation is a problem.
+    part : the cases are a shard's, of which nothing may be left: other shards have cases to score.
     """
     read: dict[Path, Parameters] = {}
     kept, notes, problems = [], [], []
@@ -47,10 +48,9 @@ def as_calibrated(
         else:
             kept.append(changed)
             notes += [f"case {case.id!r}: {changed.own_parameters}"] * bool(changed.own_parameters)
-    if not kept and not problems:
-        problems.append(
-            f"{given or 'parameters'}: every case was calibrated with: nothing is left to score; say --score-used"
-        )
+    if not (kept or problems or part):
+        all_of_them = "every case was calibrated with: nothing is left to score; say --score-used"
+        problems.append(f"{given or 'parameters'}: {all_of_them}")
     if problems:
         raise ParametersError(problems)
     return tuple(kept), tuple(notes)

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.run.launch import UsageError
-from pipeline.status import did_you_mean
+from pipeline.status import UsageError, did_you_mean
 from reports.schema import OVERALL_FILE, SUMMARY
 
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.run.hashing import file_hash
-from pipeline.run.launch import UsageError
 from pipeline.run.log import STAGES, Stage
 from pipeline.run.results import jsonable
+from pipeline.status import UsageError
 from pipeline.study.settings import Resolved
 from reports.case_files import find_cases, read_json
 from reports.origin import ABSENT, settings_of

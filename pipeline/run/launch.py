@@ -28,18 +28,12 @@ from pipeline.run.results import lost, write_json
 from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, write_sweep
 from pipeline.run.watch import Watch
 from pipeline.run.workers import NO_LIMITS, Limits
-from pipeline.status import InputError, did_you_mean
+from pipeline.status import UsageError, did_you_mean
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
 from reports.case_files import counted, left_over, read_json
 from reports.html import render_index
-
-
-class UsageError(InputError):
-    """A command line that cannot be carried out."""
-
-    place = "the command line"
 
 
 @dataclass(frozen=True)

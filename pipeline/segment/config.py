@@ -1,9 +1,11 @@
 """Settings of fuzzy connectedness and of the lumen's surface."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-from pipeline.ranges import Count, Millimetres, Point, Positive, Reach, Share
+from pydantic import Field
+
+from pipeline.ranges import Millimetres, Number, Point, Positive, PositiveCount, Reach, Share
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class SegmentConfig:
     """Spread of the object-feature affinity, grey values; estimated at the seeds when not given."""
     adjacency: Literal[6, 26] = 6
     """Neighbours of a voxel: 6 (faces) or 26."""
-    scale: Count | None = None
+    scale: Annotated[int, Field(ge=0, le=20), Number] | None = None
     """Voxels on either side over which grey is averaged before affinities are taken; from the noise when not given."""
     other_seeds_mm: tuple[Point, ...] = ()
     """Seeds (LPS mm) of what touches the lumen and is not it, such as bone: cut off at the weakest link."""
@@ -26,5 +28,5 @@ class SegmentConfig:
     """Room around the vessel in the box that holds its signed distance."""
     outer_mm: Reach = 3.0
     """How far outside the wall the distance is exact."""
-    least_voxels: Count = 200
+    least_voxels: PositiveCount = 200
     """A smaller connected region is no lumen."""

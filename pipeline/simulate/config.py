@@ -7,11 +7,12 @@ from pydantic import AfterValidator, Field
 from pydantic.config import JsonDict
 from pydantic_core import PydanticCustomError
 
-from pipeline.ranges import Factor, Finite, NonNegative, Number, PositiveCount, Step
+from pipeline.ranges import Factor, Friction, NonNegative, Number, PositiveCount, Step, Turn
 from solver._kernels.minimise import METHODS
 
 Segment = Step | Literal["auto"]
-HULLS: JsonDict = {"$comment": '"offset" or "samples:N", N from 1 to 999'}
+HULLS: JsonDict = {"$comment": '"offset" or "samples:N", N from 1 to 256'}
+SAMPLES = r"([1-9]\d?|1\d\d|2[0-4]\d|25[0-6])"
 COARSEST_MM = 1.0
 """Length of the segments that ``auto`` begins with at most."""
 
@@ -30,7 +31,7 @@ class SolverConfig:
     """newton, or the seed's closed_form."""
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
-    hull: Annotated[str, Field(pattern=r"^(offset|samples:[1-9]\d{0,2})$", json_schema_extra=HULLS)] = "offset"
+    hull: Annotated[str, Field(pattern=rf"^(offset|samples:{SAMPLES})$", json_schema_extra=HULLS)] = "offset"
     """offset (the smooth limit) or samples:N."""
     tolerance: Annotated[float, Field(gt=0, lt=1), Number] = 1e-9
     """Newton decrement, relative to the energy, at which a step counts as converged."""
@@ -58,9 +59,9 @@ class SimulateConfig:
     """Factor on the lengths over which the wire's bending stiffness changes, for sensitivity runs."""
     rest_curvature_scale: NonNegative = 1.0
     """Factor on the wire's rest curvature, for sensitivity runs; 0 takes the curve off its tip."""
-    friction: NonNegative | None = None
+    friction: Friction | None = None
     """Coulomb's coefficient instead of the manifest's, for sensitivity runs."""
     wall_scale: Factor = 1.0
     """Factor on the wall stiffness, for sensitivity runs."""
-    roll_offset_deg: Finite = 0.0
+    roll_offset_deg: Turn = 0.0
     """Added to the roll of every frame, for sensitivity runs."""

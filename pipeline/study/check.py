@@ -23,6 +23,7 @@ from pipeline.load.views import read_views
 from pipeline.load.wires import read_wires
 from pipeline.model import Branches, Shapes
 from pipeline.simulate.others import oddity
+from pipeline.study.coarse import too_coarse
 from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.same_scans import repeated
@@ -39,7 +40,7 @@ def check(cases: Sequence[Case], config: Config, *, whole: bool = True) -> list[
     whole : also frames that are cut short. A run does not ask: such a frame is lost, and said, and the others are not.
     """
     found = [(case.id, text) for case in cases for text in check_case(case, config, whole=whole)]
-    return [f"case {name!r}: {' '.join(text.split())}" for name, text in found]
+    return [f"case {name!r}: {' '.join(text.split())}" for name, text in found] + too_coarse(cases, config)
 
 
 def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
@@ -146,7 +147,9 @@ def _others_problems(case: Case, count: int) -> list[str]:
     wrong = [f.problem if f.points_mm is None else oddity(f.points_mm, entry, direction) for f in files]
     if not files or not case.simulated.files or not all(wrong):
         return []
-    return [f"none of the other simulator's {count} wires can be used; {files[0].name}: {wrong[0]}"]
+    shown = next((n for n, file in enumerate(files) if not file.missing), 0)
+    what = f"{files[shown].where or files[shown].name}: {wrong[shown]}"
+    return [f"none of the other simulator's {count} wires can be used; {what}"]
 
 
 def entry_problems(case: Case, scans: Scans) -> list[str]:

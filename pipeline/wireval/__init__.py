@@ -22,7 +22,7 @@ from pipeline.compare import point_to_curve
 from pipeline.status import InputError, StageError
 from solver import Catheter, Grid, GuideWire, Insertion, Insertions, Snap, Solution, Status, VesselWall, relax
 
-from .results import Results, read_results
+from .results import Results, read_results, read_run
 
 __all__ = [
     "Catheter",
@@ -86,11 +86,12 @@ def run(
     ``wireval run`` by its long name, as ``fresh=True``, ``only=["run1"]``, ``until="trace"``, ``quiet=True``.
 
     A frame or case that fails raises nothing: ``results.failures`` has its sentence. Running the same again keeps what
-    is finished. Raises InputError where nothing could be run.
+    is finished; a shard that gets none of the cases leaves no files, and empty tables. Raises InputError where nothing
+    could be run.
     """
     points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
     _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, **more)
-    return read_results(out)
+    return read_run(Path(out))
 
 
 def score(

@@ -10,7 +10,7 @@ from pipeline.status import InputError
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
 from reports.origin import mixed_settings
-from reports.schema import FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
+from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
 
@@ -42,7 +42,9 @@ class Results:
     @property
     def points(self) -> pd.DataFrame:
         """Every compared point of all cases; read when asked for, since it is by far the largest table."""
-        return _of_all({name: tables.read_if_there(c.folder / POINTS.file, POINTS) for name, c in self.cases.items()})
+        return _of_all(
+            {name: tables.read_if_there(c.folder / POINTS.file, POINTS) for name, c in self.cases.items()}, POINTS
+        )
 
     def __repr__(self) -> str:
         """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""
@@ -65,16 +67,28 @@ def read_results(out: str | Path) -> Results:
     cases = {folder.name: read_case(folder, points=False) for folder in find_cases(out)}
     if not cases:
         raise InputError([f"{out}: no cases below it; give a folder that `wireval run` wrote"])
+    return _results(out, cases)
 
+
+def read_run(out: Path) -> Results:
+    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases."""
+    return read_results(out) if find_cases(out) else _results(out, {})
+
+
+def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:
     def table(kind: Table, name: str = "") -> pd.DataFrame:
         return tables.read_if_there(out / (name or kind.file), kind)
 
     whole = table(SUMMARY, OVERALL_FILE)
-    errors = _of_all({name: case.errors for name, case in cases.items()})
+    errors = _of_all({name: case.errors for name, case in cases.items()}, ERRORS)
     return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), cases)
 
 
-def _of_all(by_case: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """The tables of the cases below each other, with the case in front."""
+def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:
+    """The tables of the cases, all of one kind, below each other, with the case in front."""
+    if not by_case:
+        none = tables.read_if_there(None, kind)
+        none.insert(0, "case", pd.Series(dtype="string"))
+        return none
     whole = pd.concat(by_case, names=["case", None]).reset_index("case").reset_index(drop=True)
     return whole.astype({"case": "string"})

@@ -86,3 +86,17 @@ def test_a_worker_killed_in_the_middle_of_a_case_costs_nothing(address: str, tmp
     run.join()
     assert codes == [0]
     assert differences(first, second) == []
+
+
+def test_a_scheduler_that_does_not_answer_leaves_the_folder_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import dask
+
+    assert main(["synth", "straight", "-o", str(tmp_path / "study"), "--size", "72", "--frames", "2"]) == 0
+    monkeypatch.setitem(dask.config.config["distributed"]["comm"]["timeouts"], "connect", "1s")
+    for address, said in (("tcp://127.0.0.1:9", "no dask scheduler answers there"), ("smoke://h:1", "smoke")):
+        words = ["run", str(tmp_path / "study"), "-o", str(tmp_path / "out"), "--executor", address]
+        assert main(words) == 2
+        assert said in capsys.readouterr().err
+        assert not (tmp_path / "out").exists()

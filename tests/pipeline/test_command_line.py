@@ -276,6 +276,14 @@ def test_a_gate_closes_on_the_limit_s_far_side_and_on_nothing_to_go_by() -> None
         assert "cannot be shown" in gate("rms_mm>0.5").closed(nothing)
 
 
+def test_a_wrong_gate_is_refused_before_what_takes_seconds_is_imported() -> None:
+    words = ["run", "study", "-o", "out", "--fail-if", "foo>1"]
+    code = f"import sys; from pipeline.cli import main; print(main({words}), 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["2", "False"]
+    assert "no number 'foo'" in done.stderr
+
+
 def test_other_settings_ask_before_they_overwrite(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -413,6 +421,9 @@ def test_a_folder_that_is_no_output_is_told_with_what_is(tmp_path: Path, capsys:
         assert f"give {tmp_path / 'out'}" in capsys.readouterr().err
     assert main(["report", str(tmp_path)]) == 2
     assert "this is not an output of wireval run" in capsys.readouterr().err
+    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "the run into it has finished no case: run it again" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("verb", "kept"), [("run", True), ("synth", False)])

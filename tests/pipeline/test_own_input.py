@@ -133,7 +133,7 @@ def test_one_label_of_several_by_number(tmp_path):
     assert np.sqrt(np.mean(error**2)) < 0.25 * voxel
     with pytest.raises(LoadError, match=r"4 different values, 0, 1, 2, 3.*name one"):
         mask(tmp_path / "seg.nii.gz")
-    with pytest.raises(LoadError, match="0 labelled voxels"):
+    with pytest.raises(LoadError, match="no voxel of label 7; expected one of its values, 0, 1, 2, 3"):
         mask(tmp_path / "seg.nii.gz", label=7)
     with pytest.raises(LoadError, match="no label named 'artery'"):
         mask(tmp_path / "seg.nii.gz", label="artery")

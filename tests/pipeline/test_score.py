@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -200,6 +201,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     """A missing file, an empty one and a wire that stops half way: none is left out, each says why."""
     wires = known[1]
     folder = write_csv(tmp_path / "sim", [*wires[:3], wires[3][: len(wires[3]) // 2]])
+    shutil.copytree(folder, tmp_path / "odd")
     (folder / "wire_001.csv").unlink()
     (folder / "wire_002.csv").write_text("", encoding="utf-8")
     code, table, result = run_with(known, f'"{folder}/*.csv"', "spoilt")
@@ -207,6 +209,31 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     assert list(table["status"]) == ["ok", "curve_missing", "curve_missing", "not_to_depth"]
     assert "wire_003.csv: it is" in str(result["failures"])
     assert pd.DataFrame([result["summary"]])["frames_ok"].item() == 1
+    for number, text in ((1, "a,b\n1,2\n"), (2, "x,y,z\n0,0,0\n0,0,1\n"), (3, "\0\1\2")):
+        (tmp_path / "odd" / f"wire_00{number}.csv").write_text(text, encoding="utf-8")
+    code, table, result = run_with(known, f'"{tmp_path / "odd"}/*.csv"', "odd")
+    assert code == 1, "one unreadable file refused all of them"
+    assert list(table["status"]) == ["ok", *["curve_unusable"] * 3]
+    said = [failure["message"] for failure in json.loads(json.dumps(result["failures"]))]
+    assert "wire_001.csv: has columns a, b; needs x_mm, y_mm, z_mm (or x, y, z), separated by commas" in said[0]
+    assert "wire_002.csv: space is not stated" in said[1]
+    assert r"wire_003.csv: has columns '\x00\x01\x02'; needs" in said[2], "nothing that a terminal would obey"
+
+
+def test_a_refusal_says_which_simulator_and_which_file(
+    known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    aside = write_csv(tmp_path / "cv_a", [wire + [7.7, 0.0, 0.0] for wire in known[1]])
+    words, good = ["score", str(known[0]), "-o", str(tmp_path / "out"), *QUICK], write_csv(tmp_path / "good", known[1])
+    assert main([*words, "--curves", f"good={good}", "--curves", f"a={aside}"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("a: case 'bend': none of the other simulator's 4 wires can be used; ")
+    assert f"{aside / 'wire_000.csv'}: its base passes" in error
+    assert error.count("none of the other") == 1
+    manifest = known[0].with_name("none.toml")
+    manifest.write_text(known[0].read_text(encoding="utf-8").replace("entry_mm =", "entry_m ="), encoding="utf-8")
+    assert main(["score", str(manifest), *words[2:], "--curves", f"good={good}", "--curves", f"a={aside}"]) == 2
+    assert "a: " not in capsys.readouterr().err, "what concerns all is said once, of nobody"
 
 
 def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -27,7 +27,17 @@ NEARLY_MM = 1.0
 
 
 def simulate_frames(run: Context, known: Known) -> Known:
-    """Replay the insertion; a frame without a known depth is left out."""
+    """Replay the insertion; a frame without a known depth is left out.
+
+    Raises StageError where the solver refuses its inputs.
+    """
+    try:
+        return _simulated(run, known)
+    except ValueError as error:
+        raise StageError(FrameStatus.SIMULATE_FAILED, f"case {run.case.id!r}: {error}") from error
+
+
+def _simulated(run: Context, known: Known) -> Known:
     with run.log.timed("clamp"):
         known = with_fitted_roll(run, known)
         clamp = clamp_of(run, known)
@@ -39,7 +49,7 @@ def simulate_frames(run: Context, known: Known) -> Known:
         # the simulated predictors need a segment length: that of this project's own solver
         with run.log.timed("simulate"):
             segment = _replayed(replace(run, log=Log(lambda *_: None)), known).segment_mm
-    except StageError:
+    except (StageError, ValueError):
         segment = float("nan")
     return replace(known, frames=frames_of_others(run, known), segment_mm=segment)
 
@@ -51,10 +61,7 @@ def _replayed(run: Context, known: Known) -> Known:
     replay = [frame for frame in frames if not np.isnan(frame.depth_mm)]
     if case.catheter is not None:
         log.warnings += [_cut_short(f) for f in replay if f.catheter_mm > f.depth_mm + NEARLY_MM]
-    try:
-        resolved = _resolved(run, known, replay)
-    except ValueError as error:
-        raise StageError(FrameStatus.SIMULATE_FAILED, f"case {case.id!r}: {error}") from error
+    resolved = _resolved(run, known, replay)
     log.assumptions.append(f"segments of {resolved.segment_mm:g} mm: {resolved.reason}")
     log.chosen["segment_mm"] = f"{resolved.segment_mm:g}: {resolved.reason}"
     for frame, wire, num_mm in zip(replay, resolved.wires, resolved.num_mm, strict=True):
