@@ -15,7 +15,7 @@ from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
-from pipeline.trace.whose_end import nothing_beyond, of_one_device
+from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -71,4 +71,5 @@ def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
     if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
         return curve
-    return of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))
+    curve = of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))
+    return of_one_line(image, attempt.tube, curve)
