@@ -181,6 +181,25 @@ def test_a_wire_of_no_brightness_is_refused_and_not_divided_by():
     assert verdict.status.name == "TRACE_LOW_CONTRAST"
 
 
+def test_a_sharp_line_in_a_halo_is_a_wire_that_moved():
+    """Half of the scan 1.6 voxels aside: the line lay at neither place, 0.2 mm off one at a sigma of 0.015, and ok."""
+    scene, lumen = narrow(4, 1.0)
+    image = subtracted(scene.frame, lumen, scene.reference)
+    entry = EntryPose(image.local(scene.entry[None])[0], image.turned(scene.direction))
+    best = explain.best_of(image, entry, None, TraceConfig())
+
+    def judged(blur, halo):
+        tube = best.attempt.tube
+        tube = replace(tube, sigma=blur * image.wall_blur_mm, offset=halo * tube.peak)
+        none = np.zeros(len(best.points), bool)
+        return judge(image, replace(best.attempt, tube=tube), best.points, none, best.length_mm)
+
+    assert "moved during the scan" in judged(1.0, 0.13).note
+    assert judged(1.0, 0.13).status is FrameStatus.TRACE_AMBIGUOUS
+    assert "halo" not in judged(1.2, 0.13).note, "a faint catheter of 2 mm over the wire"
+    assert judged(1.0, 0.06).status is FrameStatus.OK
+
+
 @pytest.mark.parametrize(("level", "status"), [(0.15, "TRACE_AMBIGUOUS"), (1.0, "OK")])
 def test_a_faint_end_in_a_sharp_scan_is_not_dropped_in_silence(level, status):
     """6 mm of 2.4 noises: 8 of 23 such ends were dropped, and ok; the blur in which grey is read takes most of them."""
