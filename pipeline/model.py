@@ -201,6 +201,7 @@ class Curve:
     tip_sigma_mm : standard deviation of the tip along the wire, mm.
     flagged : (n,) bool, points not to be trusted at that sigma (gap bridged, streak, strands in contact).
     in_plane : (n,) bool, points where the wire runs nearly in the plane of the scanner's rotation.
+    elsewhere_mm : (m, 3) points of bright lines off the curve.
     """
 
     points_mm: Array
@@ -212,10 +213,12 @@ class Curve:
     counters: Counters = field(default_factory=dict)
     in_plane: NDArray[np.bool_] | None = None
     levels: Levels = field(default_factory=dict)
+    elsewhere_mm: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
         object.__setattr__(self, "points_mm", read_only(self.points_mm, np.float64))
+        object.__setattr__(self, "elsewhere_mm", read_only(self.elsewhere_mm, np.float64))
         object.__setattr__(self, "sigma_mm", read_only(self.sigma_mm, np.float64))
         for name in ("flagged", "in_plane"):
             marks = getattr(self, name)

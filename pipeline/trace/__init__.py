@@ -17,9 +17,9 @@ from pipeline.trace.explain import explained, missed_mm
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
 from pipeline.trace.verdict import near_rotation_plane
-from pipeline.trace.whose_end import DIM_FROM_TIP, cleared
+from pipeline.trace.whose_end import BEYOND_GAP, DIM_FROM_TIP, GAP, cleared
 
-__all__ = ["DIM_FROM_TIP", "cleared", "of_catheter", "of_length", "trace"]
+__all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "cleared", "of_catheter", "of_length", "trace"]
 
 THICK_VOXELS = 1.6
 """Blur of a wire, from which its crest wanders: the ends of such wires, 0.9 mm in voxels of 0.15 mm, were 2 voxels off
@@ -112,7 +112,8 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     open_question = curve.status is FrameStatus.OK or np.isfinite(dim)
     if not open_question or not abs(curve.length_mm - catheter_mm) < CATHETER_END_MM:
         return curve
-    levels = {name: level for name, level in curve.levels.items() if name != DIM_FROM_TIP}  # other depths clear nothing
+    # other depths clear nothing
+    levels = {name: level for name, level in curve.levels.items() if name not in (DIM_FROM_TIP, BEYOND_GAP)}
     note = f"trace: length: got {curve.length_mm:.2f} mm, where the catheter ends ({catheter_mm:.2f} mm); "
     note += "expected a wire that ends elsewhere, or a stated depth; give insertion_mm"
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)

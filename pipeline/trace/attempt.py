@@ -105,8 +105,8 @@ def tube_length(tube: Tube) -> float:
     return float(arc_length(tube.at(np.linspace(0, tube.intervals, 4 * tube.intervals + 1)))[-1])
 
 
-def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> float:
-    """How much (mm) of the pieces lies off the tube and off ``known`` points (n, 3).
+def _off(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> list[tuple[Array, float]]:
+    """What of the pieces lies off the tube and off ``known`` points (n, 3): points (m, 3) and length (mm) of each.
 
     Pieces that are off by less than 1.5 NEAR_VOXELS are noise, and pieces fainter than a share of the wire are its own
     streaks, not another device.
@@ -114,13 +114,26 @@ def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Arr
     near = NEAR_VOXELS * image.voxel
     tree = cKDTree(np.concatenate([known, dense(tube, image.voxel)]))
     least = STREAK_SHARE * tube.peak * min(1.0, 2.0 * float(tube.steps.levels.min()) + 0.1)
-    left = 0.0
+    found = []
     for piece in pieces:
         if piece.grey >= least:
-            far = tree.query(piece.points[::2], distance_upper_bound=near)[0]
-            off = float(np.mean(~np.isfinite(far))) * piece.length
-            left += off if off > 1.5 * near else 0.0
-    return left
+            points = piece.points[::2]
+            far = ~np.isfinite(tree.query(points, distance_upper_bound=near)[0])
+            off = float(np.mean(far)) * piece.length
+            if off > 1.5 * near:
+                found.append((points[far], off))
+    return found
+
+
+def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> float:
+    """How much (mm) of the pieces lies off the tube and off ``known`` points (n, 3)."""
+    return sum(length for _, length in _off(image, tube, pieces, known))
+
+
+def elsewhere(image: Subtraction, attempt: Attempt) -> Array:
+    """Points (m, 3) of the bright lines that an attempt does not explain."""
+    off = _off(image, attempt.tube, attempt.pieces, attempt.known)
+    return np.concatenate([np.zeros((0, 3)), *(points for points, _ in off)])
 
 
 def _attempt(

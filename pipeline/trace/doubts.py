@@ -11,11 +11,15 @@ from pipeline.model import Curve
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import ENTRY_REACH_MM, Attempt, dense
 from pipeline.trace.onward import FAINTEST, TANGENT_MM
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import LEAST_SEEN, note_of
 from pipeline.trace.ways import goes_on_unseen
-from pipeline.trace.whose_end import nothing_beyond, of_one_device
+from pipeline.trace.whose_end import nothing_beyond, of_one_device, of_one_line
+
+BLURRED = 2.0 / 3.0
+"""Share of the wire's peak that the blur in which grey is read leaves where FAINTEST holds: it leaves 0.65 of a wire as
+blurred as 0.95 voxel, and 0.42 of one of 0.6 voxel, which is looked for that much lower."""
 
 
 def _traces_of_wire(image: Subtraction) -> bool:
@@ -58,8 +62,10 @@ def ends_in_nothing(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     if curve.status is not FrameStatus.OK or image.correlated:
         return curve
     line = dense(tube, 0.5 * image.voxel)
+    left = tube.sigma**2 / (tube.sigma**2 + (CREST_VOXELS * image.voxel) ** 2)
+    least = FAINTEST * tube.peak * min(1.0, left / BLURRED)
     with image.showing(tube.voxels, tube.rest):
-        if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), FAINTEST * tube.peak):
+        if not goes_on_unseen(image, line[-1], tip_tangent(line, TANGENT_MM), least):
             return curve
     got, allowed = "a faint line beyond the tip that could not be followed", "a tip with nothing beyond it"
     do = "look whether the wire's end is fainter than the rest; scan with more dose"
@@ -71,4 +77,5 @@ def doubted(image: Subtraction, attempt: Attempt, curve: Curve) -> Curve:
     curve = ends_in_nothing(image, attempt.tube, faint_for_its_noise(curve))
     if curve.status is not FrameStatus.OK or attempt.confirmed:  # a stated depth says where the wire ends
         return curve
-    return of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))
+    curve = of_one_device(image, attempt.tube, nothing_beyond(image, attempt.tube, curve))
+    return of_one_line(image, attempt.tube, curve)

@@ -11,6 +11,7 @@ from pipeline.trace.onward import seen_outside
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.tube import Tube
 
 EDGE_VOXELS = 2.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
@@ -30,6 +31,10 @@ HAIRPIN_DEG, HAIRPIN_VOXELS = 140.0, 7.0
 back."""
 J_MM = 6.0
 """A curve that goes on for no longer than this after such a turn is the hook of a J tip, of 1 mm radius and less."""
+HALO, HALO_CNR, SHARP = 0.1, 5.0, 1.05
+"""Grey over its peak that a fit needs all around a line, from which that is no still wire; the contrast from which that
+is sure; and the most that the line is blurred, over the scanner's blur. A wire that lay 1.2 or 1.6 voxels aside half
+of the time had 0.12 to 0.17, still ones 0.06 at most, and 0.09 with a third of the scanner's blur 2.5 times as wide."""
 TIP_BESIDE = 3.5
 """Distance (voxel) of another strand of the wire within which nobody sees where its tip ends: two blurs of each."""
 
@@ -139,6 +144,15 @@ def of_a_pair(pair: float, attempt: Attempt) -> tuple[Objection, ...]:
     )  # fmt: skip
 
 
+def _haloed(image: Subtraction, tube: Tube) -> bool:
+    """Whether a line as sharp as the scanner allows lies in a halo: a wire that was elsewhere for a part of the scan.
+
+    A faint catheter of 2 mm makes one, too, but its wire is fitted wider.
+    """
+    sharp = tube.sigma < SHARP * image.wall_blur_mm and not image.modelled and not image.thick_slices
+    return sharp and tube.offset > HALO * max(tube.peak, 1e-9) and tube.peak > HALO_CNR * image.noise
+
+
 def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve (n, 3) may be no wire, or not one."""
     step = length_mm / max(1, len(points) - 1)
@@ -148,6 +162,9 @@ def of_the_whole(image: Subtraction, attempt: Attempt, points: Array, length_mm:
          f"slices {image.slices_apart:.1f} times as far apart as pixels",
          f"less than {MOST_APART} times",
          "reconstruct thinner slices: in these a wire and its ends are off by more than its uncertainty says"),
+        (_haloed(image, attempt.tube), FrameStatus.TRACE_AMBIGUOUS,
+         f"a sharp line in a halo of {attempt.tube.offset / max(attempt.tube.peak, 1e-9):.2f} of its brightness",
+         f"{HALO:g} at most", "look whether the wire moved during the scan, or another one lies beside it: scan again"),
         (turn > HAIRPIN_DEG and not attempt.confirmed, FrameStatus.TRACE_AMBIGUOUS,
          f"a turn by {turn:.0f} degrees within {HAIRPIN_VOXELS * image.voxel:.1f} mm", f"{HAIRPIN_DEG:g} at most",
          "look whether two wires lie side by side; state insertion_mm if the wire is folded"),

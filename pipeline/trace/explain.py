@@ -19,6 +19,7 @@ from pipeline.trace.attempt import (
     beside,
     cold,
     dense,
+    elsewhere,
     misfit,
     prolonged,
     warm,
@@ -211,7 +212,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     }  # fmt: skip
     return Curve(
         image.world(best.points), sigma, tip_sigma, verdict.flagged, verdict.status,
-        verdict.note, counters, levels=levels,
+        verdict.note, counters, levels=levels, elsewhere_mm=image.world(elsewhere(image, attempt)),
     )  # fmt: skip
 
 

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays.jets import gaussian_taps, smooth_voxels
-from pipeline.model import Array, Curve
+from pipeline.model import Array, Curve, arc_length
 from pipeline.status import FrameStatus
 from pipeline.trace.attempt import dense, tube_length
 from pipeline.trace.profile import BAND_VOXELS, LEAST_LEVEL, UNEVEN, Steps
 from pipeline.trace.region import voxels_of
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
 from pipeline.trace.tube import Tube
 from pipeline.trace.verdict import note_of
 
@@ -28,6 +28,15 @@ BODY_MM = 3.0
 """Length from which a piece is the wire's body, and no marker band."""
 DIM_FROM_TIP = "dim_from_tip_mm"
 """Level of a curve that is doubted for a dim part alone: how far from its end that part begins."""
+BEYOND_GAP = "beyond_gap_mm"
+"""Level of a curve with a gap in it: how much of it lies beyond."""
+GAP = "gap_mm"
+"""Level of such a curve: how long the gap is."""
+GAP_SHARE, SIDE_MM = 0.6, 1.5
+"""Share of the line's grey on either side below which it has a gap, and how much line each side has at the least: blur
+leaves 0.3 to 0.5 in a gap of 1.5 mm (voxels of 0.5 mm)."""
+MOST_BEYOND_MM = 15.0
+"""Length beyond a gap up to which a line is one wire without more: coils and marked tips are no longer."""
 
 
 def _marks_beyond(image: Subtraction, tube: Tube, line: Array) -> float:
@@ -101,6 +110,40 @@ def of_one_device(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
     )
 
 
-def cleared(curve: Curve) -> Curve:
-    """A curve that was doubted for its dim part alone, without that doubt; any other as it is."""
-    return replace(curve, status=FrameStatus.OK, note="") if DIM_FROM_TIP in curve.levels else curve
+def first_gap_mm(grey: Array, arc: Array, noise: float) -> tuple[float, float]:
+    """Where a line's first gap begins and ends, mm; infinite where it has none.
+
+    grey, arc : (n,) along the line.  noise : standard deviation of the grey.  A gap is darker than most of the line
+    before it and most of the line beyond it.
+    """
+    for n in np.flatnonzero((arc > SIDE_MM) & (arc < arc[-1] - SIDE_MM)):
+        least = GAP_SHARE * min(np.median(grey[:n]), np.median(grey[n:]))
+        if grey[n] + 2.0 * noise < least:
+            return float(arc[n]), float(arc[n + int(np.argmax(grey[n:] > least))])
+    return np.inf, np.inf
+
+
+def of_one_line(image: Subtraction, tube: Tube, curve: Curve) -> Curve:
+    """The curve with how much of it lies beyond a gap, ambiguous where that is more than a wire's tip is long.
+
+    A second device that faces the wire's tip looks like the wire beyond a gap. Frames at other depths tell: a gap of
+    the wire's own goes with the tip, one that a streak makes stays where it is.
+    """
+    line = dense(tube, 0.5 * image.voxel)
+    arc = arc_length(line)
+    begins_mm, ends_mm = first_gap_mm(image.along(line), arc, image.noise_in(CREST_VOXELS))
+    beyond_mm = float(arc[-1]) - ends_mm
+    if np.isinf(ends_mm) or curve.status is not FrameStatus.OK:
+        return curve
+    curve = replace(curve, levels={**curve.levels, BEYOND_GAP: beyond_mm, GAP: ends_mm - begins_mm})
+    if beyond_mm < MOST_BEYOND_MM or image.modelled:  # in a modelled background a stenosis looks like a gap
+        return curve
+    got = f"a line with {beyond_mm:.1f} mm of it beyond a gap"
+    allowed = f"{MOST_BEYOND_MM:g} mm at most, or frames at other depths that show the same gap"
+    do = "look whether a second device faces the wire's tip there; state insertion_mm"
+    return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note_of(got, allowed, do))
+
+
+def cleared(curve: Curve, of: str = DIM_FROM_TIP) -> Curve:
+    """A curve that was doubted for its dim part, or its gap, alone, without that doubt; any other as it is."""
+    return replace(curve, status=FrameStatus.OK, note="") if of in curve.levels else curve

@@ -19,6 +19,7 @@ from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen
 from pipeline.run.stages.depths import in_step, shrinking
 from pipeline.run.stages.dim_ends import own_dim_ends
+from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.repeated import known_by, once
 from pipeline.run.stages.thickness import too_thin
@@ -47,6 +48,8 @@ def trace_frames(run: Context, known: Known) -> Known:
     voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
     frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
     run.log.assumptions += assumed
+    frames, doubtful_gaps = own_gaps(frames, voxel_mm)
+    run.log.warnings += doubtful_gaps
     frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))

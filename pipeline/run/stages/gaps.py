@@ -1,0 +1,88 @@
+"""Gaps in traced wires: the wire's own, a streak's, or what lies between its tip and a second device that faces it.
+
+A wire's own gap goes with its tip, a streak makes one that stays where it is. What already lay ahead of the wire's tip
+in another frame, and stayed there while the wire came nearer, is no part of it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.model import Curve, arc_length
+from pipeline.run.stages.known import Frame
+from pipeline.status import FrameStatus
+from pipeline.trace import BEYOND_GAP, GAP, cleared
+
+FEWEST = 3
+"""Frames that must agree on a gap."""
+AGREE_VOXELS = 4.0
+"""How much the places of their gaps may differ: a gap of 1.5 mm is seen anywhere within it."""
+MOVED_MM = 5.0
+"""By how much the wire must have been pushed between the first and the last of them."""
+CAME_NEARER_MM = 2.0
+"""By how much the wire before the gap must have come nearer to a line that stayed where it was."""
+STAYED_VOXELS, STAYED_MM = 2.0, 2.5
+"""How closely, and over what length, the line beyond a gap must lie where another frame has one off its wire."""
+
+
+def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], list[str]]:
+    """The frames, cleared of the doubt about a gap where they agree on it; and a warning for each other gap's frame.
+
+    Frames with a stated depth are left out: it says where the wire ends.
+    """
+    out = list(frames)
+    with_gap = [n for n, f in enumerate(out) if np.isnan(f.expected_mm) and f.curve and BEYOND_GAP in f.curve.levels]
+    curves = [curve for n in with_gap if (curve := out[n].curve) is not None]
+    length = np.array([curve.length_mm for curve in curves])
+    beyond = np.array([curve.levels[BEYOND_GAP] for curve in curves])
+    agreed = np.zeros(len(curves), bool)
+    for place in (beyond, length - beyond):
+        same = np.abs(place - np.median(place)) < AGREE_VOXELS * voxel_mm if len(place) else agreed
+        if same.sum() >= FEWEST and np.ptp(length[same]) > MOVED_MM:
+            agreed |= same
+    for n in np.flatnonzero(agreed):
+        frame, good = out[with_gap[n]], FrameStatus.OK
+        if frame.stage == "trace" and frame.status == FrameStatus.TRACE_AMBIGUOUS.identifier:
+            out[with_gap[n]] = replace(
+                frame, curve=cleared(curves[n], BEYOND_GAP), status=good.identifier, sentence=good.value, stage="",
+                message="",
+            )  # fmt: skip
+    out = _faced(out, voxel_mm)
+    odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
+    if not odd:
+        return out, []
+    return out, [
+        f"frames {', '.join(odd)}: so much of the traced wire lies beyond a gap in it, and a second device that faces "
+        "the wire's tip would look the same: look at the picture, or state insertion_mm"
+    ]
+
+
+def _faced(frames: list[Frame], voxel_mm: float) -> list[Frame]:
+    """The frames; one fails whose curve goes on along a line that another frame shows off its wire and ahead of it."""
+    out = list(frames)
+    for n, frame in enumerate(frames):
+        curve = frame.trusted_curve
+        if curve is None or np.isfinite(frame.expected_mm) or BEYOND_GAP not in curve.levels:
+            continue
+        for other in frames:
+            if other is not frame and other.curve is not None and _lay_there(curve, other.curve, voxel_mm):
+                note = (
+                    f"trace: wire: got {curve.levels[BEYOND_GAP]:.1f} mm of line beyond a gap, which lay there in "
+                    f"frame {other.index}, of {other.curve.length_mm:.1f} mm of wire; expected a line that moves with "
+                    "the wire; look for a second device that faces the wire's tip; state insertion_mm"
+                )
+                out[n] = frame.failed("trace", FrameStatus.TRACE_AMBIGUOUS, note)
+                break
+    return out
+
+
+def _lay_there(curve: Curve, other: Curve, voxel_mm: float) -> bool:
+    """Whether the line beyond a curve's gap lay there, off the wire, when the wire ended well before that gap."""
+    ends_mm = curve.length_mm - curve.levels[BEYOND_GAP]
+    if not len(other.elsewhere_mm) or other.length_mm > ends_mm - curve.levels[GAP] - CAME_NEARER_MM:
+        return False
+    arc = arc_length(curve.points_mm)
+    off = cKDTree(other.elsewhere_mm).query(curve.points_mm[arc > ends_mm])[0]
+    return bool(np.mean(off < STAYED_VOXELS * voxel_mm) * (arc[-1] - ends_mm) > STAYED_MM)

@@ -1,0 +1,117 @@
+"""Gaps in traced wires: a second device that faces the wire's tip looks like 17 to 19 mm more of it, and was ok."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.run.stages.gaps import own_gaps
+from pipeline.run.stages.known import Frame
+from pipeline.segment import segment
+from pipeline.status import FrameStatus
+from pipeline.trace import BEYOND_GAP, GAP, trace
+from pipeline.trace.whose_end import first_gap_mm
+from tests.pipeline.test_depths import frames
+from tests.studies.seeing.render import arc_of
+from tests.studies.seeing.scenes import Draft
+
+NAN = float("nan")
+
+
+def facing(gap_mm: float):
+    """A wire of 17 mm, and over 15 mm of a device as bright on its way, from that far beyond its tip on."""
+    draft = Draft(np.random.default_rng(3), length=60.0)
+    whole, tip = draft.path, round(20.0 / 0.05)
+    draft.path, draft.opacity = whole[:tip], np.ones(tip)
+    draft.others = [(whole[tip + round(gap_mm / 0.05) :], draft.wire_radius, 1.0)]
+    return draft.scan(16)
+
+
+@pytest.mark.parametrize("gap_mm", [1.2, 2.5])
+def test_a_device_that_faces_the_tip_is_not_taken_for_the_wire_unless_the_depth_says_so(gap_mm):
+    scene = facing(gap_mm)
+    lumen = segment(scene.reference, scene.entry[None])
+    curve = trace(scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference)
+    assert curve.status is FrameStatus.TRACE_AMBIGUOUS, f"{curve.length_mm:.1f} of {arc_of(scene.wire)[-1]:.1f} mm, ok"
+    assert "second device faces the wire's tip" in curve.note
+    whole = trace(
+        scene.frame, lumen, scene.entry, scene.direction, reference=scene.reference, expected_mm=curve.length_mm
+    )
+    assert whole.status is FrameStatus.OK, "the same picture: the wire has a gap, says the stated depth"
+
+
+def test_a_gap_is_darker_than_the_line_on_both_sides():
+    arc = np.linspace(0.0, 30.0, 301)
+    line = np.ones(301)
+    dark = (arc > 18.0) & (arc < 20.0)
+    assert first_gap_mm(np.where(dark, 0.3, line), arc, 0.05) == pytest.approx((18.0, 20.0), abs=0.2)
+    none = np.inf, np.inf
+    assert first_gap_mm(np.where(dark, 0.8, line), arc, 0.05) == none
+    assert first_gap_mm(np.where(arc < 18.0, 5.0, line), arc, 0.05) == none, "where a coil of platinum ends"
+    assert first_gap_mm(np.where(arc < 18.0, 1.0, 0.2), arc, 0.05) == none, "a dim end"
+    noisy = line + 0.15 * np.random.default_rng(0).normal(size=301)
+    assert first_gap_mm(noisy, arc, 0.15) == none
+
+
+def gapped(lengths: list[float], beyond: list[float], *, doubted: bool) -> list[Frame]:
+    """Frames whose wires have gaps, refused for them or not."""
+    out = []
+    for frame, far in zip(frames(lengths, [NAN] * len(lengths)), beyond, strict=True):
+        assert frame.curve is not None
+        status = FrameStatus.TRACE_AMBIGUOUS if doubted else FrameStatus.OK
+        curve = replace(frame.curve, status=status, levels={BEYOND_GAP: far, GAP: 3.0} if far else {})
+        done = replace(frame, curve=curve)
+        out.append(done.failed("trace", status, "?") if doubted else done)
+    return out
+
+
+@pytest.mark.parametrize("beyond", [[20.0, 20.3, 19.8], [20.0, 25.2, 30.0]], ids=["the wire's", "a streak's"])
+def test_a_gap_at_the_same_distance_from_tip_or_entry_is_no_second_device(beyond):
+    found, said = own_gaps(gapped([40.0, 45.0, 50.0], beyond, doubted=True), 0.3)
+    assert [f.status for f in found] == ["ok"] * 3
+    assert all(f.trusted_curve is not None and f.trusted_curve.status is FrameStatus.OK for f in found)
+    assert not said
+
+
+@pytest.mark.parametrize(
+    ("lengths", "beyond"),
+    [
+        ([52.8, 52.6, 52.2], [38.0, 28.0, 18.0]),  # the wire comes nearer and the line's end stays
+        ([50.0, 50.0, 50.2], [20.0, 20.0, 20.0]),  # nothing was pushed
+        ([40.0, 50.0], [20.0, 20.0]),
+    ],
+)
+def test_a_gap_that_may_be_before_another_device_stays_refused(lengths, beyond):
+    found, _ = own_gaps(gapped(lengths, beyond, doubted=True), 0.3)
+    assert not any(f.ok for f in found)
+
+
+def test_what_lay_ahead_of_the_tip_in_another_frame_is_no_wire():
+    """A device of 10 mm: bright line off the curve in frame 0, the wire's last 10 mm in frame 1, which was ok."""
+    seen = gapped([15.0, 46.0], [0.0, 10.0], doubted=False)
+    ahead = np.stack([np.zeros(20), np.zeros(20), np.linspace(36.5, 46.0, 20)], 1)
+    first = seen[0].curve
+    assert first is not None
+    seen[0] = replace(seen[0], curve=replace(first, elsewhere_mm=ahead)).failed("trace", FrameStatus.TRACE_AMBIGUOUS)
+    found, said = own_gaps(seen, 0.3)
+    assert found[1].status == "trace_ambiguous"
+    assert "lay there in frame 0, of 15.0 mm of wire" in found[1].message
+    assert not said
+    # a streak hides the same place in both: the first frame's wire ended there, and went on
+    near = frames([32.5], [NAN])[0].curve
+    assert near is not None
+    assert own_gaps([replace(seen[0], curve=replace(near, elsewhere_mm=ahead)), seen[1]], 0.3)[0][1].ok
+    # and a wire's own part has moved with it
+    moved = [replace(seen[0], curve=replace(first, elsewhere_mm=ahead - [0, 0, 20.0])), seen[1]]
+    assert own_gaps(moved, 0.3)[0][1].ok
+
+
+def test_a_gap_that_nothing_explains_is_a_warning_and_a_stated_depth_ends_all_doubt():
+    found, said = own_gaps(gapped([40.0], [10.0], doubted=False), 0.3)
+    assert found[0].ok
+    assert "frames 0 (10.0 mm)" in said[0]
+    assert "state insertion_mm" in said[0]
+    stated = [replace(f, expected_mm=40.0) for f in found]
+    assert own_gaps(stated, 0.3) == (stated, [])
