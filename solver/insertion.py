@@ -88,8 +88,6 @@ class Insertion:
         self._work.clamp(entry, frame, load, initial == "translate", steps, weight)
         self._started, self._way, self._lock = False, object(), threading.Lock()
         self._too_long = (most + 0.5 - 1e-12) * wire.segment_mm  # there ``segments_at`` counts one joint too many
-        deepest = min(tol.MOST_JOINTS * wire.segment_mm, LENGTH_MM.largest)
-        self._depths = Range(0.0, deepest, "arc lengths from the entry, in mm; longer segments for a longer wire")
         self._refused = None if wall is None else _refused(wall, entry)
 
     @property
@@ -137,9 +135,10 @@ class Insertion:
         """Depths, mm, and for each a roll, degrees, and the catheter's tip, mm; ValueError where one is refused."""
         if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
-        depths = _list("depths_mm", depths_mm, self._depths)
+        allowed = _reach(self.wire)
+        depths = _list("depths_mm", depths_mm, allowed)
         rolls = _each_of("roll_deg", roll_deg, ANGLE_DEG, len(depths))
-        tips = _each_of("catheter_mm", catheter_mm, self._depths, len(depths))
+        tips = _each_of("catheter_mm", catheter_mm, allowed, len(depths))
         if any(tips) and self._work.catheter is None:
             refuse("insertion", "catheter_mm", catheter_mm, "0 without a catheter", "Insertion(..., catheter=...)")
         for depth, tip in zip(depths, tips, strict=True):
@@ -231,6 +230,12 @@ class Insertion:
         """Go to a depth and roll that may be far from here."""
         here = Goal(self.depth_mm, self.roll_deg, self.catheter_mm)
         return advance(self._work, here, Goal(depth, roll, float(self._work.place["goal"][0])))
+
+
+def _reach(wire: GuideWire) -> Range:
+    """Depths that may be asked for: beyond them no memory holds the wire."""
+    deepest = min(tol.MOST_JOINTS * wire.segment_mm, LENGTH_MM.largest)
+    return Range(0.0, deepest, "arc lengths from the entry, in mm; longer segments for a longer wire")
 
 
 def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:
