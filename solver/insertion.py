@@ -25,7 +25,6 @@ from solver.wire import GuideWire
 from solver.workspace import Workspace
 
 ROLL_STEP_DEG = Range(1e-6, 1e6)
-DEPTH_MM = Range(0.0, 1e12, "arc lengths from the entry to the tip, in mm")
 FINEST_MM = Range(LENGTH_MM.least, math.inf, "step_mm or more: no step is taken again")
 SHAFT_MM, SHAFT_N = Range(0.0, 1e6, "0 is no shaft"), Range(0.0, 1e6, "0 is no friction")
 SEPTUM_SAMPLES = 17
@@ -119,9 +118,10 @@ class Insertion:
     ) -> Iterator[Solution]:
         """Push (or pull) the tip to each depth in turn and yield the wire there.
 
-        depths_mm : arc lengths from the entry to the tip, 0 or more.     roll_deg : of the base.     catheter_mm : the
-        catheter's tip beyond the entry, no deeper than the wire's; both are one for all or one per depth. Between two
-        depths wire, roll and catheter advance in proportion; push_force_N acts on the wire, with the catheter held.
+        depths_mm : arc lengths from the entry to the tip, from 0 to 1e7 mm and 1e6 segments; beyond ``max_joints``
+        segments they yield TOO_LONG.     roll_deg : of the base.     catheter_mm : the catheter's tip beyond the entry,
+        no deeper than the wire's; both are one for all or one per depth. Between two depths wire, roll and catheter
+        advance in proportion; push_force_N acts on the wire, with the catheter held.
         Each call sets both anew: left out, the base is turned back to 0 and the catheter pulled back to 0.
         A depth that cannot be reached yields the last good state with its own depth and a status.
         The arguments are checked at once. The first depth of a call ends the calls before it: going on with one of
@@ -135,9 +135,10 @@ class Insertion:
         """Depths, mm, and for each a roll, degrees, and the catheter's tip, mm; ValueError where one is refused."""
         if isinstance(depths_mm, (str, bytes, Mapping, Set)) or not isinstance(depths_mm, Iterable):
             refuse("insertion", "depths_mm", depths_mm, "a list of numbers of 0 or more", "write [10.0, 20.0]")
-        depths = _list("depths_mm", depths_mm, DEPTH_MM)
+        allowed = _reach(self.wire)
+        depths = _list("depths_mm", depths_mm, allowed)
         rolls = _each_of("roll_deg", roll_deg, ANGLE_DEG, len(depths))
-        tips = _each_of("catheter_mm", catheter_mm, DEPTH_MM, len(depths))
+        tips = _each_of("catheter_mm", catheter_mm, allowed, len(depths))
         if any(tips) and self._work.catheter is None:
             refuse("insertion", "catheter_mm", catheter_mm, "0 without a catheter", "Insertion(..., catheter=...)")
         for depth, tip in zip(depths, tips, strict=True):
@@ -229,6 +230,12 @@ class Insertion:
         """Go to a depth and roll that may be far from here."""
         here = Goal(self.depth_mm, self.roll_deg, self.catheter_mm)
         return advance(self._work, here, Goal(depth, roll, float(self._work.place["goal"][0])))
+
+
+def _reach(wire: GuideWire) -> Range:
+    """Depths that may be asked for: beyond them no memory holds the wire."""
+    deepest = min(tol.MOST_JOINTS * wire.segment_mm, LENGTH_MM.largest)
+    return Range(0.0, deepest, "arc lengths from the entry, in mm; longer segments for a longer wire")
 
 
 def _steps(step_mm: float, roll_step_deg: float, finest_mm: float) -> tuple[float, float, float]:

@@ -3,7 +3,8 @@
 Also the settings of a relaxation, and the frame in which the introducer holds the wire.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,7 +136,12 @@ def relax(
     work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
-    return work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)
+    return _judged(work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg))
+
+
+def _judged(solution: Solution) -> Solution:
+    """Without a pivot where the wire is not at rest: the last one may be of a state that it left long ago."""
+    return solution if solution.converged else replace(solution, least_pivot=math.nan)
 
 
 def _polyline(points: ArrayLike, entry: Array, within_mm: float) -> Array:

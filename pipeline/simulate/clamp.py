@@ -5,6 +5,11 @@ hand-picked entry is no better. The wire's first millimetres show the clamp, ben
 the solver's wire, with its stiffness, rest curvature and wall, is what is fitted. The manifest's statement is the
 prior, with the uncertainty that it states. The unknowns are the clamp's place (3), two tilts of its direction and an
 offset of each frame's depth; Gauss-Newton finds them, with difference quotients from clamps that are a little off.
+
+Along the wire the clamp stays in the manifest's plane. A straight wire that slides along itself is the same wire, so
+that nothing but what the model gets wrong farther on would tell this place, and all depths would follow it: a wire that
+is no solution of the model slid the clamp by 1 mm, five of its standard deviations. How well it is known stays what the
+manifest states, and what it may be makes the rest less certain.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,6 +20,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve, arc_length
+from pipeline.simulate.departures import departed
 from pipeline.simulate.evidence import Sight, covariance_of, disagreeing, posterior
 from solver import Solution
 
@@ -33,6 +39,7 @@ TIP_VOXELS = 0.25
 near the entry: 0.3 mm deeper turns such a wire by 2.6 degrees."""
 FARTHEST_MM, LARGEST_TURN_DEG = 1.0, 10.0
 TANGENT_MM = 0.25
+ALONG = 0  # of the unknowns: the place along the entry direction, which is held
 SNAPS = 3.0
 """A derivative of more than this many times a rigid wire's is a snap: that frame is not used in this round."""
 
@@ -166,7 +173,8 @@ class _Fit:
             used = [self.sights[i] for i in use]
             stacked = [np.concatenate([a[i] for i in use]) for a in (residual, jacobian)]
             noise = covariance_of(used, self.voxel_mm)
-            mean, spread, left = posterior(stacked[0], stacked[1], noise, self.sigmas, at)
+            held = np.arange(len(at)) == ALONG
+            mean, spread, left = posterior(stacked[0], stacked[1], noise, self.sigmas, held, at)
             worst = disagreeing(left, used, self.voxel_mm)
             if worst is None or len(use) < 3:
                 return mean, spread, out, len(use)
@@ -194,20 +202,24 @@ def estimated_clamp(seen: Sequence[Seen], given: Clamp, prior: Prior, replay: Re
         if np.all(np.abs(step) <= SETTLED * np.sqrt(np.diag(covariance))):
             break
     found = moved(given, at[:5])
-    found = replace(found, covariance=_in_space(found, covariance[:5, :5]))
-    return _told(given, found, [chosen[i].index for i in out], used)
+    found = replace(found, covariance=_in_space(given, covariance[:5, :5]))
+    contradiction = departed(given, found, prior.sigma_mm, prior.direction_sigma_deg)
+    return _told(given, found, [chosen[i].index for i in out], used, contradiction)
 
 
 def _in_space(clamp: Clamp, covariance: Array) -> Array:
-    """Covariance (6, 6) of the place, mm, and of the direction's change, from that of the five unknowns."""
+    """Covariance (6, 6) of the place, mm, and of the direction's change, from that of ``moved``'s five unknowns."""
     axes = axes_of(clamp.direction)
     turn = np.zeros((6, 5))
     turn[:3, :3], turn[3:, 3:] = axes.T, axes[1:].T
     return np.asarray(turn @ covariance @ turn.T)
 
 
-def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
-    """The clamp that was found with a note; the given one with a warning where it lies too far off."""
+def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int, contradiction: str) -> Clamp:
+    """The clamp that was found with a note; the given one with a warning where it lies too far off.
+
+    contradiction : see ``departures.departed``.
+    """
     shift, turned = float(np.linalg.norm(found.entry_mm - given.entry_mm)), angle_deg(found.direction, given.direction)
     offset = f"{shift:.2f} mm and {turned:.1f} degrees from the manifest's"
     if shift > FARTHEST_MM or turned > LARGEST_TURN_DEG:
@@ -226,9 +238,10 @@ def _told(given: Clamp, found: Clamp, out: Sequence[int], used: int) -> Clamp:
         f"the clamp was estimated from {frames}: the solver's wire fitted to the first {REACH_MM:g} mm of the traces, "
         f"weighed with the manifest's entry; {offset}, known to {found.sigma_mm:.3f} mm across the wire and "
         f"{found.sigma_deg:.2f} degrees (one standard deviation along each axis; simulate.entry = manifest switches "
-        "this off)"
+        "this off); along the wire, where a straight wire shows nothing, it stays in the manifest's plane"
     )
-    return replace(found, note=note, warning=_left_out(out, used) if out else "")
+    left = _left_out(out, used) if out else ""
+    return replace(found, note=note, warning="; ".join(filter(None, (left, contradiction))))
 
 
 def _left_out(out: Sequence[int], used: int) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from pipeline.model import Array
@@ -87,23 +88,30 @@ def covariance_of_traces(sights: Sequence[Sight], voxel_mm: float) -> Array:
     return np.asarray(((1.0 - OWN) * bells + OWN * np.eye(len(arc))) * np.outer(sigma, sigma))
 
 
-def posterior(residual: Array, jacobian: Array, noise: Array, sigmas: Array, at: Array) -> tuple[Array, Array, Array]:
+def posterior(
+    residual: Array, jacobian: Array, noise: Array, sigmas: Array, held: NDArray[np.bool_], at: Array
+) -> tuple[Array, Array, Array]:
     """Mean (p,) and covariance (p, p) of the unknowns, and the residuals (n, 3) that the mean leaves.
 
     residual : (n, 3) at the unknowns' values ``at`` (p,).     jacobian : (n, 3, p).     noise : (n, n) of a component.
-    sigmas : (p,) of the prior about 0; an unknown of 0 stays there.
+    sigmas : (p,) of the prior about 0; an unknown of 0 stays there.     held : (p,) True for those that stay at 0
+    although they are not known: what they may be makes the others less certain (Schmidt's consider parameters).
     """
-    free = sigmas > 0
+    free, unknown = (sigmas > 0) & ~held, np.where(held, sigmas, 0.0)
     factor = cho_factor(noise)
     slopes = jacobian[:, :, free]
     target = residual + slopes @ at[free]
     normal, right = np.diag(1.0 / sigmas[free] ** 2), np.zeros(int(free.sum()))
+    leak: Array = np.zeros((len(right), len(sigmas)))
     for axis in range(3):
         weighted = cho_solve(factor, slopes[:, axis])
         normal, right = normal + slopes[:, axis].T @ weighted, right + weighted.T @ target[:, axis]
-    mean, spread = np.zeros(len(sigmas)), np.zeros((len(sigmas), len(sigmas)))
+        leak = leak + weighted.T @ (jacobian[:, axis] * unknown)
+    mean, spread = np.zeros(len(sigmas)), np.diag(unknown)
     inverse = np.linalg.inv(normal)
-    mean[free], spread[np.ix_(free, free)] = inverse @ right, inverse
+    mean[free], spread[free] = inverse @ right, -inverse @ leak
+    spread = spread @ spread.T
+    spread[np.ix_(free, free)] += inverse
     return mean, spread, target - slopes @ mean[free]
 
 

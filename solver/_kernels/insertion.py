@@ -18,7 +18,7 @@ from solver._kernels.forks import other_side
 from solver._kernels.friction import anchor_friction, friction_loss, settle_friction
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.septum import through_wall
-from solver._kernels.shaft import anchor_shaft, settle_shaft
+from solver._kernels.shaft import anchor_shaft, loss_by_turning, settle_shaft
 from solver._kernels.sleeve import put_over, stored_energy
 from solver._kernels.snaps import account, may_fork
 from solver._kernels.start import extrapolate_start, lay_along, note_change, put_load
@@ -180,7 +180,11 @@ def settle(
             at.rubbed += friction_loss(problem, k)
             settle_friction(problem, k)
         if problem.shaft.drag > 0.0:
-            at.rubbed += settle_shaft(problem, k)
+            # what turned the wire at the entry took is in the work of the hand's torque already
+            at.dissipated -= loss_by_turning(problem, k)
+            slid = settle_shaft(problem, k)
+            at.rubbed += slid
+            at.dissipated += slid
     else:
         take_back(handle)
     return outcome

@@ -12,9 +12,11 @@ import pytest
 
 from pipeline.arrays.polyline import angle_deg, at_arc
 from pipeline.model import Array, Clamp, Curve
+from pipeline.run.stages.clamp import clamp_of
 from pipeline.run.stages.given import manifest_clamp
 from pipeline.simulate import together
 from pipeline.simulate.clamp import Prior, Seen, _left_out, depth_from, estimated_clamp, moved
+from pipeline.simulate.evidence import posterior
 from solver import GuideWire, Insertion, Solution
 from solver.relax import base_frame
 
@@ -27,10 +29,10 @@ WIRE = GuideWire(
 )  # fmt: skip
 
 
-def free_wire(depth_mm: float) -> Array:
+def free_wire(depth_mm: float, curved_mm: float = CURVED_MM) -> Array:
     """A wire with a curved tip that touches nothing, from the origin along z, bent towards x; points every 0.3 mm."""
     s = np.linspace(0.0, depth_mm, max(3, round(depth_mm / VOXEL_MM)))
-    angle = CURVATURE * np.maximum(s - max(depth_mm - CURVED_MM, 0.0), 0.0)
+    angle = CURVATURE * np.maximum(s - max(depth_mm - curved_mm, 0.0), 0.0)
     straight = s - angle / CURVATURE
     x, z = (1 - np.cos(angle)) / CURVATURE, straight + np.sin(angle) / CURVATURE
     return np.column_stack([x, 0 * s, z])
@@ -128,6 +130,85 @@ def test_an_entry_far_off_is_not_followed_but_said() -> None:
     said = tomllib.loads(lines)
     assert np.linalg.norm(said["entry_mm"]) < 1.0, "what may be copied is where the traces begin"
     assert angle_deg(np.array(said["entry_direction"]), curves[0].points_mm[5] - curves[0].points_mm[0]) < 5.0
+
+
+def test_along_the_wire_the_clamp_stays_where_it_is_stated() -> None:
+    """What the model gets wrong slid it, and all depths with it: here a curve that is 1 mm longer than the solver's."""
+    curves = [
+        Curve(free_wire(depth, CURVED_MM + 1.0), np.full(round(depth / VOXEL_MM), 0.02), 0.01, levels={"knot_mm": 3.0})
+        for depth in (9.0, 11.1, 14.1, 17.1)
+    ]
+    given = off(0.0, (0.0, 0.0, 0.0))
+    found = estimate(curves, given, Prior(0.25, 2.0))
+    assert found.entry_mm[2] == pytest.approx(0.0, abs=1e-12)
+    assert depth_from(found, curves[-1]) == pytest.approx(curves[-1].length_mm, abs=0.02)
+    assert np.asarray(found.covariance)[2, 2] == pytest.approx(0.25**2)
+
+
+def test_what_is_held_makes_the_rest_less_certain() -> None:
+    rng = np.random.default_rng(100)
+    jacobian, noise = rng.normal(size=(20, 3, 4)), 0.01 * np.eye(20)
+    sigmas, held = np.array([0.5, 1.0, 0.2, 0.0]), np.array([True, False, False, False])
+    off_by = []
+    for _ in range(4000):
+        true = sigmas * rng.normal(size=4)
+        seen = jacobian @ true + 0.1 * rng.normal(size=(20, 3))
+        mean, spread, _ = posterior(seen, jacobian, noise, sigmas, held, np.zeros(4))
+        off_by.append(true - mean)
+        assert mean[0] == mean[3] == 0.0
+    np.testing.assert_allclose(spread, np.cov(np.transpose(off_by)), atol=0.01)
+
+
+def test_a_clamp_far_from_what_the_manifest_says_of_it_is_told_by_what_is_off() -> None:
+    curves = [trace(8.0 + 4 * i, 0.02, np.random.default_rng(i)) for i in range(5)]
+    told = estimate(curves, off(0.0, (0.4, 0.0, 0.0)), Prior(0.1, 2.0))
+    assert "off the manifest's by 0.39 mm across the wire, 3.9 times entry_sigma_mm (0.1)" in told.warning
+    assert "in direction" not in told.warning
+    turned = estimate(curves, off(4.0), Prior(0.15, 1.0))
+    assert "degrees in direction, 3." in turned.warning
+    assert "entry_direction_sigma_deg (1)" in turned.warning
+    assert "across" not in turned.warning
+    assert not estimate(curves, off(2.0)).warning
+
+
+def known_of(curves: Sequence[Curve]) -> tuple[Any, Any]:
+    """A case with an exact entry at the origin, run up to its traces."""
+    case = SimpleNamespace(
+        entry_mm=(0.0, 0.0, 0.0), entry_direction=(0.0, 0.0, 1.0), material_axis=None, down=None, entry_case=None,
+        entry_sigma_mm=0.0, entry_direction_sigma_deg=0.0,
+    )  # fmt: skip
+    frames = [
+        SimpleNamespace(index=i, trusted_curve=curve, curve=curve, roll_deg=0.0, catheter_mm=0.0)
+        for i, curve in enumerate(curves)
+    ]
+    log = SimpleNamespace(warnings=[], assumptions=[])
+    lumen = SimpleNamespace(distance=SimpleNamespace(spacing_mm=np.full(3, VOXEL_MM)))
+    return SimpleNamespace(case=case, log=log), SimpleNamespace(frames=frames, lumen=lumen)
+
+
+@pytest.mark.parametrize(
+    ("entry", "aside_mm", "sigma_mm", "doubted"),
+    [
+        ("traced", 0.1, 0.0, False),
+        ("traced", 1.2, 0.0, True),
+        ("manifest", 0.1, 0.0, False),
+        ("manifest", 1.2, 0.0, True),
+        ("manifest", 1.2, 0.2, True),
+        ("manifest", 1.2, 0.5, False),
+    ],
+)
+def test_an_exact_entry_beside_the_traced_wires_is_told(
+    entry: str, aside_mm: float, sigma_mm: float, doubted: bool
+) -> None:
+    """1.6 mm beside them, said to be exact: every frame was ok without a word."""
+    curves = [trace(12.0 + 4 * i, 0.02, np.random.default_rng(i)) for i in range(3)]
+    run, known = known_of([Curve(c.points_mm + [aside_mm, 0.0, 0.0], c.sigma_mm, 0.01) for c in curves])
+    run.case.entry_sigma_mm = sigma_mm
+    run.config = SimpleNamespace(simulate=SimpleNamespace(entry=entry))
+    clamp = clamp_of(run, known)
+    np.testing.assert_array_equal(clamp.entry_mm, np.zeros(3))
+    said = "; ".join(run.log.warnings)
+    assert ("mm beside the manifest's entry (median of 3 frames)" in said) == doubted, said
 
 
 def test_depth_is_counted_from_the_clamp() -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from solver import Grid, GuideWire, Insertion, Status, VesselWall, relax
+from solver import Grid, GuideWire, Insertion, Insertions, Status, VesselWall, relax
 from tests.solver.entry_points import outside_by
 from tests.solver.scenes import sampled, tube_distance, tube_grid
 
@@ -96,8 +98,30 @@ def test_leaving_the_grid_is_a_status_and_keeps_the_last_good_state() -> None:
 
 
 def test_absurd_depth_is_a_status_at_once() -> None:
-    solution = next(Insertion(WIRE, VesselWall(tube_grid(), 1.0), [0, 0, 0], [0, 0, 1]).to_depths([1e9]))
+    solution = next(Insertion(WIRE, VesselWall(tube_grid(), 1.0), [0, 0, 0], [0, 0, 1]).to_depths([1e5]))
     assert solution.status is Status.TOO_LONG
+
+
+def test_a_depth_that_no_memory_holds_is_refused_at_the_call_as_relax_refuses_it() -> None:
+    """It was accepted by to_depths and a status at the first depth."""
+    wire = GuideWire(0.5, 0.18, 2.0)
+    insertion = Insertion(wire, None, [0, 0, 0], [0, 0, 1])
+    for call in (
+        lambda depth: insertion.to_depths([10.0, depth]),
+        lambda depth: Insertions([insertion]).to_depths([depth]),
+        lambda depth: relax(wire, depth_mm=depth),
+    ):
+        for depth in (1e9, 500_001.0):
+            with pytest.raises(ValueError, match=r"depths?_mm: got .*; allowed: a number from .*longer segments"):
+                call(depth)
+    assert next(insertion.to_depths([499_999.0])).status is Status.TOO_LONG, "max_joints may be raised"
+
+
+def test_no_pivot_is_stated_of_a_wire_that_is_not_at_rest() -> None:
+    """Under Euler's load, after which it folds away slowly, it said 1.0: that of a free wire."""
+    solution = relax(GuideWire(0.25, 0.18, 1.0), depth_mm=10.0, load_N=[0, 0, -1000 * math.pi**2 / 400])
+    assert not solution.converged
+    assert math.isnan(solution.least_pivot)
 
 
 @pytest.mark.parametrize("lumen", [0.05, 0.1])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Solution, VesselWall
+from solver import GuideWire, Insertion, Insertions, Solution, VesselWall
 from tests.solver.scenes import last, tube_grid
 
 RADIUS, DRAG, SHAFT, TORSION = 0.18, 0.02, 1000.0, 5.0
@@ -85,6 +86,49 @@ def test_a_bent_tip_follows_the_hand_later() -> None:
         solution = roll(insertion, [20.0, 40.0])
         angle.append(behind(solution))
     assert 0.0 < angle[0] < angle[1] < angle[2]
+
+
+def way_of_the_hand() -> tuple[list[float], list[float]]:
+    """Depths and rolls: in, out, turned, and both; the first step of each is short, as friction turns round there."""
+    inwards = np.arange(5.0, 15.01, 0.25)
+    outwards = np.append(14.99, np.arange(14.75, 12.0, -0.25))
+    turned = np.append(0.02, np.arange(2.0, 60.0, 2.0))
+    onwards = np.append(outwards[-1] + 0.01, np.arange(12.5, 15.0, 0.25))
+    depths = [*inwards, *outwards, *np.full(len(turned), outwards[-1]), *onwards]
+    rolls = [*np.zeros(len(inwards) + len(outwards)), *turned, *(turned[-1] + 8.0 * (onwards - outwards[-1]))]
+    return depths, rolls
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.2])
+@pytest.mark.parametrize("rest", [0.0, 0.02])
+@pytest.mark.parametrize("torsion", [TORSION, math.inf])
+def test_the_work_of_the_hand_is_stored_or_dissipated(coefficient: float, rest: float, torsion: float) -> None:
+    wire = GuideWire(1.0, RADIUS, 10.0, rest, torsional_stiffness_N_mm2=torsion)
+    where = {"material_axis": [1, 0, 0], "tip_load_N": [0, 0.05, 0], "shaft_mm": 500.0, "shaft_friction_N": DRAG}
+    one = Insertion(wire, VesselWall(tube_grid(), 20.0, friction=coefficient), [0, 1.8, 0], [0, 0, 1], **where)
+    twin = one.clone()
+    depths, rolls = way_of_the_hand()
+    found = list(one.to_depths(depths, rolls))
+    work = [0.0]
+    for a, b in pairwise(found):
+        turn = math.radians(b.roll_deg - a.roll_deg)
+        pushed = 0.5 * (a.push_force_N + b.push_force_N) * (b.depth_mm - a.depth_mm)
+        work.append(pushed + 0.5 * (a.reaction_torque_N_mm + b.reaction_torque_N_mm) * turn)
+    taken_up = [s.energy_N_mm - found[0].energy_N_mm for s in found] + np.cumsum([s.dissipated_N_mm for s in found])
+    np.testing.assert_allclose(taken_up - found[0].dissipated_N_mm, np.cumsum(work), atol=5e-3 * sum(work))
+    assert not any(s.snaps for s in found)
+    (beside,) = Insertions([twin]).to_depths([depths], [rolls])
+    assert [s.dissipated_N_mm for s in beside] == [s.dissipated_N_mm for s in found]
+
+
+def test_a_shaft_alone_dissipates_all_that_the_hand_does() -> None:
+    """All of 0.1 N mm went without a word: the shaft's friction was in friction_energy_N_mm alone."""
+    insertion = Insertion(
+        GuideWire(0.5, RADIUS, 2.0), None, [0, 0, 0], [0, 0, 1], shaft_mm=500.0, shaft_friction_N=0.01
+    )
+    for solution in insertion.to_depths([10.0, 20.0, 30.0, 25.0]):
+        assert solution.dissipated_N_mm == pytest.approx(solution.friction_energy_N_mm, rel=1e-9)
+        assert solution.dissipated_N_mm == pytest.approx(0.1 if solution.depth_mm != 25.0 else 0.05, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["shaft_mm", "shaft_friction_N"])

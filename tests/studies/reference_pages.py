@@ -37,7 +37,7 @@ KEYS = {
     "entry_mm": "Where the wire enters the lumen, LPS mm.",
     "entry_direction": "Where the wire points at the entry.",
     "entry": 'Take the clamp from another insertion of the same fixation: `"case:ID"`.',
-    "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel.",
+    "entry_sigma_mm": "How well entry_mm is known; 0 is exact. Default: half a voxel. Along the wire only this tells.",
     "entry_direction_sigma_deg": "How well entry_direction is known; 0 is exact.",
     "material_axis": "Where material axis 1 points at roll 0. Default: the world axis least along the direction.",
     "wire": "Name of one of `[wires.*]`.",

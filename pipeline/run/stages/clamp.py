@@ -13,6 +13,7 @@ from pipeline.run.stages.segment import segment_vessel
 from pipeline.run.stages.trace import trace_frames
 from pipeline.simulate import altered, insertion_of, together
 from pipeline.simulate.clamp import Seen, estimated_clamp
+from pipeline.simulate.departures import beside
 from pipeline.simulate.resolution import lengths_mm
 from pipeline.study.manifest import Case
 from solver import Solution
@@ -21,12 +22,16 @@ from solver import Solution
 def clamp_of(run: Context, known: Known) -> Clamp:
     """The clamp of the simulation: estimated from the scans, or the manifest's."""
     given, prior, voxel_mm = manifest_clamp(run, known)
+    seen = seen_in(known.frames) if any(frame.trusted_curve for frame in known.frames) else []
+    passed = beside([frame.curve for frame in seen], given, prior.sigma_mm, voxel_mm)
     if run.config.simulate.entry == "manifest":
+        run.log.warnings += [passed] * bool(passed)
         return given
     if run.case.entry_case is not None:
         return _of_another(run, run.case.entry_case, given)
-    seen = seen_in(known.frames) if any(frame.trusted_curve for frame in known.frames) else []
     clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
+    if prior.sigma_mm == 0.0:
+        clamp = replace(clamp, warning="; ".join(filter(None, (clamp.warning, passed))))
     run.log.assumptions += [clamp.note] * bool(clamp.note)
     run.log.warnings += [clamp.warning] * bool(clamp.warning)
     return clamp
