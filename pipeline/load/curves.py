@@ -64,7 +64,7 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
     if columns is None and any(c and not _is_number(c) for c in head[:3]):
         shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
         needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"
-        raise unusable(path, f"has columns {shown}; needs {needed}; write them so")
+        raise unusable(path, f"has columns {shown}; expected {needed}; write them so")
     try:
         if columns is None:
             return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)

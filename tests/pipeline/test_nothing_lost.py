@@ -304,7 +304,7 @@ def test_an_executor_that_is_not_there_is_refused(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(study, tmp_path / "out", "--executor", "nonsense://") == 2
-    assert "--executor nonsense://: " in capsys.readouterr().err
+    assert "--executor 'nonsense://': expected the address" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -215,9 +215,9 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     assert code == 1, "one unreadable file refused all of them"
     assert list(table["status"]) == ["ok", *["curve_unusable"] * 3]
     said = [failure["message"] for failure in json.loads(json.dumps(result["failures"]))]
-    assert "wire_001.csv: has columns a, b; needs x_mm, y_mm, z_mm (or x, y, z), separated by commas" in said[0]
+    assert "wire_001.csv: has columns a, b; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas" in said[0]
     assert "wire_002.csv: space is not stated" in said[1]
-    assert r"wire_003.csv: has columns '\x00\x01\x02'; needs" in said[2], "nothing that a terminal would obey"
+    assert r"wire_003.csv: has columns '\x00\x01\x02'; expected" in said[2], "nothing that a terminal would obey"
 
 
 def test_a_refusal_says_which_simulator_and_which_file(
