@@ -1,7 +1,5 @@
 """Memory that is used again: to write to fresh memory costs a page fault every 4 KiB, of 3 to 10 us each."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from numpy.typing import DTypeLike, NDArray
@@ -26,10 +24,3 @@ class Spare:
     def give_back(self, array: NDArray[Any]) -> None:
         """Let others use an array that was taken."""
         self._free.append(array)
-
-    @contextmanager
-    def lent(self) -> Iterator[NDArray[Any]]:
-        """An array for a ``with`` block that leaves it as it was; after an exception nobody else gets it."""
-        array = self.take()
-        yield array
-        self.give_back(array)

@@ -61,11 +61,6 @@ class Job:
         return self.out / "cases" / self.case.id
 
     @property
-    def simulates(self) -> bool:
-        """Whether the solver is needed."""
-        return self.until in ("simulate", "compare", "report")
-
-    @property
     def wants_pages(self) -> ledger.Pages:
         """Which pages are asked for."""
         if not self.pictures or self.until != "report":
@@ -136,13 +131,13 @@ def _files(case: Case) -> list[Path]:
 
 
 def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> None:
-    if job.simulates:
-        load_kernels(progress)
-    clock = perf_counter()
     log = Log(progress)
     store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
     begin = files.begin if job.pictures and job.cores > 1 else nothing
     run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, begin)
+    if run.goes_to("simulate"):
+        load_kernels(progress)
+    clock = perf_counter()
     try:
         known = run_stages(run)
         hashed()

@@ -6,14 +6,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.model import Array, Curve, arc_length
-from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.crests import BEND, Tracklet, find_crests
 from pipeline.trace.knots import CLOSEST, FIRST_BLUR, first_tube
 from pipeline.trace.link import Path, link, resampled, with_doubles
 from pipeline.trace.onward import beyond
 from pipeline.trace.profile import EVEN, ended
 from pipeline.trace.stated import Opacity, ended_as_stated
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import Subtraction, numbered
 from pipeline.trace.tube import Tube, fit_tube, predicted
 
 ENTRY_REACH_MM = 4.0
@@ -47,7 +46,7 @@ class EntryPose:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A fitted tube with the path that led to it. leftover_mm : crests that it does not explain.
+    """A fitted tube with the path that led to it. off : what it does not explain of the crests, see ``_off``.
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
@@ -56,7 +55,7 @@ class Attempt:
 
     tube: Tube
     path: Path
-    leftover_mm: float
+    off: list[tuple[Array, float]]
     pieces: list[Tracklet]
     known: Array
     from_previous: bool = False
@@ -64,6 +63,16 @@ class Attempt:
     goes_on: bool = False
     confirmed: bool = False
     late_mm: float = 0.0
+
+    @property
+    def leftover_mm(self) -> float:
+        """How much of the crests it does not explain."""
+        return sum(length for _, length in self.off)
+
+    @property
+    def elsewhere(self) -> Array:
+        """Points (m, 3) of the crests that it does not explain."""
+        return np.concatenate([np.zeros((0, 3)), *(points for points, _ in self.off)])
 
     @property
     def cut(self) -> bool:
@@ -125,17 +134,6 @@ def _off(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -
     return found
 
 
-def _leftover(image: Subtraction, tube: Tube, pieces: list[Tracklet], known: Array) -> float:
-    """How much (mm) of the pieces lies off the tube and off ``known`` points (n, 3)."""
-    return sum(length for _, length in _off(image, tube, pieces, known))
-
-
-def elsewhere(image: Subtraction, attempt: Attempt) -> Array:
-    """Points (m, 3) of the bright lines that an attempt does not explain."""
-    off = _off(image, attempt.tube, attempt.pieces, attempt.known)
-    return np.concatenate([np.zeros((0, 3)), *(points for points, _ in off)])
-
-
 def _attempt(
     image: Subtraction, path: Path, entry: EntryPose, pieces: list[Tracklet], known: Array, behind_mm: float = 0.0
 ) -> Attempt | None:
@@ -143,7 +141,7 @@ def _attempt(
     tube = _fitted(image, path.points, behind_mm > 0.0, entry)
     if tube is None:
         return None
-    return Attempt(tube, path, _leftover(image, tube, pieces, known), pieces, known, behind_mm=behind_mm)
+    return Attempt(tube, path, _off(image, tube, pieces, known), pieces, known, behind_mm=behind_mm)
 
 
 def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt | None:
@@ -166,8 +164,7 @@ def prolonged(image: Subtraction, attempt: Attempt, entry: EntryPose) -> Attempt
     points = np.concatenate([gaps, path.points])
     path = Path(points, np.concatenate([np.ones(len(gaps), bool), path.bridged]), attempt.path.bridges + path.bridges)
     known = np.concatenate([attempt.known, path.points])
-    left_mm = _leftover(image, tube, attempt.pieces, known)
-    return replace(attempt, tube=tube, path=path, known=known, leftover_mm=left_mm)
+    return replace(attempt, tube=tube, path=path, known=known, off=_off(image, tube, attempt.pieces, known))
 
 
 def _from_entry(path: Path, entry: EntryPose) -> Path:
@@ -201,8 +198,7 @@ def cold(
 
 def beside(image: Subtraction, attempt: Attempt, pieces: list[Tracklet]) -> Attempt:
     """The attempt with its leftover by the crests of another one, which may be apart where its own have merged."""
-    left_mm = _leftover(image, attempt.tube, pieces, attempt.known)
-    return replace(attempt, pieces=pieces, leftover_mm=left_mm)
+    return replace(attempt, pieces=pieces, off=_off(image, attempt.tube, pieces, attempt.known))
 
 
 def again(image: Subtraction, attempt: Attempt, entry: EntryPose, closest: bool = False) -> Attempt:
@@ -261,13 +257,11 @@ def misfit(image: Subtraction, attempts: list[Attempt]) -> list[float]:
     radius = 3.0 * max(a.tube.sigma for a in attempts)
     curve = np.concatenate([dense(a.tube, image.voxel) for a in attempts])
     out = []
-    with image.region.numbers.lent() as slot:
-        voxels = active_voxels(slot, image.spacing, curve, radius)
+    with numbered(image, curve, radius) as (voxels, slot):
         for attempt in attempts:
             left = image.grey.reshape(-1)[voxels].astype(float)
             own, model = predicted(image, attempt.tube)
             at = slot.reshape(-1)[own] - 1
             left[at[at >= 0]] -= model[at >= 0]
             out.append(float(np.sum(left**2)) / image.noise**2)
-        slot.reshape(-1)[voxels] = 0
     return out

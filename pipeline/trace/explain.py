@@ -19,7 +19,6 @@ from pipeline.trace.attempt import (
     beside,
     cold,
     dense,
-    elsewhere,
     misfit,
     prolonged,
     warm,
@@ -212,7 +211,7 @@ def _curve(image: Subtraction, best: Candidate) -> Curve:
     }  # fmt: skip
     return Curve(
         image.world(best.points), sigma, tip_sigma, verdict.flagged, verdict.status,
-        verdict.note, counters, levels=levels, elsewhere_mm=image.world(elsewhere(image, attempt)),
+        verdict.note, counters, levels=levels, elsewhere_mm=image.world(attempt.elsewhere),
     )  # fmt: skip
 
 

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, arc_length
-from pipeline.trace._kernels.tube import active_voxels
 from pipeline.trace.attempt import dense
 from pipeline.trace.link import extended, resampled
 from pipeline.trace.profile import AHEAD_VOXELS, BACK_VOXELS
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import Subtraction, numbered
 from pipeline.trace.tube import WINDOW, Tube
 
 END_SIGMAS = 3.0
@@ -31,10 +30,8 @@ def _sources(image: Subtraction, line: Array, sigma: float) -> tuple[Array, Arra
     Voxels that wire before the line lights up, too, are left out.
     """
     h = image.voxel
-    with image.region.numbers.lent() as slot:
-        voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(line), WINDOW * sigma)
-        slot.reshape(-1)[voxels] = 0
-    index = unflattened(voxels, image.grey.shape) * image.spacing
+    with numbered(image, line, WINDOW * sigma) as (voxels, _):
+        index = unflattened(voxels, image.grey.shape) * image.spacing
     square = np.sum((index[:, None] - line[None]) ** 2, axis=2)
     keep = np.argmin(square, axis=1) * STEP_VOXELS * h > WINDOW * sigma
     share = np.exp(-0.5 * square[keep] / sigma**2) * STEP_VOXELS * h / (np.sqrt(2.0 * np.pi) * sigma)

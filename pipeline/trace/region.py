@@ -60,7 +60,7 @@ class SearchRegion:
 
     @cached_property
     def numbers(self) -> Spare:
-        """Memory on the box for the numbers of voxels in a list: zeros, which their user puts back."""
+        """Memory on the box for the numbers of voxels in a list: all 0."""
         return Spare(self.box.shape, np.int32)
 
 

@@ -184,6 +184,19 @@ def subtracting(frame: Volume, lumen: Lumen, reference: Volume | None) -> Iterat
         image.region.greys.give_back(image.grey)
 
 
+@contextmanager
+def numbered(image: Subtraction, curve: Array, radius: float) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int32]]]:
+    """Voxels (flat) within ``radius`` mm of a curve (n, 3), and a box with the position + 1 of each, 0 elsewhere.
+
+    The box is for a ``with`` block: then it is the next one's. After an exception, not all 0, it is nobody's.
+    """
+    slot = image.region.numbers.take()
+    voxels = active_voxels(slot, image.spacing, np.ascontiguousarray(curve), radius)
+    yield voxels, slot
+    slot.reshape(-1)[voxels] = 0
+    image.region.numbers.give_back(slot)
+
+
 def _smooth(sums: Array, counts: Array) -> Array:
     """Mean of the blocks around each block, 0 where they hold next to nothing."""
     top, below = (ndimage.gaussian_filter(a, SMOOTH_BLOCKS, mode="constant") for a in (sums, counts))
@@ -203,10 +216,8 @@ def levelled(image: Subtraction, curve: Array, sigma: float) -> Subtraction:
     distance, grey = image.region.box.values[at], image.grey[at].astype(float)
     # a blur is wider than half the halo only where the wall was not found; its step is not carried further than that
     share = ndtr(-distance / min(image.wall_blur_mm, 0.5 * HALO_VOXELS * voxel))
-    with image.region.numbers.lent() as wire:
-        near = active_voxels(wire, image.spacing, np.ascontiguousarray(curve), CLEAR_BLURS * sigma)
+    with numbered(image, curve, CLEAR_BLURS * sigma) as (_, wire):
         clear = (wire[at] == 0) & (distance < -DEEP_VOXELS * voxel)
-        wire.reshape(-1)[near] = 0
     shape = tuple(-(-n // BLOCK) for n in image.grey.shape)
     block = np.ravel_multi_index(tuple(index[:, clear] // BLOCK), shape)
     counts = np.bincount(block, minlength=int(np.prod(shape))).reshape(shape).astype(float)

@@ -11,7 +11,7 @@ from pipeline.trace._kernels import tube as kernels
 from pipeline.trace._kernels.skyline import factorise, substitute
 from pipeline.trace._kernels.tube import Blob, Claim, Equations, Line, Samples
 from pipeline.trace.profile import EVEN, Steps
-from pipeline.trace.subtraction import Subtraction
+from pipeline.trace.subtraction import Subtraction, numbered
 
 WINDOW = 3.0
 """Radius of the fitted voxels about the curve, in blurs."""
@@ -160,25 +160,23 @@ def _prior(tube: Tube, image: Subtraction) -> Array:
     return np.asarray(np.kron(block, np.eye(3)))
 
 
-def _claim(image: Subtraction, tube: Tube, curve: Array, slot: NDArray[np.int32]) -> Claim:
-    """The voxels near the tube's curve (n, 3); those at its start that lie before its start plane have no weight."""
-    voxels = kernels.active_voxels(slot, image.spacing, curve, tube.blob(image.voxel).radius)
+def _weights(image: Subtraction, tube: Tube, voxels: NDArray[np.int64]) -> Array:
+    """Weights (n,) of the voxels near the tube: none at its start for those that lie before its start plane."""
     if tube.start_plane is None:
-        return Claim(voxels, slot, np.ones(len(voxels)))
+        return np.ones(len(voxels))
     point, direction = tube.start_plane
     index = unflattened(voxels, image.grey.shape) * image.spacing
     # a wire may come back past the plane elsewhere
     at_start = np.sum((index - point) ** 2, axis=1) < (START_VOXELS * image.voxel) ** 2
-    return Claim(voxels, slot, np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0))
+    return np.where(at_start & ((index - point) @ direction <= 0), 0.0, 1.0)
 
 
 def _equations(image: Subtraction, tube: Tube, samples: Samples, prior: Array) -> tuple[Equations, Claim, Line]:
     """One set of normal equations, with the prior, the voxels that they are of, and the tube at its samples."""
     line, blob, k = sampled(tube, samples), tube.blob(image.voxel), len(tube.controls)
-    with image.region.numbers.lent() as slot:
-        claim = _claim(image, tube, line.curve, slot)
+    with numbered(image, line.curve, blob.radius) as (voxels, slot):
+        claim = Claim(voxels, slot, _weights(image, tube, voxels))
         e = kernels.normal_equations(image.grey, image.spacing, claim, line, blob, k, len(tube.tint))
-        slot.reshape(-1)[claim.voxels] = 0
     e.right[: 3 * k] -= prior @ tube.controls.ravel()
     e.normal[: 3 * k, : 3 * k] += prior
     return e, claim, line
@@ -286,8 +284,5 @@ def point_sigmas(tube: Tube, u: Array) -> tuple[Array, float]:
 def predicted(image: Subtraction, tube: Tube) -> tuple[NDArray[np.int64], Array]:
     """Voxels (flat) that the tube lights up and the grey it gives them."""
     line, blob = sampled(tube, sampling(tube, image.voxel)), tube.blob(image.voxel)
-    with image.region.numbers.lent() as slot:
-        voxels = kernels.active_voxels(slot, image.spacing, line.curve, blob.radius)
-        grey = kernels.render(slot, image.spacing, len(voxels), line, blob)
-        slot.reshape(-1)[voxels] = 0
-    return voxels, grey
+    with numbered(image, line.curve, blob.radius) as (voxels, slot):
+        return voxels, kernels.render(slot, image.spacing, len(voxels), line, blob)

@@ -1,12 +1,10 @@
 """Dim ends of traced wires that frames at several depths agree on: those are the wire's own, and no catheter's."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from pipeline.run.stages.known import Frame
-from pipeline.status import FrameStatus
 from pipeline.trace import DIM_FROM_TIP, cleared
 
 FEWEST = 3
@@ -34,11 +32,7 @@ def own_dim_ends(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame],
         return out, []
     usual = float(np.median(dim[agreed]))
     for n in np.flatnonzero(agreed):
-        good = FrameStatus.OK
-        frame = out[doubted[n]]
-        out[doubted[n]] = replace(
-            frame, curve=cleared(curves[n]), status=good.identifier, sentence=good.value, stage="", message=""
-        )
+        out[doubted[n]] = out[doubted[n]].cleared(cleared(curves[n]))
     said = (
         f"the last {usual:.1f} mm of the wire are far dimmer than the rest in {int(agreed.sum())} frames, at depths of "
         f"{length[agreed].min():.1f} to {length[agreed].max():.1f} mm: taken for the wire's own end; were it a "

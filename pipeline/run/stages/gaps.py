@@ -5,7 +5,6 @@ in another frame, and stayed there while the wire came nearer, is no part of it.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -43,12 +42,9 @@ def own_gaps(frames: Sequence[Frame], voxel_mm: float) -> tuple[list[Frame], lis
         if same.sum() >= FEWEST and np.ptp(length[same]) > MOVED_MM:
             agreed |= same
     for n in np.flatnonzero(agreed):
-        frame, good = out[with_gap[n]], FrameStatus.OK
+        frame = out[with_gap[n]]
         if frame.stage == "trace" and frame.status == FrameStatus.TRACE_AMBIGUOUS.identifier:
-            out[with_gap[n]] = replace(
-                frame, curve=cleared(curves[n], BEYOND_GAP), status=good.identifier, sentence=good.value, stage="",
-                message="",
-            )  # fmt: skip
+            out[with_gap[n]] = frame.cleared(cleared(curves[n], BEYOND_GAP))
     out = _faced(out, voxel_mm)
     odd = [f"{out[with_gap[n]].index} ({beyond[n]:.1f} mm)" for n in np.flatnonzero(~agreed) if out[with_gap[n]].ok]
     if not odd:

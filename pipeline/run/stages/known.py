@@ -96,6 +96,11 @@ class Frame:
         """Whether the simulated wire was about to snap, or segments of twice the length lead elsewhere."""
         return self.solved is not None and (self.solved.uncertain or self.num_mm > AGREED_MM)
 
+    def cleared(self, curve: Curve) -> "Frame":
+        """The same frame with a curve that is doubted no more."""
+        good = FrameStatus.OK
+        return replace(self, curve=curve, status=good.identifier, sentence=good.value, stage="", message="")
+
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
         if not self.ok:
