@@ -80,8 +80,15 @@ def write_page(template: str, page: Mapping[str, Any], path: Path) -> Path:
 
 
 @cache
+def compiled() -> None:
+    """Compile the templates of a run's pages, which takes as long as filling them in: beside the drawing, say."""
+    for name in ("case.html.j2", "index.html.j2", "macros.html.j2", "viewer.html.j2", "base.html.j2"):
+        _templates().get_template(name)
+
+
+@cache
 def _templates() -> jinja2.Environment:
-    """The templates, each compiled once a process: that takes as long as filling it in."""
+    """The templates, each compiled once a process."""
     templates = Path(__file__).parent / "templates"
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(templates), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True

@@ -34,7 +34,9 @@ def side_by_side(*calls: Callable[[], Any]) -> list[Any]:
     with ThreadPoolExecutor(min(_cores.get(), len(calls)) - 1) as others:
         begun = [others.submit(call) for call in calls[1:]]
         first = calls[0]()
-        return [first, *(one.result() for one in begun)]
+        # from the end on, what nobody has begun is done here
+        rest = [call() if one.cancel() else one.result() for call, one in zip(calls[:0:-1], begun[::-1], strict=True)]
+        return [first, *rest[::-1]]
 
 
 def in_parts(work: Callable[[NDArray[Any]], Any], voxels: NDArray[Any]) -> list[Any]:

@@ -27,7 +27,7 @@ from pipeline.study.settings import Resolved
 from reports import tables
 from reports.atomic import writing
 from reports.html import render_case
-from reports.page import Each
+from reports.page import Each, compiled
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, TIMINGS
 from solver import warm_up
 from solver._compile import hash_of
@@ -165,7 +165,7 @@ def _heal(job: Job, progress: CaseProgress) -> None:
 
 def each_on(cores: int) -> Each:
     """A function ``(work, count)`` that shares ``count`` calls of ``work`` among cores; pages draw figures with it."""
-    return lambda work, count: shared(lambda number, _: work(number), count, cores)
+    return lambda work, count: shared(lambda number, _: work(number), count, cores, compiled)
 
 
 def draw(folder: Path, pages: ledger.Pages, cores: int = 1) -> None:

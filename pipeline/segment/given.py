@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from pipeline.arrays.grids import in_memory_order, reorder
 from pipeline.model import Branches, Lumen, Shapes, Volume
-from pipeline.segment._kernels.distance import Owned, propagate
+from pipeline.segment._kernels.distance import Owned
 from pipeline.segment._kernels.solids import cones, enclosed, splat_triangles
+from pipeline.segment.closest import find_closest
 from pipeline.segment.config import SegmentConfig
 from pipeline.segment.levels import GreyLevels
 from pipeline.segment.surface import prepare, signed, signed_distance
@@ -61,7 +62,7 @@ def lumen_from_surface(shapes: Shapes, config: SegmentConfig) -> Lumen:
     foot = np.zeros((int(8 * area.sum() / voxel**2) + 8 * len(corners) + 1000, 3))
     voxels = splat_triangles(corners, spacing, 1.5 * voxel, box.owner, foot)[:, 0]
     foot = foot[: len(voxels)]
-    propagate(box, voxels, foot, config.outer_mm)
+    find_closest(box, voxels, foot, config.outer_mm)
     flat = (foot, np.zeros_like(foot), np.zeros(len(foot)))
     distance = signed(box, flat, config.outer_mm, 0)
     return _lumen(grid.with_values(distance), "the lumen is what the given surface encloses (points taken as LPS mm)")

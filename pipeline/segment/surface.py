@@ -18,9 +18,10 @@ from pipeline.arrays.grids import unflattened
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.model import Counters
 from pipeline.segment._kernels.contact import Inner
-from pipeline.segment._kernels.distance import Owned, distances, lost_feet, propagate
+from pipeline.segment._kernels.distance import Owned, distances, lost_feet
 from pipeline.segment._kernels.voxels import extent, rebased
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
+from pipeline.segment.closest import find_closest
 from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
 from solver.grid import Array, Grid, read_only
@@ -217,7 +218,8 @@ class SignedDistance:
 def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
     """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface."""
     spacing: Array = np.asarray(site.volume.spacing_mm)
-    inside, owner = sparse_zeros(site.state.shape, np.uint8), np.zeros(site.state.shape, np.int32)
+    inside = sparse_zeros(site.state.shape, np.uint8)
+    owner = np.full(site.state.shape, 0, np.int32)  # written to all over: in large pages, which zeros are not given
     box = Owned(owner, inside, spacing)
     voxels, wall = _half_level_wall(site, levels.half, inside)
     good = np.isfinite(wall.distance)
@@ -233,11 +235,11 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
     blur = blur_of_wall(wall.steepness[own], wall.curvature[own], levels.contrast)
     wall = _corrected(wall, voxels, owner, blur, float(spacing.min()))
     inside.reshape(-1)[seen] = wall.distance[good] < 0
-    visits = propagate(box, seen, wall.foot, outer_mm)
+    visits = find_closest(box, seen, wall.foot, outer_mm)
     stray = lost_feet(box, voxels, wall.foot, good)
     if len(stray):
         wall.curvature[stray] = 0.0
-        visits += propagate(box, voxels[stray], wall.foot, outer_mm)
+        visits += find_closest(box, voxels[stray], wall.foot, outer_mm)
     values = signed(box, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
     counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits)}
     return SignedDistance(values, levels, blur, counters)

@@ -16,7 +16,7 @@ from pipeline.arrays.grids import contiguous, corners_mm, integer_offset, reorde
 from pipeline.arrays.lattice import sparse_zeros
 from pipeline.arrays.spare import Spare
 from pipeline.model import Lumen, Volume
-from pipeline.trace._kernels.runs import WallModel, denoised, modelled, subtract
+from pipeline.trace._kernels.runs import WallModel, denoised, modelled, runs_below, subtract
 from solver.grid import Grid
 
 HALO_VOXELS = 4.0
@@ -94,13 +94,11 @@ def _region(frame: Grid, distance: Grid) -> SearchRegion:
     box, corner = _onto(frame, distance)
     box = contiguous(box)
     # in float64: a limit rounded up to float32 may include the distances that were cut off at it
-    near = box.values < HALO_VOXELS * np.float64(box.spacing_mm.min())
-    near = np.pad(near, ((0, 0), (0, 0), (1, 1)))
-    edges = np.argwhere(near[..., 1:] != near[..., :-1])
-    allowed = (box.values < INSIDE_MM).view(np.uint8)
+    runs = runs_below(box.values, HALO_VOXELS * float(box.spacing_mm.min()))
+    allowed = box.values < INSIDE_MM
     within = np.flatnonzero(allowed)
     within = within[:: max(1, len(within) // SAMPLE)]
-    return SearchRegion(box, corner, np.column_stack([edges[::2], edges[1::2, 2]]), within, allowed)
+    return SearchRegion(box, corner, runs, within, allowed.view(np.uint8))
 
 
 _regions: weakref.WeakKeyDictionary[Lumen, tuple[bytes, SearchRegion]] = weakref.WeakKeyDictionary()

@@ -43,14 +43,14 @@ def _takes(at: tuple[float, float, float], known: int, inside: int, foot: NDArra
 
 
 @entry_point
-def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float) -> int:
+def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float, low: int, high: int) -> int:
     """Hand closest points on from ``voxels``, which have one: to all of the inside, and outside as far as ``outer`` mm.
 
-    voxels : flat, ascending for the sake of the cache. Layer by layer; a voxel that gets a nearer foot hands it on
-    again. Returns the number of hand-overs.
+    voxels : flat, ascending for the sake of the cache.  low, high : planes of the box outside which nothing is read or
+    written. Layer by layer; a voxel that gets a nearer foot hands it on again. Returns the number of hand-overs.
     """
     owner, inside, (hx, hy, hz) = box.owner, box.inside, (box.spacing[0], box.spacing[1], box.spacing[2])
-    ni, nj, nk = owner.shape
+    _, nj, nk = owner.shape
     front, following = voxels.copy(), np.empty(max(4096, voxels.shape[0]), np.int64)
     count = visits = voxels.shape[0]
     while count:
@@ -59,7 +59,7 @@ def propagate(box: Owned, voxels: NDArray[Any], foot: NDArray[Any], outer: float
             i, j, k = unravelled(front[n], owner.shape)
             inside[i, j, k] &= ~QUEUED
             m = owner[i, j, k] - 1
-            for a in range(max(0, i - 1), min(ni, i + 2)):
+            for a in range(max(low, i - 1), min(high, i + 2)):
                 for b in range(max(0, j - 1), min(nj, j + 2)):
                     for c in range(max(0, k - 1), min(nk, k + 2)):
                         known, at, mark = owner[a, b, c], (a * hx, b * hy, c * hz), inside[a, b, c]
