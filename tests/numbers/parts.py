@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from tests.numbers import benchmark, imaging, pages, runs, solver, synthetic
+from tests.numbers import benchmark, imaging, pages, runs, solver, synthetic, traces
 from tests.numbers.kept import Scene
 
 
@@ -24,6 +24,7 @@ PARTS = {
     # single precision (6e-8) is summed over voxels there, and fits end where they change little
     "imaging": Part(imaging.SCENES, 1e-4),
     "runs": Part(runs.SCENES, 1e-4),
+    "traces": Part(traces.SCENES, 1e-4),
     # sizes and places are what they are set to; a picture on paper is drawn
     "pages": Part(pages.SCENES, 1e-6),
 }
