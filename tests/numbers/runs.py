@@ -17,6 +17,8 @@ from tests.numbers.imaging import TIMES, arrays, columns
 from tests.numbers.kept import Numbers, Scene, digest
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+HEADS = {".nrrd": re.compile(rb"\A.*?\n\n", re.DOTALL), ".vtp": re.compile(rb"<[^>]*>")}
+"""What of these files is no data, but says what the data are."""
 OTHERWISE = re.compile(r"provenance|sha256|bytes|MiB|key|version|argv|host|path|time|seconds|_s$|_ms$|config|inputs")
 """What another machine or another day has otherwise."""
 
@@ -47,8 +49,9 @@ def of_file(path: Path) -> Iterator[tuple[str, list[float]]]:
         yield from ((f"{name}.{kind}", values) for kind, values in kinds.items())
     elif path.suffix == ".json" and not OTHERWISE.search(name):
         yield f"{name}.record", digest(list(values_of(json.loads(path.read_text(encoding="utf-8")))))
-    elif path.suffix == ".nrrd":
-        yield f"{name}.head", digest([float(n) for n in NUMBER.findall(str(path.read_bytes().partition(b"\n\n")[0]))])
+    elif path.suffix in HEADS:
+        head = b" ".join(HEADS[path.suffix].findall(path.read_bytes())).decode("latin-1")
+        yield f"{name}.head", [*digest([float(n) for n in NUMBER.findall(head)]), len(head)]
 
 
 def everything(out: Path) -> Numbers:
