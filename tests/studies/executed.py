@@ -80,7 +80,8 @@ def merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
         for line, found in lines.items():
             tests.setdefault(file, {}).setdefault(line, []).extend(found)
     both = old["lines"].keys() | new["lines"].keys()
-    lines = {file: max(run["lines"].get(file, (0, 0)) for run in (old, new)) for file in both}
+    # what was read back from a file has lists
+    lines = {file: max(tuple(run["lines"].get(file, (0, 0))) for run in (old, new)) for file in both}
     return {"tests": tests, "seconds": old["seconds"] | new["seconds"], "lines": lines}
 
 

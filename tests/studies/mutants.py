@@ -22,7 +22,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -36,7 +36,7 @@ NEIGHBOUR: dict[type, type] = {
     ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Add: ast.Sub, ast.Sub: ast.Add,
     ast.Mult: ast.Div, ast.Div: ast.Mult, ast.And: ast.Or, ast.Or: ast.And,
 }  # fmt: skip
-FEW, MOST = 8, 200
+FEW, NEAREST, MOST = 8, 2, 200
 SOLVER, PLAIN = "solver/_kernels/", "tests/numbers/test_solver.py"
 MEANT = b"was that meant?"
 """What the kept numbers say of a difference. An index beyond an array, which compiled code does not see, says more."""
@@ -100,17 +100,33 @@ def mutants_of(path: Path) -> Iterator[Mutant]:
 
 
 def tests_of(file: str) -> list[str]:
-    """For a line that no coverage sees, a kernel's: files that name the module or what is around it, nearest first."""
+    """For a line that no coverage sees, a kernel's: files that name the module or what is around it, nearest first.
+
+    A test names what its helpers name: those beside it that it imports.
+    """
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     found: list[str] = []
-    near = [p for p in sorted((ROOT / "tests").rglob("test_*.py")) if not {"studies", "bench"} & {*p.parts}]
+    texts = {
+        p.relative_to(ROOT): p.read_text(encoding="utf-8")
+        for p in sorted((ROOT / "tests").rglob("*.py"))
+        if not {"studies", "bench"} & {*p.parts}
+    }
     while "." in module:
-        package, _, name = module.rpartition(".")
-        wanted = re.compile(rf"{re.escape(module)}\b|from {re.escape(package)} import .*\b{name}\b")
-        named = (str(p.relative_to(ROOT)) for p in near if wanted.search(p.read_text(encoding="utf-8")))
-        found += [name for name in named if name not in found]
-        module = package
+        named = [*_naming(module, texts)]
+        named += [p for helper in named for p in _naming(".".join(helper.with_suffix("").parts), texts)]
+        tests = dict.fromkeys(str(p) for p in named if p.name.startswith("test_"))
+        found += [name for name in tests if name not in found]
+        module = module.rpartition(".")[0]
     return found or [f"tests/{module}"]
+
+
+def _naming(module: str, texts: Mapping[Path, str]) -> Iterator[Path]:
+    """The files whose text names a module."""
+    package, _, name = module.rpartition(".")
+    wanted = re.compile(
+        rf"{re.escape(module)}\b|from {re.escape(package)} import (?:[^\n(]*|\([^)]*)\b{re.escape(name)}\b"
+    )
+    yield from (path for path, text in texts.items() if wanted.search(text))
 
 
 def steps_of(mutant: Mutant, known: Executed) -> list[list[str]]:
@@ -118,7 +134,9 @@ def steps_of(mutant: Mutant, known: Executed) -> list[list[str]]:
     own = known.of(mutant.file, mutant.line)
     if not own:
         found, first = behind(mutant.file, mutant.line, known), [PLAIN] if mutant.file.startswith(SOLVER) else []
-        return [first, found[:MOST], found[MOST:], *([name] for name in tests_of(mutant.file))]
+        named = [[name] for name in tests_of(mutant.file)]
+        # what names the module is written for it; the others only come by, and may take all of the time
+        return [first, *named[:NEAREST], found[:MOST], found[MOST:], *named[NEAREST:]]
     # first the few quickest, then all that execute the line, then all in their files: these may share a fixture
     first = spread(own, known)[:FEW]
     return [first, [test for test in own if test not in first][:MOST], known.files(own)]
