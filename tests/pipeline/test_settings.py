@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pipeline.model import Curve, Lumen
 from pipeline.run.cache import Store
 from pipeline.run.hashing import file_hash
 from pipeline.run.store import digest, key_of
+from pipeline.run.sweep import unchanged
 from pipeline.segment import segment
 from pipeline.segment.config import SegmentConfig
 from pipeline.status import FrameStatus
@@ -126,3 +128,19 @@ def test_a_damaged_entry_counts_as_absent(tmp_path: Path, kept: int) -> None:
     assert store.get("trace", "ab" * 32) is None
     assert store.entries() == []
     assert Store(None).get("trace", "ab" * 32) is None
+
+
+@pytest.mark.parametrize(
+    ("setting", "frictions", "said"),
+    [
+        ("", [0.1, 0.1], "0.1"),
+        ("", [0.1, 0.2], ""),  # no one value is the plain run's
+        ("simulate.friction=0.3", [0.1, 0.2], "0.3"),
+        ("simulate.friction=0.0", [0.1], "0"),
+    ],
+)
+def test_the_plain_value_of_a_sweep_is_the_setting_or_what_all_cases_state(setting, frictions, said):
+    plain = resolve([parse_assignment(setting)] if setting else [])
+    cases = [SimpleNamespace(wall=SimpleNamespace(friction=f)) for f in frictions]
+    assert unchanged(plain, cases, "simulate.friction") == said
+    assert unchanged(plain, cases, "simulate.roll_offset_deg") == "0"

@@ -116,6 +116,9 @@ def main() -> int:
     parser.add_argument("--size", type=int, default=256, help="of its scans, voxels")
     parser.add_argument("--one-case", action="store_true", help="that row alone")
     given = parser.parse_args()
+    if os.environ.get("OMP_NUM_THREADS") != "1":
+        # the command sets it before it imports anything; here everything is imported before the command
+        raise SystemExit("set OMP_NUM_THREADS=1 first, or -j 1 has BLAS on several cores")
     for module in IMPORTED:
         import_module(module)
     with tempfile.TemporaryDirectory() as name:
