@@ -92,6 +92,18 @@ def test_texts_name_no_machine(path: Path) -> None:
     assert not found, "paths of one machine and registry hosts do not belong into the project"
 
 
+def test_a_stated_bound_is_the_bound() -> None:
+    """numpy adds 1e-7 of the value to ``atol`` unless told otherwise: 6e-6 mm of a wire beside a bound of 1e-9."""
+    wrong = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and "assert_allclose" in ast.unparse(node.func):
+                given = {keyword.arg for keyword in node.keywords}
+                if "atol" in given and "rtol" not in given and len(node.args) < 3:
+                    wrong.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert not wrong, "say rtol, too"
+
+
 def test_help_imports_nothing_heavy() -> None:
     """`wireval --help` must be instant: the command line imports a command's modules inside the command."""
     code = "import sys, pipeline.cli; pipeline.cli.parsers(); print(*sys.modules)"

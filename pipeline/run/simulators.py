@@ -139,7 +139,8 @@ def _pieces(parts: Sequence[Part], place: int, low: float, high: float) -> list[
 def _rows(head: dict[str, Any], found: Mapping[str, Sequence[Piece]], off: Set[str]) -> Iterator[dict[str, Any]]:
     """A row for each simulator in a bin; the nearest one that is not ``off`` also gets its lead and how sure it is."""
     mean = {name: sum(p.squares for p in pieces) / sum(p.points for p in pieces) for name, pieces in found.items()}
-    order = sorted(mean.keys() - off, key=lambda name: mean[name])
+    # of those that are the same but for rounding the first that was given, run after run
+    order = sorted((name for name in mean if name not in off), key=lambda name: float(f"{mean[name]:.6g}"))
     for name in found:
         row = head | {"simulator": name, "rms_mm": float(np.sqrt(mean[name])), "frames": len(found[name])}
         row |= {"lead": TIPS_OFF} if name in off else {}

@@ -70,7 +70,7 @@ def test_swc_becomes_a_smooth_way_with_its_branch(tmp_path: Path) -> None:
 def test_slicer_curves_are_read_in_lps(tmp_path: Path, system: str) -> None:
     write_curve(tmp_path / "a.mrk.json", system)
     tree = read_tree(tmp_path / "a.mrk.json")
-    np.testing.assert_allclose(tree.points_mm, TRUNK, atol=1e-9)
+    np.testing.assert_allclose(tree.points_mm, TRUNK, rtol=0.0, atol=1e-9)
 
 
 def test_bad_anatomies_are_refused_by_name(tmp_path: Path) -> None:
@@ -88,7 +88,7 @@ def test_smoothing_keeps_ends_and_never_folds() -> None:
     rng = np.random.default_rng(1)
     points = np.cumsum(rng.normal([0, 0, 1.5], 1.0, (20, 3)), axis=0)
     tube = smooth_tube("t", points, np.full(20, 1.2))
-    np.testing.assert_allclose(tube.points_mm[[0, -1]], points[[0, -1]], atol=1e-9)
+    np.testing.assert_allclose(tube.points_mm[[0, -1]], points[[0, -1]], rtol=0.0, atol=1e-9)
     bend = np.linalg.norm(np.gradient(tube.tangents, tube.step_mm, axis=0), axis=1)
     assert np.max(bend * tube.radii_mm) < 1.0
 
@@ -108,7 +108,9 @@ def test_iso_wall_of_a_ball_is_its_distance() -> None:
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     for radius in (3.5, 4.0, 4.6):
         value, slope = wall.distance_and_gradient([1.1, -2.1, 3.05] + radius * direction)
-        np.testing.assert_allclose(value, radius - 4.0, atol=0.06)  # a tenth of a voxel: what a threshold is worth
+        np.testing.assert_allclose(
+            value, radius - 4.0, rtol=0.0, atol=0.06
+        )  # a tenth of a voxel: what a threshold is worth
         assert np.median(np.sum(slope * direction, axis=1)) == pytest.approx(1.0, abs=0.02)
 
 
@@ -120,7 +122,7 @@ def test_iso_wall_gradient_is_its_derivative() -> None:
     for a in range(3):
         step = 1e-5 * np.eye(3)[a]
         change = (wall.distance_and_gradient(points + step)[0] - wall.distance_and_gradient(points - step)[0]) / 2e-5
-        np.testing.assert_allclose(slope[:, a], change, atol=1e-6)
+        np.testing.assert_allclose(slope[:, a], change, rtol=0.0, atol=1e-6)
 
 
 def test_wire_painted_into_a_scan_lies_in_its_vessel(tmp_path: Path) -> None:
@@ -222,4 +224,4 @@ def test_a_jagged_centreline_is_smoothed_until_its_tube_does_not_fold_and_no_fur
     sharpest = [np.max(np.linalg.norm(np.gradient(t.tangents, t.step_mm, axis=0), axis=1)) for t in (first, beyond)]
     assert sharpest[1] < sharpest[0] < 1.0 / 2.0, "a tube of 2 mm folds where it bends more"
     for tube in same:
-        np.testing.assert_allclose(tube.points_mm, first.points_mm, atol=1e-9)
+        np.testing.assert_allclose(tube.points_mm, first.points_mm, rtol=0.0, atol=1e-9)

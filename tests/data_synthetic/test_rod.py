@@ -37,7 +37,7 @@ def straight_shape(rod: Rod) -> object:
 )
 def test_elastica_under_a_dead_tip_load(alpha: float, x: float, y: float) -> None:
     tip = cantilever(200, load_N=alpha * STIFFNESS / LENGTH**2).shape.points[-1] / LENGTH
-    np.testing.assert_allclose(tip, [x, y, 0.0], atol=1e-4)  # a tenth of the 0.1 % asked for
+    np.testing.assert_allclose(tip, [x, y, 0.0], rtol=0.0, atol=1e-4)  # a tenth of the 0.1 % asked for
 
 
 def test_elastica_converges_in_second_order() -> None:
@@ -55,7 +55,7 @@ def test_rest_circle_is_free_of_force_and_energy() -> None:
     e = cantilever(400, rest=curvature)
     angle = curvature * LENGTH
     np.testing.assert_allclose(
-        e.shape.points[-1], [np.sin(angle) / curvature, (1 - np.cos(angle)) / curvature, 0], atol=5e-4
+        e.shape.points[-1], [np.sin(angle) / curvature, (1 - np.cos(angle)) / curvature, 0], rtol=0.0, atol=5e-4
     )
     assert e.energy_N_mm < 1e-15
 
@@ -63,9 +63,9 @@ def test_rest_circle_is_free_of_force_and_energy() -> None:
 def test_cells_average_a_jump_exactly() -> None:
     profile = ((0.0, 0.1), (8.0, 0.1), (8.0, 0.0))
     means = cell_means(profile, np.array([0.0, 7.5, 9.0]), np.array([1.0, 8.5, 10.0]))
-    np.testing.assert_allclose(means, [0.1, 0.05, 0.0], atol=1e-15)
+    np.testing.assert_allclose(means, [0.1, 0.05, 0.0], rtol=0.0, atol=1e-15)
     tapered = cell_means(((0.0, 0.5), (30.0, 5.0)), np.array([0.0, 29.0]), np.array([2.0, 31.0]))
-    np.testing.assert_allclose(tapered, [0.65, 0.5 * (4.925 + 5.0)], atol=1e-12)
+    np.testing.assert_allclose(tapered, [0.65, 0.5 * (4.925 + 5.0)], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("depth", [2.0, 7.31, 50.0])
@@ -120,7 +120,7 @@ def test_wall_forces_and_clamp_balance(bend: Anatomy) -> None:
 def test_rolling_by_half_a_turn_mirrors_a_planar_insertion(bend: Anatomy) -> None:
     """A bend in x-z and a hook in y: rolls of +90 and -90 degrees are mirror images."""
     left, right = (next(iter(replay(insertion(bend, 0.4), [28.0], r))) for r in (90.0, -90.0))
-    np.testing.assert_allclose(left.points_mm * [1, -1, 1], right.points_mm, atol=1e-5)
+    np.testing.assert_allclose(left.points_mm * [1, -1, 1], right.points_mm, rtol=0.0, atol=1e-5)
     assert abs(left.points_mm[-1, 1]) > 0.3
 
 
@@ -138,4 +138,4 @@ def test_rigid_motion_moves_the_truth_along(bend: Anatomy) -> None:
     here = next(iter(replay(insertion(bend, 0.4), [25.0], 30.0)))
     moved = Anatomy(tuple(replace(t, points_mm=t.points_mm @ turn.T, tangents=t.tangents @ turn.T) for t in bend.tubes))
     there = next(iter(replay(insertion(moved, 0.4, material_axis=turn @ X), [25.0], 30.0)))
-    np.testing.assert_allclose(here.points_mm @ turn.T, there.points_mm, atol=1e-6)
+    np.testing.assert_allclose(here.points_mm @ turn.T, there.points_mm, rtol=0.0, atol=1e-6)

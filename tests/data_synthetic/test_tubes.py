@@ -25,13 +25,13 @@ def test_distance_of_a_tapered_tube_is_that_of_its_balls() -> None:
     points = np.random.default_rng(0).uniform(-3, 14, (300, 3))
     oracle = tube_distance(tube.points_mm, tube.radii_mm, points)
     # the oracle samples balls every 0.1 um; both splines interpolate the same samples
-    np.testing.assert_allclose(Anatomy((tube,)).distance(points), oracle, atol=2e-4)
+    np.testing.assert_allclose(Anatomy((tube,)).distance(points), oracle, rtol=0.0, atol=2e-4)
 
 
 def test_straight_tube_is_a_capsule() -> None:
     capsule = Anatomy((sweep("c", [[0, 0, 0], [0, 0, 10.0]], 2.0),))
     points = np.array([[3.0, 0, 5.0], [0, 1.0, 5.0], [0, 0, 13.0], [0, 4.0, -3.0]])
-    np.testing.assert_allclose(capsule.distance(points), [1.0, -1.0, 1.0, 3.0], atol=1e-9)
+    np.testing.assert_allclose(capsule.distance(points), [1.0, -1.0, 1.0, 3.0], rtol=0.0, atol=1e-9)
 
 
 def test_gradient_is_the_derivative(junction: Anatomy) -> None:
@@ -60,7 +60,7 @@ def test_smooth_union_only_adds_and_only_near_the_junction(junction: Anatomy) ->
     united = junction.distance(points)
     assert np.all(united <= nearest[0] + 1e-12)
     far = nearest[1] - nearest[0] > 0.6
-    np.testing.assert_allclose(united[far], nearest[0][far], atol=1e-12)
+    np.testing.assert_allclose(united[far], nearest[0][far], rtol=0.0, atol=1e-12)
     assert np.max(nearest[0] - united) <= 2 * 0.6 / 6 + 1e-12
 
 

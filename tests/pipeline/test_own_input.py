@@ -219,7 +219,7 @@ def test_curves_come_back_as_they_were_written(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]), encoding="utf-8")
     (tmp_path / "bare.csv").write_text("\n".join(lines), encoding="utf-8")
     for name in ("a.vtp", "a.mrk.json", "a.csv", "bare.csv"):
-        np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, atol=1e-6)
+        np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5"])
@@ -263,4 +263,4 @@ def test_the_distance_to_a_surface_of_large_triangles_is_that_to_the_solid_it_en
     exact = np.linalg.norm(np.maximum(away, 0.0), axis=-1) + np.minimum(away.max(axis=-1), 0.0)
     near = np.abs(exact) < 1.5
     # a spline of the distance rounds the edges, a tenth of a voxel here; a triangle that is missed leaves voxels
-    np.testing.assert_allclose(found.values[near], exact[near], atol=0.05)
+    np.testing.assert_allclose(found.values[near], exact[near], rtol=0.0, atol=0.05)

@@ -120,7 +120,7 @@ def test_motions_compose_and_undo() -> None:
     b = Motion.about([-4.0, 0.0, 1.0], [0.0, 0.3, 0.1], [0.0, 1.0, 0.0])
     points = np.random.default_rng(0).normal(size=(5, 3)) * 30
     np.testing.assert_allclose(a.then(b).moved(points), b.moved(a.moved(points)))
-    np.testing.assert_allclose(a.then(b.after(a)).moved(points), b.moved(points), atol=1e-12)
+    np.testing.assert_allclose(a.then(b.after(a)).moved(points), b.moved(points), rtol=0.0, atol=1e-12)
     scan = Volume(np.zeros((4, 5, 6), np.int16), np.array([0.3, 0.4, 0.5]), np.array([5.0, -7.0, 2.0]))
     voxel = np.array([1.0, 2.0, 3.0])
     np.testing.assert_allclose(a.moved(a.undone(scan).to_mm(voxel)), scan.to_mm(voxel))

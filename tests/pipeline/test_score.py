@@ -188,7 +188,9 @@ def test_a_wire_begins_at_the_clamps_plane() -> None:
     """Cut where its base passes it, continued back where it begins behind it; a wire that comes back is cut once."""
     wire = made()
     introducer = ENTRY - np.array([[30.0], [0.4]]) * ALONG
-    np.testing.assert_allclose(begun(np.concatenate([introducer, wire[1:]]), ENTRY, ALONG)[:2], wire[:2], atol=2e-3)
+    np.testing.assert_allclose(
+        begun(np.concatenate([introducer, wire[1:]]), ENTRY, ALONG)[:2], wire[:2], rtol=0.0, atol=2e-3
+    )
     late = begun(wire[3:], ENTRY, ALONG)
     assert (late[0] - ENTRY) @ ALONG == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_array_equal(late[1:], wire[3:])
@@ -278,7 +280,7 @@ def test_every_format_and_what_it_states(tmp_path: Path) -> None:
         path = tmp_path / place
         files = [Source(p) for p in ([path] if path.is_file() else sorted(path.iterdir()))]
         for found, wire in zip(read_wires(files, 2), wires, strict=True):
-            np.testing.assert_allclose(found.points_mm, wire, atol=1e-6, err_msg=place)
+            np.testing.assert_allclose(found.points_mm, wire, rtol=0.0, atol=1e-6, err_msg=place)
 
 
 def test_which_file_is_which_frame() -> None:
@@ -351,4 +353,4 @@ def test_the_adapters_of_the_manual(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     Path("trajectory").write_bytes(pickle.dumps({"obs": [], "info": info}))
     exec(script("cathsim"), {})
     found = read_wires([Source(Path(f"wire_00{n}.csv")) for n in (0, 1)], 2)
-    np.testing.assert_allclose(found[0].points_mm, 2 * wire, atol=1e-9)
+    np.testing.assert_allclose(found[0].points_mm, 2 * wire, rtol=0.0, atol=1e-9)

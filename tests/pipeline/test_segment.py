@@ -83,9 +83,9 @@ def test_memory_order_and_pose_do_not_change_the_lumen():
     turned = segment(Volume(grey, [VOXEL] * 3, turn @ origin, turn), curve[[200]] @ turn.T)
     assert plain.distance.shape == fortran.distance.shape
     near = np.abs(plain.distance.values) < 0.6
-    np.testing.assert_allclose(plain.distance.values[near], fortran.distance.values[near], atol=2e-2)
-    np.testing.assert_allclose(plain.distance.values, turned.distance.values, atol=1e-6)
-    np.testing.assert_allclose(turned.distance.origin_mm, turn @ plain.distance.origin_mm, atol=1e-9)
+    np.testing.assert_allclose(plain.distance.values[near], fortran.distance.values[near], rtol=0.0, atol=2e-2)
+    np.testing.assert_allclose(plain.distance.values, turned.distance.values, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(turned.distance.origin_mm, turn @ plain.distance.origin_mm, rtol=0.0, atol=1e-9)
 
 
 def test_background_is_not_visited():

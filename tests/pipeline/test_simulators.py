@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
-from pipeline.run.simulators import side_by_side, write_comparison
+from pipeline.run.simulators import Piece, _rows, side_by_side, write_comparison
 from reports import tables
 from reports.schema import ERRORS, POINTS, SUMMARY, WHERE
 from reports.simulators import _where, render_simulators
@@ -189,6 +189,14 @@ def test_simulators_of_different_settings_are_not_compared(tmp_path: Path) -> No
     said = side_by_side(tmp_path, {"one": one, "other": other}, embed=False)
     assert "Nothing is pooled" in said[0]
     assert pd.read_csv(tmp_path / "simulators.csv")["against"].isna().all()
+
+
+@pytest.mark.parametrize("first", [1.0, 1.0 + 1e-12, 1.0 - 1e-12])
+def test_of_a_tie_the_first_leads_run_after_run(first: float) -> None:
+    """Wires that were computed and the same ones read again differ by rounding: where.csv differed after a resume."""
+    found = {"own": [Piece("a", first, 4)], "wireval": [Piece("a", 1.0, 4)], "far": [Piece("a", 2.0, 4)]}
+    rows = list(_rows({}, found, set()))
+    assert [row["simulator"] for row in rows if "lead" in row] == ["own"]
 
 
 def test_the_same_twice_is_a_tie(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def test_a_path_goes_on_over_a_gap_whichever_way_its_pieces_run(turned):
     assert inside.min() > 8.0 - 1e-9
     assert inside.max() < 9.5 + 1e-9
     assert np.ptp(inside) > 1.0
-    np.testing.assert_allclose(path.points[:, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(path.points[:, :2], 0.0, rtol=0.0, atol=1e-12)
 
 
 def test_no_path_begins_far_from_the_entry_or_across_it():
@@ -54,4 +54,4 @@ def test_a_path_is_continued_straight_by_what_is_asked():
     points = np.outer(np.arange(0.0, 5.0, 0.1), [0.6, 0.0, 0.8])
     longer = extended(points, 2.0, 0.25)
     assert arc_length(longer)[-1] == pytest.approx(arc_length(points)[-1] + 2.0, abs=0.25)
-    np.testing.assert_allclose(longer[-1] / np.linalg.norm(longer[-1]), [0.6, 0.0, 0.8], atol=1e-12)
+    np.testing.assert_allclose(longer[-1] / np.linalg.norm(longer[-1]), [0.6, 0.0, 0.8], rtol=0.0, atol=1e-12)

@@ -28,7 +28,7 @@ TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 def test_curves_read_back(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray) -> None:
     folder = tmp_path_factory.mktemp("curve")
     export.write_markups_curve(folder / "w.mrk.json", points, "wire")
-    np.testing.assert_allclose(read_markups_curve(folder / "w.mrk.json"), points, atol=1e-6)
+    np.testing.assert_allclose(read_markups_curve(folder / "w.mrk.json"), points, rtol=0.0, atol=1e-6)
     export.write_polyline_vtp(folder / "w.vtp", points, {"error_mm": points[:, 0], "force_N": points})
     back = read_vtp(folder / "w.vtp")
     np.testing.assert_array_equal(back.points_mm, points)
@@ -113,13 +113,13 @@ def test_segmentations_keep_axes_and_geometry(tmp_path: Path) -> None:
     export.write_segmentation_nrrd(path, values, spacing, origin, TURN, segments=("lumen", "aneurysm sac"))
     back = read_segmentation_nrrd(path)
     np.testing.assert_array_equal(back.values, values)
-    np.testing.assert_allclose(back.direction, TURN, atol=1e-12)
+    np.testing.assert_allclose(back.direction, TURN, rtol=0.0, atol=1e-12)
     assert back.segments == ("lumen", "aneurysm sac")
     # the independent witness: ITK's own index -> LPS point of the voxel that is set
     image = sitk.ReadImage(str(path))
     assert image[1, 2, 3] == 1
     expected = np.array(origin) + TURN @ (np.array(spacing) * [1, 2, 3])
-    np.testing.assert_allclose(image.TransformIndexToPhysicalPoint((1, 2, 3)), expected, atol=1e-9)
+    np.testing.assert_allclose(image.TransformIndexToPhysicalPoint((1, 2, 3)), expected, rtol=0.0, atol=1e-9)
     header = path.read_bytes()[:4000]
     assert b"left-posterior-superior" in header
     assert b"Segment0_Name:=lumen" in header

@@ -161,7 +161,7 @@ def test_heat_map_shows_each_sample_at_its_place(tmp_path: Path) -> None:
     drawing = CASE_FIGURES["error_along_wire"](_heat_case(tmp_path))
     assert drawing is not None
     shown = drawing.table
-    np.testing.assert_allclose(shown["error_mm"], shown["arc_mm"] / 10, atol=0.5 / 10 / 2 + 1e-9)
+    np.testing.assert_allclose(shown["error_mm"], shown["arc_mm"] / 10, rtol=0.0, atol=0.5 / 10 / 2 + 1e-9)
     assert shown["frame"].unique().tolist() == [0, 2], "the frame without points stays empty"
     reach = shown.groupby("frame")["arc_mm"].max()
     assert reach[0] == 4.0
@@ -241,7 +241,7 @@ def test_curves_fall_on_the_voxels_they_run_through(direction: np.ndarray) -> No
         rows = (place[:, up] - bottom) / (top - bottom) * projected.shape[1]
         found = projected[np.floor(columns).astype(int), np.floor(rows).astype(int)]
         assert found.tolist() == [1, 1, 1]
-        np.testing.assert_allclose(columns % 1, 0.5, atol=1e-9)
+        np.testing.assert_allclose(columns % 1, 0.5, rtol=0.0, atol=1e-9)
     assert view.aligned == bool(np.array_equal(direction, np.eye(3)))
     assert ("LPS" in view.label(0)) or ("left" in view.label(0)) == view.aligned
 
@@ -472,7 +472,7 @@ def test_every_parameter_of_a_calibration_has_a_panel() -> None:
     assert panels["taper"].get_xydata().tolist() == [[0.9, 1.2], [1.0, 0.0], [1.1, 0.9]]
     assert panels["depth_offset_mm"].get_linestyle() == "--"
     values, rises = panels["depth_offset_mm"].get_xydata().T
-    np.testing.assert_allclose(rises, ((values - 1.0) / 0.1) ** 2, atol=1e-9)
+    np.testing.assert_allclose(rises, ((values - 1.0) / 0.1) ** 2, rtol=0.0, atol=1e-9)
     (entry,) = [entry for entry in declared("calibration") if entry["figure"] == "profiles"]
     assert "dashed curve" in caption(entry["read"], drawing.table)
     assert "dashed curve" not in caption(entry["read"], drawing.table.query("parameter == 'taper'"))

@@ -53,10 +53,10 @@ def test_rotation_series_meets_its_closed_form(q: float) -> None:
 
     s, a = sine_terms(q)
     b, da, db = jacobian_terms(q, s, a)
-    np.testing.assert_allclose((s, a, b), (series(1), series(2), series(3)), atol=2e-15)
+    np.testing.assert_allclose((s, a, b), (series(1), series(2), series(3)), rtol=0.0, atol=2e-15)
     # derivatives with respect to the angle, over the angle
     slopes = (-series(4, lambda n: 2 * n + 2), -series(5, lambda n: 2 * n + 2))
-    np.testing.assert_allclose((da, db), slopes, atol=1e-13)
+    np.testing.assert_allclose((da, db), slopes, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
@@ -66,7 +66,7 @@ def test_wall_takes_the_values_at_the_nodes_and_differentiates_its_own_interpola
     grid = Grid(rng.normal(size=(9, 8, 7)).astype(dtype), np.array([0.3, 0.5, 0.4]), rng.normal(size=3), turn)
     wall = VesselWall(grid, 1.0)
     nodes = np.argwhere(np.ones(grid.shape, bool))
-    np.testing.assert_allclose(wall.look_up(grid.to_mm(nodes))[0], grid.values[tuple(nodes.T)], atol=3e-6)
+    np.testing.assert_allclose(wall.look_up(grid.to_mm(nodes))[0], grid.values[tuple(nodes.T)], rtol=0.0, atol=3e-6)
     # beyond the faces as well: the continuation is linear along each axis
     points = grid.to_mm(rng.uniform(-1.5, 9.0, size=(200, 3)))
     _, gradient, hessian = wall.look_up(points)
@@ -75,8 +75,8 @@ def test_wall_takes_the_values_at_the_nodes_and_differentiates_its_own_interpola
         d = np.zeros(3)
         d[a] = step
         up, down = wall.look_up(points + d), wall.look_up(points - d)
-        np.testing.assert_allclose(gradient[:, a], (up[0] - down[0]) / (2 * step), atol=1e-6)
-        np.testing.assert_allclose(hessian[:, :, a], (up[1] - down[1]) / (2 * step), atol=2e-5)
+        np.testing.assert_allclose(gradient[:, a], (up[0] - down[0]) / (2 * step), rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(hessian[:, :, a], (up[1] - down[1]) / (2 * step), rtol=0.0, atol=2e-5)
 
 
 def test_wall_bounds_hold_where_the_lumen_is() -> None:
@@ -265,7 +265,7 @@ def test_a_joints_block_is_judged_stiffened_and_solved_as_the_matrix_it_is(twist
         found = np.reshape(solve_stiffened(q, 0.7, twisting), (3, 3))
         inverse = np.zeros((3, 3))
         inverse[:size, :size] = -np.linalg.inv(stiffer[:size, :size])
-        np.testing.assert_allclose(found, inverse, atol=1e-9)
+        np.testing.assert_allclose(found, inverse, rtol=0.0, atol=1e-9)
 
 
 def test_frames_stay_turns_along_a_long_curve() -> None:
@@ -278,11 +278,14 @@ def test_frames_stay_turns_along_a_long_curve() -> None:
         s.x[1, j + 1] = s.x[1, j] + b.problem.chain.length[j] * np.array(way)
         s.u[1, j, 2] = 0.0
         aim(b.problem.chain, s.u[1], s.x[1], s.r[1], j)
-        np.testing.assert_allclose(s.r[1, j + 1, :, 2], way, atol=1e-13)
+        np.testing.assert_allclose(s.r[1, j + 1, :, 2], way, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(
-        s.r[1, : b.k + 1].transpose(0, 2, 1) @ s.r[1, : b.k + 1], np.eye(3)[None].repeat(b.k + 1, 0), atol=1e-13
+        s.r[1, : b.k + 1].transpose(0, 2, 1) @ s.r[1, : b.k + 1],
+        np.eye(3)[None].repeat(b.k + 1, 0),
+        rtol=0.0,
+        atol=1e-13,
     )
     # the controls alone lead to the same wire
     s.u[0, : b.k], s.r[0, 0], s.x[0, 0] = s.u[1, : b.k], s.r[1, 0], s.x[1, 0]
     place(b.problem.chain, s, 0, b.k)
-    np.testing.assert_allclose(s.x[0, : b.k + 1], s.x[1, : b.k + 1], atol=1e-11)
+    np.testing.assert_allclose(s.x[0, : b.k + 1], s.x[1, : b.k + 1], rtol=0.0, atol=1e-11)

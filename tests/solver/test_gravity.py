@@ -50,7 +50,7 @@ def test_a_cantilever_under_its_weight_is_met_at_second_order(load: float) -> No
         solution = relax(wire, depth_mm=length, entry_direction=[1, 0, 0], down=[0, 0, -1])
         assert solution.converged
         errors.append(np.hypot(solution.joints_mm[-1, 0] - x, -solution.joints_mm[-1, 2] - y) / length)
-    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, atol=0.1)
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2.0, rtol=0.0, atol=0.1)
     assert errors[0] < 3e-3
 
 
@@ -89,7 +89,7 @@ def test_a_naive_chain_hangs_alike() -> None:
         return energy(controls, bend, twist, rest, length, base, entry, None, 0.0, 0.18, load) - hanging
 
     controls, least = minimum(k, 3, total, np.zeros((k, 3)))
-    np.testing.assert_allclose(solution.joints_mm, joints_of(controls, rest, length, base, entry), atol=2e-5)
+    np.testing.assert_allclose(solution.joints_mm, joints_of(controls, rest, length, base, entry), rtol=0.0, atol=2e-5)
     assert solution.energy_N_mm == pytest.approx(least, abs=1e-9)
 
 
@@ -102,7 +102,7 @@ def test_forces_balance_and_the_hand_feels_the_change_of_energy(walled: bool) ->
     *_, before, here, after = push.to_depths([10.0, 20.0, 30.0, depth - step, depth, depth + step])
     assert here.converged
     force = here.contact_force_N.sum(axis=0) + 2e-4 * depth * down + here.reaction_force_N
-    np.testing.assert_allclose(force, 0.0, atol=1e-7)
+    np.testing.assert_allclose(force, 0.0, rtol=0.0, atol=1e-7)
     slope = (after.energy_N_mm - before.energy_N_mm) / (2 * step)
     assert here.push_force_N == pytest.approx(slope, abs=1e-6)
 
@@ -113,7 +113,7 @@ def test_a_wire_lies_on_the_bottom_of_a_horizontal_tube() -> None:
     *_, solution = push.to_depths([20.0, 40.0, 55.0])
     assert solution.converged
     # it comes down from the axis within (72 EI h / w)^¼ = 13 mm
-    np.testing.assert_allclose(solution.contact_force_N[25:45], [[0.0, -5e-3, 0.0]] * 20, atol=5e-6)
+    np.testing.assert_allclose(solution.contact_force_N[25:45], [[0.0, -5e-3, 0.0]] * 20, rtol=0.0, atol=5e-6)
 
 
 def test_a_rigid_motion_far_from_the_origin_moves_the_answer() -> None:
@@ -132,7 +132,7 @@ def test_a_rigid_motion_far_from_the_origin_moves_the_answer() -> None:
     moved = {name: turn @ v + shift * (name == "entry_mm") for name, v in where.items()}
     there = relax(wire, depth_mm=60.0, **moved)
     assert here.status is there.status is Status.CONVERGED
-    np.testing.assert_allclose(here.joints_mm @ turn.T + shift, there.joints_mm, atol=1e-6)
+    np.testing.assert_allclose(here.joints_mm @ turn.T + shift, there.joints_mm, rtol=0.0, atol=1e-6)
     assert here.energy_N_mm == pytest.approx(there.energy_N_mm, rel=1e-9)
 
 

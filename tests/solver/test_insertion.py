@@ -31,7 +31,7 @@ def test_slide_and_translate_reach_the_same_minimum() -> None:
         last(Insertion(GuideWire(1.0, 0.18, 10.0), wall, [0, 0, 0], [0, 0, 1], initial=way), np.arange(1.0, 56.0))
         for way in ("slide", "translate")
     ]
-    np.testing.assert_allclose(shapes[0].joints_mm, shapes[1].joints_mm, atol=1e-5)
+    np.testing.assert_allclose(shapes[0].joints_mm, shapes[1].joints_mm, rtol=0.0, atol=1e-5)
 
 
 def test_retraction_returns_along_the_same_states_without_friction() -> None:
@@ -42,7 +42,7 @@ def test_retraction_returns_along_the_same_states_without_friction() -> None:
     assert all(s.converged for s in solutions)
     for into, out in zip(solutions[: len(depths) - 1], solutions[: len(depths) - 1 : -1], strict=True):
         assert into.depth_mm == out.depth_mm
-        np.testing.assert_allclose(into.joints_mm, out.joints_mm, atol=1e-4)
+        np.testing.assert_allclose(into.joints_mm, out.joints_mm, rtol=0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize(("roll", "side"), [(0.0, 1.0), (180.0, -1.0)])
@@ -158,7 +158,7 @@ def test_skips_change_nothing_and_are_counted(skip: str) -> None:
     # look-ups are skipped exactly; iterations are saved within the solver's tolerance
     tolerance = 1e-12 if skip in EXACT else 1e-6
     for with_skip, without in zip(*both, strict=True):
-        np.testing.assert_allclose(with_skip.joints_mm, without.joints_mm, atol=tolerance)
+        np.testing.assert_allclose(with_skip.joints_mm, without.joints_mm, rtol=0.0, atol=tolerance)
     if skip in EXACT:
         assert all(a.energy_N_mm == b.energy_N_mm for a, b in zip(*both, strict=True))
     if skip in ("clearance", "cheap"):
@@ -182,7 +182,7 @@ def test_friction_and_twist_are_left_out_where_there_is_none(what: str) -> None:
     counts = [sum(s.work[counter] for s in run) for run in (without, with_it)]
     assert counts[0] > counts[1] == 0
     for a, b in zip(without, with_it, strict=True):
-        np.testing.assert_allclose(a.joints_mm, b.joints_mm, atol=1e-6)
+        np.testing.assert_allclose(a.joints_mm, b.joints_mm, rtol=0.0, atol=1e-6)
 
 
 def test_depth_zero_and_repeated_depths_are_no_work() -> None:

@@ -259,14 +259,14 @@ def test_a_wall_shifted_by_a_smooth_offset_is_the_wall_of_the_sum() -> None:
     points = wall.distance.to_mm(np.random.default_rng(0).uniform(-2.0, np.array(wall.distance.shape) + 1.0, (200, 3)))
     pairs = zip(shifted.look_up(points), whole.look_up(points), (1e-5, 1e-4, 1e-3), strict=True)
     for got, wanted, rounding in pairs:  # coefficients are float32: 1e-6 mm
-        np.testing.assert_allclose(got, wanted, atol=rounding)
+        np.testing.assert_allclose(got, wanted, rtol=0.0, atol=rounding)
     assert shifted.field.slope == pytest.approx(whole.field.slope, rel=1e-4)
     assert np.array_equal(np.asarray(wall.distance.values), values), "the wall that it is made from stays"
     wires = [
         next(Insertion(GuideWire(1.0, 0.18, 10.0), one, [0, 0, 0], [0, 0, 1]).to_depths([50.0]))
         for one in (shifted, whole, wall)
     ]
-    np.testing.assert_allclose(wires[0].joints_mm, wires[1].joints_mm, atol=1e-4)
+    np.testing.assert_allclose(wires[0].joints_mm, wires[1].joints_mm, rtol=0.0, atol=1e-4)
     assert np.abs(wires[0].joints_mm - wires[2].joints_mm).max() > 0.005  # fifty times the tolerance above
 
 

@@ -40,7 +40,7 @@ def test_lengths_are_exact_energy_falls_and_everything_is_finite(
         length = np.full(len(s.joints_mm) - 1, wire.segment_mm)
         length[0] = wire.segments_at(s.depth_mm)[1]
         got = np.linalg.norm(np.diff(s.joints_mm, axis=0), axis=1)
-        np.testing.assert_allclose(got, length, atol=1e-12 * max(1.0, np.abs(s.joints_mm).max()))
+        np.testing.assert_allclose(got, length, rtol=0.0, atol=1e-12 * max(1.0, np.abs(s.joints_mm).max()))
         assert s.energy_N_mm <= s.work["start_energy_N_mm"] + 1e-12
         for value in (s.energy_N_mm, s.push_force_N, s.reaction_torque_N_mm, s.max_penetration_mm):
             assert np.isfinite(value)
@@ -65,7 +65,7 @@ def test_a_rigid_motion_of_the_scene_moves_the_answer(
     # before the fork: beyond it rounding may choose the branch
     for a, b in zip(here, there, strict=True):
         assert a.status is b.status
-        np.testing.assert_allclose(a.joints_mm @ turn.T + shift, b.joints_mm, atol=1e-6)
+        np.testing.assert_allclose(a.joints_mm @ turn.T + shift, b.joints_mm, rtol=0.0, atol=1e-6)
 
 
 @CASES
@@ -77,4 +77,4 @@ def test_a_mirrored_scene_has_the_mirrored_answer(wire: GuideWire, stiffness: fl
     there = inserted(wire, fork_grid(), stiffness, np.eye(3), np.array([0.2, -0.1, 0.0]), -roll)[:8]
     for a, b in zip(here, there, strict=True):
         assert a.status is b.status
-        np.testing.assert_allclose(a.joints_mm @ mirror, b.joints_mm, atol=1e-5)
+        np.testing.assert_allclose(a.joints_mm @ mirror, b.joints_mm, rtol=0.0, atol=1e-5)

@@ -52,7 +52,7 @@ def test_friction_hides_no_snap() -> None:
     """What friction takes of the hand's work is no snap, and the rest is one: as good as none changes nothing."""
     none, hardly, some = caught(), caught(1e-9), caught(0.05)
     for one, other in zip(none, hardly, strict=True):
-        np.testing.assert_allclose(one.joints_mm, other.joints_mm, atol=1e-3)
+        np.testing.assert_allclose(one.joints_mm, other.joints_mm, rtol=0.0, atol=1e-3)
         assert one.uncertain == other.uncertain
         assert len(one.snaps) == len(other.snaps)
         for mine, same in zip(one.snaps, other.snaps, strict=True):
@@ -118,7 +118,7 @@ def turned(segment: float, stiffness: float, **how: float) -> list[Solution]:
 def test_only_what_long_and_short_steps_agree_on_is_certain() -> None:
     """Rounding decides to which side a straight wire turns: in one sphere both ways agree, by chance."""
     for mine, short in zip(turned(1.0, 1.0), turned(1.0, 1.0, step_mm=0.05), strict=True):
-        np.testing.assert_allclose(mine.joints_mm, short.joints_mm, atol=1e-4)
+        np.testing.assert_allclose(mine.joints_mm, short.joints_mm, rtol=0.0, atol=1e-4)
     assert any(mine.uncertain for mine in turned(1.0, 1.0))
     assert not any(mine.uncertain for mine in turned(1.0, 1.0)[:15])
     assert turned(1.0, 1.0, finest_mm=1.0)[-1].uncertain
