@@ -24,7 +24,8 @@ def writing(path: Path) -> Iterator[None]:
         raise
     except OSError as error:
         reason = error.strerror or str(error)
-        what = f"{path}: cannot be written: {reason}; make room or allow writing there"
+        do = "remove this folder, or give it another name" if path.is_dir() else "make room or allow writing there"
+        what = f"{path}: cannot be written: {reason}; {do}"
         raise WriteError(f"{what}, then give the same command again: what is finished is kept") from error
 
 

@@ -1,24 +1,37 @@
-"""Outputs stay where the user put them: no link in an output folder may lead out of it."""
+"""Outputs stay where the user put them: no link in an output folder leads out of it, nor to a case under two names."""
 
 import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-MOST_NAMED = 5
+from reports.case_files import listed
 
 
-def links_out(out: Path) -> list[str]:
-    """A sentence where links below ``out`` lead out of it: what is written through them would land elsewhere."""
-    root = out.resolve()
-    found = []
+def misleading_links(out: Path) -> list[str]:
+    """A sentence each on links below ``out`` that lead out of it, and on cases that are links to others within it.
+
+    What is written through the first would land elsewhere; a case behind a link would be counted under two names.
+    """
+    root, leading_out, twice = out.resolve(), [], []
+    for path in _links(out):
+        if not _target(path).is_relative_to(root):
+            leading_out.append(path)
+        elif path.parent.name == "cases":
+            twice.append(path)
+    return [
+        *_said(leading_out, f"{out}: links lead out of it", "outputs follow none: remove them, or name another -o"),
+        *_said(twice, f"{out}: a case is a link to another", "it would be counted twice: remove it"),
+    ]
+
+
+def _links(out: Path) -> Iterator[Path]:
     for folder, folders, files in os.walk(out, followlinks=False):
-        for name in (*folders, *files):
-            path = Path(folder, name)
-            if path.is_symlink() and not _target(path).is_relative_to(root):
-                found.append(f"{path} -> {path.readlink()}")
-    if not found:
-        return []
-    named = ", ".join(sorted(found)[:MOST_NAMED])
-    return [f"{out}: {len(found)} links lead out of it ({named}); outputs follow none: remove them, or name another -o"]
+        yield from (path for name in (*folders, *files) if (path := Path(folder, name)).is_symlink())
+
+
+def _said(links: Sequence[Path], what: str, do: str) -> list[str]:
+    named = listed(sorted(f"{path} -> {path.readlink()}" for path in links))
+    return [f"{what}: {named}; {do}"] * bool(links)
 
 
 def _target(path: Path) -> Path:

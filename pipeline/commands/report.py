@@ -38,7 +38,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.results import found_results
     from pipeline.run.sweep import found_heads, lost_points, write_sweep
     from reports.html import render_index
-    from reports.inside import links_out
+    from reports.inside import misleading_links
 
     found = found_results(args.out)
     if not found:
@@ -47,8 +47,8 @@ def main(args: argparse.Namespace) -> int:
         why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
         hint = next(iter(above), why)
         return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
-    if links_out(args.out):
-        return complain(links_out(args.out), str(args.out), "; nothing was drawn")
+    if misleading_links(args.out):
+        return complain(misleading_links(args.out), str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))

@@ -71,7 +71,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.coarse import too_coarse
-    from reports.inside import links_out
+    from reports.inside import misleading_links
     from reports.verdict import remarks, warned
 
     plan = _plan(args)
@@ -80,7 +80,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
             write_tests(args.junit, (), {})  # a build server expects the file
         say(_nothing(args.shard, plan))
         return 0
-    problems = links_out(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
+    problems = misleading_links(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
     problems += [p for point in plan.points for p in too_coarse(plan.cases, point.cheap.config)]
     if problems:
         raise InputError(list(dict.fromkeys(problems)))

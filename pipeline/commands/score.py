@@ -46,13 +46,15 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.run.simulators import side_by_side
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from reports.inside import misleading_links
     from reports.verdict import OURS, remarks
 
     plans = _plans(args)
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
     theirs = [f"{name}: {text}" for name, of in found.items() for text in of if text not in found[OURS]]
-    if found[OURS] or theirs:
-        raise InputError([*found[OURS], *theirs])
+    problems = [*misleading_links(args.out), *found[OURS], *theirs]
+    if problems:
+        raise InputError(problems)
     (args.out / "simulators").mkdir(parents=True, exist_ok=True)
     done = {}
     for name, plan in plans.items():

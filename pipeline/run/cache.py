@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -63,7 +64,7 @@ class Store:
         if path in _lumen:
             return _lumen[path]
         try:
-            result = decoded(stage, key, path.read_bytes())
+            result = decoded(stage, key, _content(path))
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -88,7 +89,7 @@ class Store:
                 temporary.write_bytes(encoded(key, result))
         except OSError as error:
             self._writable = False
-            self.warn(f"the cache keeps nothing from here on: {error}")
+            self.warn(f"the cache keeps nothing from here on: {error.__cause__ or error}")
 
     @staticmethod
     def _path(root: Path, stage: str, key: str) -> Path:
@@ -146,7 +147,7 @@ class Store:
             if path.name.startswith(".") or path.suffix != ".result":
                 continue
             try:
-                decoded(path.parent.parent.name, path.stem, path.read_bytes())
+                decoded(path.parent.parent.name, path.stem, _content(path))
                 whole += 1
             except (OSError, *NOT_A_RESULT):
                 damaged.append(path)
@@ -182,7 +183,16 @@ def _seal(key: str, body: bytes) -> bytes:
     return hashlib.sha256(key.encode() + body).digest()
 
 
+def _content(path: Path) -> bytes:
+    """The bytes of a stored result; ValueError where a folder stands in its place."""
+    if path.is_dir():
+        raise ValueError("it is a folder")
+    return path.read_bytes()
+
+
 def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
     with suppress(OSError):
         path.unlink(missing_ok=True)
 

@@ -14,11 +14,12 @@ from pipeline.calibrate.trials import Trial, depths_at
 from pipeline.calibrate.unknowns import Unknown, unknowns
 from pipeline.run.cache import Store
 from pipeline.run.calibrated import data_of
+from pipeline.run.inputs import Inputs
 from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.load import each_frame
-from pipeline.status import InputError
+from pipeline.status import InputError, StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
@@ -75,8 +76,12 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
     kept, trials, stated, voxels, left_out, notes = [], [], [], [], [], []
     for case in cases:
         log = Log(lambda *_: None)
-        run = Context(case, config, store, log, until="trace")
+        run = Context(case, config, store, log, until="trace", inputs=Inputs.of(case))
         known = run_stages(run)
+        try:
+            run.inputs.require_unchanged()
+        except StageError as error:
+            known = known.failed("load", error)
         frames = [frame for frame in known.frames if frame.trusted_curve is not None]
         notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
         if known.failure is not None or len(frames) < LEAST_FRAMES:

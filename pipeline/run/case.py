@@ -16,12 +16,14 @@ from pipeline.run import ledger, outputs, results
 from pipeline.run.cache import Store
 from pipeline.run.hashing import hashing
 from pipeline.run.helpers import nothing, shared
+from pipeline.run.inputs import Inputs
 from pipeline.run.log import CaseProgress, Log, Stage
 from pipeline.run.occupied import held
 from pipeline.run.provenance import code_state, package_version, peak_memory_mib, this_run
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import code_of, digest
 from pipeline.run.view import LumenFiles, write_view
+from pipeline.status import StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -109,6 +111,7 @@ def _why_again(job: Job, key: str) -> str | None:
 def run_case(job: Job) -> None:
     """Run one case. Failures are recorded in its folder; only a bug or a full disk raises an exception."""
     progress = CaseProgress(job.label, job.folder / "log.txt", quiet=job.quiet, verbose=job.verbose)
+    inputs = Inputs.of(job.case)
     with hashing(_files(job.case), job.cores) as hashed, held(job.folder, progress.warn):
         again: str | None = ""
         if not job.fresh and ledger.read(job.folder) is not None:
@@ -121,7 +124,7 @@ def run_case(job: Job) -> None:
         progress.start()
         if again:
             progress.warn(again)
-        _compute(job, hashed, progress)
+        _compute(job, hashed, inputs, progress)
 
 
 def _files(case: Case) -> list[Path]:
@@ -130,18 +133,24 @@ def _files(case: Case) -> list[Path]:
     return list(dict.fromkeys(s.path for s in sources if s is not None and s.path.exists()))
 
 
-def _compute(job: Job, hashed: Callable[[], None], progress: CaseProgress) -> None:
+def _compute(job: Job, hashed: Callable[[], None], inputs: Inputs, progress: CaseProgress) -> None:
     log = Log(progress)
     store, files = Store(job.cache, progress.warn), LumenFiles(job.folder / "view")
     begin = files.begin if job.pictures and job.cores > 1 else nothing
-    run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, begin)
+    run = Context(job.case, job.settings.config, store, log, job.cores, job.until, hashed, inputs, begin)
     if run.goes_to("simulate"):
         load_kernels(progress)
     clock = perf_counter()
     try:
         known = run_stages(run)
         hashed()
-        _write(job, known, log, files, clock)
+        result = _written(job, known, log, files, clock)
+        try:
+            inputs.require_unchanged()  # now that its key is made: that, too, is of the files as they were
+        except StageError as error:
+            result = _written(job, known.failed("load", error), log, files, clock)
+        result.write(job.folder)
+        ledger.write(job.folder, result.key)
     finally:
         files.end()
     if job.wants_pages:
@@ -189,8 +198,8 @@ def _write_tables(job: Job, known: Known) -> tuple[dict[str, Any], str]:
     return summary, job.key
 
 
-def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) -> None:
-    """Write every file of the case but its pages; the ledger last, since it says that they are complete.
+def _written(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) -> results.Result:
+    """Write the tables, arrays and views of a case; returns its result.
 
     files : of the lumen, which may be written already.
     """
@@ -206,8 +215,7 @@ def _write(job: Job, known: Known, log: Log, files: LumenFiles, clock: float) ->
     results.write_json(job.folder / ledger.PROVENANCE, this_run() | {"reused": log.reused})
     details = results.details_of(job.case, known, log) | ({"simulator": job.simulator} if job.simulator else {})
     details |= {"until": job.until, "config": job.settings.as_dict(), "provenance": code_state()}
-    results.result_of(job.case, known, summary, key, details).write(job.folder)
-    ledger.write(job.folder, key)
+    return results.result_of(job.case, known, summary, key, details)
 
 
 @functools.cache

@@ -11,6 +11,7 @@ from pipeline.compare.intervals import in_words
 from pipeline.run.aggregate import Totals
 from pipeline.run.launch import Plan
 from pipeline.run.overall import shared_scans
+from pipeline.run.provenance import command_line
 from pipeline.run.results import found_results
 from pipeline.run.sweep import heads_of, lost_points
 from reports.alike import alike
@@ -19,7 +20,7 @@ from reports.origin import mixed_settings
 from reports.schema import SWEEP
 from reports.sweep import silent_points
 from reports.tables import read_if_there
-from reports.verdict import in_short, next_command, typed, worse_sentence
+from reports.verdict import in_short, next_command, worse_sentence
 
 
 def failure_lines(plan: Plan, then: str = "") -> list[str]:
@@ -54,7 +55,7 @@ def _failure(row: Mapping[str, Any]) -> str:
 
 def _next(plan: Plan, cases: Sequence[str]) -> str:
     """What to do about failures; where the manifest was inferred, it must first be written to be corrected."""
-    again = next_command(cases, typed(plan.out))
+    again = next_command(cases, command_line())
     if plan.inferred_from is None:
         return f"do what the message says, then {again}"
     folder = shlex.quote(str(plan.inferred_from))

@@ -15,6 +15,7 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
+from pipeline.run import ledger
 from pipeline.run.aggregate import Totals, aggregate
 from pipeline.run.batch import run_all
 from pipeline.run.cache import Store, forget_lumen
@@ -193,6 +194,10 @@ def run_cases(plan: Plan, jobs: Sequence[Job]) -> None:
             if outcome.error:
                 _write_lost(outcome)
             watch.finished(outcome.job, outcome.error)
+    for job in jobs:
+        if not (job.folder / ledger.RESULT).exists():
+            why = f"{job.folder}: its result was removed while the run went on"
+            _write_lost(Outcome(job, None, why, why, "removed"))
 
 
 def _write_lost(outcome: Outcome[Job, None]) -> None:

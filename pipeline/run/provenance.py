@@ -53,10 +53,15 @@ def code_state() -> dict[str, Any]:
     }
 
 
+def command_line() -> list[str]:
+    """The command of this run, as it was typed."""
+    return [Path(sys.argv[0]).name, *sys.argv[1:]]
+
+
 def this_run() -> dict[str, Any]:
     """Command line, machine and time of this run: what no result depends on, and what differs in every run."""
     return {
-        "argv": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "argv": command_line(),
         "host": platform.node(),
         "system": platform.platform(),
         "processor": _processor(),

@@ -14,7 +14,7 @@ from pipeline.load import Scans
 from pipeline.register.frames import record
 from pipeline.run import ledger
 from pipeline.run.calibrated import data_of
-from pipeline.run.hashing import file_hash
+from pipeline.run.inputs import described
 from pipeline.run.log import Log
 from pipeline.run.occupied import owner_of
 from pipeline.run.outputs import failure_rows, message_of
@@ -23,7 +23,6 @@ from pipeline.run.stages.known import Frame
 from pipeline.run.store import digest
 from pipeline.status import FrameStatus
 from pipeline.study.manifest import Case
-from pipeline.study.sources import files_of
 from reports.atomic import write_text
 from reports.case_files import GOOD, find_cases
 
@@ -31,6 +30,7 @@ LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
+    "removed": "the case's result was removed while the run went on; give the same command again",
     "damaged": "a result file cannot be read; run the case again with --fresh",
 }
 """Statuses of a case that has no result of its own, each with its sentence."""
@@ -111,6 +111,10 @@ def _found(folder: Path) -> Result:
     except (ValidationError, OSError) as error:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         return lost(folder.name, "damaged", f"{path}: {why}")
+    if result.case != folder.name:
+        return lost(
+            folder.name, "damaged", f"{folder}: holds the result of case {result.case!r}; remove it or rename it so"
+        )
     # a case that went through the stages has a key; while a run is still at work on it, its ledger may be missing
     if written is None and result.key and not owner_of(folder):
         return lost(folder.name, "damaged", f"{folder}: {ledger.FILE} is missing or cannot be read; run the case again")
@@ -166,7 +170,7 @@ def details_of(case: Case, known: Known, log: Log) -> dict[str, Any]:
         "entry": clamp,
         **{name: value for name in ("down", "catheter") if (value := getattr(case, name)) is not None},
         "geometry": _geometry(known.scans),
-        "inputs": _inputs(case),
+        "inputs": described(case),
         "counters": log.counters,
         "chosen": log.chosen,
     }
@@ -194,23 +198,6 @@ def _geometry(scans: Scans | None) -> dict[str, Any]:
         return {}
     names = ("shape", "spacing_mm", "origin_mm", "direction", "pixel_type")
     return {name: getattr(scans.first, name) for name in names}
-
-
-def _inputs(case: Case) -> list[dict[str, Any]]:
-    """Every input file of a case, once: its key in the manifest, path, hash and size."""
-    named = {path: key for key, path in reversed(_files(case).items()) if path.exists()}
-    return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
-
-
-def _files(case: Case) -> dict[str, Path]:
-    """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows."""
-    others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
-    return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
-
-
-def _size(path: Path) -> int:
-    """Bytes of a file, or of all files of a folder."""
-    return sum(p.stat().st_size for p in path.rglob("*") if p.is_file()) if path.is_dir() else path.stat().st_size
 
 
 def jsonable(value: Any) -> Any:

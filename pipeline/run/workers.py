@@ -12,9 +12,9 @@ import resource
 import signal
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
-from contextlib import suppress
-from multiprocessing import connection, forkserver
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing import connection, forkserver, resource_tracker
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -138,12 +138,27 @@ def _start_server() -> None:
     one_thread()
     try:
         multiprocessing.get_context("forkserver").set_forkserver_preload([PRELOADED])
-        forkserver.ensure_running()
+        resource_tracker.ensure_running()  # it lets signals through again
+        with _interrupts_wait():
+            forkserver.ensure_running()
     finally:
         for name, value in before.items():
             os.environ.pop(name)
             if value is not None:
                 os.environ[name] = value
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Let Ctrl-C wait until the end of a block; processes that are begun in it never hear of it.
+
+    It reaches every process of a terminal, and the server would ignore it only once it has imported everything.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _serve(pipe: Any, work: Callable[[J], R]) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import shutil
 import signal
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -21,6 +23,7 @@ from pipeline.run import launch, ledger
 from pipeline.run.cache import Store
 from pipeline.run.occupied import held, owner_of
 from pipeline.run.outcome import Outcome
+from pipeline.run.stages import STEPS, Context, Known
 from reports import atomic
 from tests.studies.trees import differences
 
@@ -229,7 +232,7 @@ def test_a_store_that_cannot_be_written_costs_a_warning(
     assert differences(whole, tmp_path / "out") == []
 
 
-@pytest.mark.parametrize("how", ["altered", "cut", "of another"])
+@pytest.mark.parametrize("how", ["altered", "cut", "of another", "a folder"])
 def test_a_stored_result_that_was_changed_is_not_used(tmp_path: Path, how: str) -> None:
     said: list[str] = []
     mine = Store(tmp_path, said.append)
@@ -239,7 +242,11 @@ def test_a_stored_result_that_was_changed_is_not_used(tmp_path: Path, how: str) 
     content = first.read_bytes()
     place = content.index(np.eye(3).tobytes())
     altered = content[:place] + np.float64(1.5).tobytes() + content[place + 8 :]
-    first.write_bytes({"altered": altered, "cut": content[:-9], "of another": second.read_bytes()}[how])
+    if how == "a folder":
+        first.unlink()
+        (first / "within").mkdir(parents=True)
+    else:
+        first.write_bytes({"altered": altered, "cut": content[:-9], "of another": second.read_bytes()}[how])
     assert mine.get("trace", "a" * 64) is None
     assert "is not as it was written" in said[0]
     assert mine.get("trace", "b" * 64) is not None
@@ -332,3 +339,91 @@ def test_a_case_beyond_its_time_is_named_with_its_stage(
     failures = pd.read_csv(tmp_path / "out" / "failures.csv")
     assert list(failures["status"]) == ["over_limit"]
     assert "took longer than the 0.01 s" in failures["message"][0]
+
+
+UNTIL = ("--until", "compare")  # without pages, which are no matter here
+
+
+def changing(monkeypatch: pytest.MonkeyPatch, stage: str, change: Callable[[], object]) -> None:
+    """Let something happen right before a stage of the next run."""
+    step = STEPS[stage]
+
+    def changed(run: Context, known: Known) -> Known:
+        change()
+        return step(run, known)
+
+    monkeypatch.setitem(STEPS, stage, changed)
+
+
+@pytest.mark.parametrize(("stage", "how"), [("trace", "written to"), ("compare", "replaced"), ("trace", "its folder")])
+def test_a_scan_that_is_replaced_while_it_is_read_fails_its_case(
+    study: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str, how: str
+) -> None:
+    """The hash that is recorded would be that of the new file, and the numbers those of the old one, for good."""
+    own = Path(shutil.copytree(study, tmp_path / "study"))
+    scan, other = sorted((own / "frames").iterdir())
+    was = scan.read_bytes()
+
+    def replace() -> None:
+        if how == "written to":
+            scan.write_bytes(other.read_bytes())
+        elif how == "replaced":
+            shutil.copy2(other, own / "new.mha")
+            os.utime(own / "new.mha", ns=(0, scan.stat().st_mtime_ns))
+            (own / "new.mha").replace(scan)
+        else:
+            shutil.rmtree(scan.parent)
+            shutil.copytree(study / "frames", scan.parent)
+            scan.write_bytes(other.read_bytes())
+
+    store = tmp_path / "store"
+    monkeypatch.setenv("WIREVAL_CACHE", str(store))
+    with monkeypatch.context() as patch:
+        changing(patch, stage, replace)
+        assert run(own, tmp_path / "out", *UNTIL) == 1
+    result = json.loads((case_of(tmp_path / "out") / "result.json").read_text(encoding="utf-8"))
+    assert all(frame["status"] != "ok" for frame in result["frames"])
+    assert str(scan) in result["sentence"]
+    assert "give the same command again" in result["sentence"]
+    # nothing that was made of the old file is kept under the new one's name, and the other way round
+    scan.write_bytes(was)
+    assert run(own, tmp_path / "out", *UNTIL) == 0
+    assert run(own, tmp_path / "again", "--no-cache", *UNTIL) == 0
+    assert differences(tmp_path / "out", tmp_path / "again") == []
+
+
+def test_a_scan_that_is_gone_once_it_was_read_fails_nothing(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = Path(shutil.copytree(study, tmp_path / "study"))
+    changing(monkeypatch, "simulate", lambda: shutil.rmtree(own / "frames"))
+    assert run(own, tmp_path / "out", *UNTIL) == 0
+
+
+def test_a_result_that_is_removed_while_the_run_goes_on_is_missed(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of two cases the first is removed while the second is computed: not one case, all ok."""
+    two = Path(shutil.copytree(study, tmp_path / "two")) / "manifest.toml"
+    text = two.read_text(encoding="utf-8")
+    more = text[text.index("[[case]]") :].replace('id = "bifurcation"', 'id = "second"')
+    two.write_text(f"{text}\n{more}", encoding="utf-8")
+    first = case_of(tmp_path / "out")
+    changing(monkeypatch, "compare", lambda: (first / "result.json").exists() and shutil.rmtree(first))
+    assert run(two.parent, tmp_path / "out", *UNTIL) == 1
+    said = capsys.readouterr()
+    assert "2 cases, 4 frames: 2 ok" in said.out
+    assert "removed while the run went on" in said.err
+
+
+def test_a_result_under_another_name_is_not_counted(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(case_of(out), out / "cases" / "copy")
+    (out / "run.json").unlink()
+    assert main(["report", str(out), "--overview"]) == 1
+    assert "holds the result of case 'bifurcation'" in capsys.readouterr().err
+
+
+def test_a_folder_where_a_lock_is_meant_is_named(tmp_path: Path) -> None:
+    (tmp_path / ".at-work").mkdir()
+    with pytest.raises(atomic.WriteError, match="Is a directory; remove this folder"), held(tmp_path, print):
+        pass

@@ -8,7 +8,7 @@ import pandas as pd
 
 from pipeline.cli import main
 from reports import tables
-from reports.inside import links_out
+from reports.inside import misleading_links
 from reports.schema import SUMMARY
 from tests.pipeline.test_manifest import GOOD
 
@@ -31,8 +31,8 @@ def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None
     (out / "cases").mkdir(parents=True)
     elsewhere.mkdir()
     (out / "inner").symlink_to(out / "cases")
-    assert links_out(out) == []
-    assert links_out(tmp_path / "nothing") == []
+    assert misleading_links(out) == []
+    assert misleading_links(tmp_path / "nothing") == []
     (out / "cases" / "run1").symlink_to(elsewhere)
     (out / "loop").symlink_to(out / "loop")
     (tmp_path / "f.mha").touch()
@@ -40,3 +40,11 @@ def test_links_that_lead_out_are_refused(tmp_path: Path, capsys: object) -> None
     assert main(["run", str(tmp_path / "m.toml"), "-o", str(out), "--resume"]) == 2
     assert "links lead out of it" in capsys.readouterr().err  # type: ignore[attr-defined]
     assert list(elsewhere.iterdir()) == []
+
+
+def test_a_case_that_is_a_link_to_another_is_refused(tmp_path: Path) -> None:
+    """It would be pooled twice, under two names; what it held itself is gone."""
+    (tmp_path / "cases" / "b").mkdir(parents=True)
+    (tmp_path / "cases" / "a").symlink_to("b")
+    (told,) = misleading_links(tmp_path)
+    assert f"a case is a link to another: {tmp_path / 'cases' / 'a'} -> b; it would be counted twice" in told

@@ -1,8 +1,9 @@
 """Runs that are killed and resumed, against one that was not: ``make interrupt``.
 
 Half of the runs are ended at a random time, half as soon as a random file of the output is there; by SIGINT, SIGTERM
-or SIGKILL to the main process alone, with one worker, two, or four with a helper each, with and without a stage store.
-The same command again must leave the tree of the run that was never interrupted, file by file, timing files apart.
+or SIGKILL to the main process alone, or to every process of the terminal, as Ctrl-C sends it; with one worker, two, or
+four with a helper each, with and without a stage store. Nobody prints a traceback. The same command again must leave
+the tree of the run that was never interrupted, file by file, timing files apart.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ AFTER_S = 2.0
 
 @dataclass(frozen=True)
 class Trial:
-    """How a run is ended. after_s : at a time, or once the file ``there`` is."""
+    """How a run is ended.
+
+    after_s : at a time, or once the file ``there`` is.     all_of_them : every process, not the main one alone.
+    """
 
     number: int
     workers: int
@@ -37,6 +41,7 @@ class Trial:
     number_of_signal: int
     after_s: float
     there: str
+    all_of_them: bool
 
 
 def study(folder: Path) -> Path:
@@ -49,8 +54,11 @@ def study(folder: Path) -> Path:
     return manifest
 
 
-def started(words: list[str]) -> int:
-    """``wireval`` in a process of its own, in a session of its own; everything is imported already."""
+def started(words: list[str], said: Path) -> int:
+    """``wireval`` in a process of its own, in a session of its own; everything is imported already.
+
+    said : the file that its stderr goes to.
+    """
     process = os.fork()
     if process:
         return process
@@ -58,7 +66,7 @@ def started(words: list[str]) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell has what it starts with & ignore it
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
-    os.dup2(null, 2)
+    os.dup2(os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
     code = 99
     try:
         code = wireval(words)
@@ -118,24 +126,30 @@ def run_trial(trial: Trial, manifest: Path, root: Path, reference: Path) -> tupl
     os.environ["WIREVAL_CACHE"] = str(root / "store")
     shutil.rmtree(root / "store", ignore_errors=True)
     words = words_of(manifest, out, trial.workers, trial.store)
-    process, clock = started(words), time.monotonic()
+    said = root / "stderr"
+    process, clock = started(words, said), time.monotonic()
     while not is_due(trial, out, time.monotonic() - clock):
         if os.waitid(os.P_PID, process, os.WEXITED | os.WNOHANG | os.WNOWAIT):
             break
         time.sleep(0.002)
     workers = workers_of(process)
-    os.kill(process, trial.number_of_signal)
+    (os.killpg if trial.all_of_them else os.kill)(process, trial.number_of_signal)
     code, left_s = ended(process), outlived(workers)
     state = hashlib.sha256("".join(sorted(str(p) for p in out.rglob("*"))).encode()).hexdigest()[:6]
     # a signal that comes when all is written finds nothing to interrupt
     as_said = code == SIGNALS[signal.Signals(trial.number_of_signal)] or not differences(reference, out)
-    again = ended(started(words))
+    traced_back = b"Traceback" in said.read_bytes()
+    again = ended(started(words, said))
     wrong = differences(reference, out)
-    good = as_said and again == 0 and not wrong and left_s < AFTER_S
-    how = f"{signal.Signals(trial.number_of_signal).name} " + (trial.there or f"after {trial.after_s:.2f} s")
+    good = as_said and again == 0 and not wrong and left_s < AFTER_S and not traced_back
+    how = (
+        "all " * trial.all_of_them
+        + f"{signal.Signals(trial.number_of_signal).name} "
+        + (trial.there or f"after {trial.after_s:.2f} s")
+    )
     line = f"{trial.number:3d}  -j {trial.workers}  {how:55s} exit {code:4d}  "
     line += f"{len(workers)} workers gone after {left_s:.2f} s  files {state}  "
-    return good, line + ("equal" if good else f"WRONG: exit {again}, {wrong[:3]}")
+    return good, line + ("equal" if good else f"WRONG: exit {again}, {wrong[:3]}" + ", traceback" * traced_back)
 
 
 def trials(count: int, seed: int, files: list[str], lasts_s: dict[int, float]) -> list[Trial]:
@@ -148,6 +162,7 @@ def trials(count: int, seed: int, files: list[str], lasts_s: dict[int, float]) -
             draw.choice(list(SIGNALS)),
             draw.uniform(0.0, lasts_s[workers]),
             draw.choice(files) if number % 2 else "",
+            draw.random() < 0.5,
         )
         for number in range(count)
     ]
@@ -167,7 +182,7 @@ def main() -> int:
         for workers in (8, 2, 1):
             shutil.rmtree(reference, ignore_errors=True)
             clock = time.monotonic()
-            if ended(started(words_of(manifest, reference, workers, store=False))):
+            if ended(started(words_of(manifest, reference, workers, store=False), root / "stderr")):
                 return 1
             lasts_s[workers] = time.monotonic() - clock
         # the path of the output stands in no file

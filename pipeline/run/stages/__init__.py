@@ -36,7 +36,6 @@ def run_stages(run: Context) -> Known:
         try:
             known = step(run, known)
         except StageError as error:
-            frames = tuple(frame.failed(stage, error) for frame in known.frames)
             unseen = scan_at_entry(run, known) if known.lumen is None else None
-            return replace(known, frames=frames, failure=error, failed_stage=stage, at_entry=unseen)
+            return replace(known.failed(stage, error), at_entry=unseen)
     return known

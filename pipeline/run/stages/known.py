@@ -16,6 +16,7 @@ from pipeline.model import Array, Clamp, Curve, Lumen, OtherWire, Volume
 from pipeline.register import Registration
 from pipeline.run.cache import Store
 from pipeline.run.helpers import R, Work, nothing, said, shared
+from pipeline.run.inputs import ANY, Inputs
 from pipeline.run.log import STAGES, Log, Stage
 from pipeline.run.stages.before import ASKS, Before, is_asks
 from pipeline.run.store import key_of
@@ -136,6 +137,10 @@ class Known:
     failed_stage: str = ""
     at_entry: ScanCrop | None = None
 
+    def failed(self, stage: str, why: StageError) -> "Known":
+        """The same case with what ended it, which is every frame's failure."""
+        return replace(self, frames=tuple(f.failed(stage, why) for f in self.frames), failure=why, failed_stage=stage)
+
 
 @dataclass(frozen=True, eq=False)
 class Context:
@@ -143,6 +148,7 @@ class Context:
 
     cores : that the case may use.     until : the last stage that it goes through.
     hashed : waits until the files are hashed, so that forked processes inherit the hashes.
+    inputs : the case's files as they were when it began; nothing is stored that was made of others.
     lumen_known : called as soon as the lumen is what it will be, before the case is simulated.
     """
 
@@ -153,6 +159,7 @@ class Context:
     cores: int = 1
     until: Stage = "report"
     hashed: Callable[[], object] = nothing
+    inputs: Inputs = ANY
     lumen_known: Callable[[Lumen], object] = nothing
 
     def goes_to(self, stage: Stage) -> bool:
@@ -212,10 +219,11 @@ class Context:
             asked = previous is None or previous.asked
             with self.log.timed(stage, of_frame):
                 result = function(*volumes, **named, **({} if previous is None else {"previous": previous}))
-            if self.store.root and previous is not None and previous.asked and not asked:
-                self.store.put(stage, key, ASKS)
-                key = key_of(function, inputs, named, previous.curve)
-            self.store.put(stage, key, result)
+            if self.store.root and self.inputs.unchanged:
+                if previous is not None and previous.asked and not asked:
+                    self.store.put(stage, key, ASKS)
+                    key = key_of(function, inputs, named, previous.curve)
+                self.store.put(stage, key, result)
         else:
             result = cast(Result, kept)
             self.log.reused[stage] = self.log.reused.get(stage, 0) + 1

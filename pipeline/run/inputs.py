@@ -1,0 +1,88 @@
+"""The input files of a case: what result.json says of them, and whether they stayed as they were while it was computed.
+
+A scan that is replaced between reading and the end would be recorded with the hash of what nobody has read: the result
+would be taken for that of the new file, and kept.
+"""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.load import parts_of
+from pipeline.run.hashing import file_hash
+from pipeline.status import FrameStatus, StageError
+from pipeline.study.manifest import Case
+from pipeline.study.sources import files_of
+
+State = tuple[int, int, int]
+"""Size, time of the last change, and number on its disk: a file that replaces another one has a number of its own.
+
+The time of a folder changes with the files that are put into it."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The files of a case as they were when it began."""
+
+    states: dict[Path, State]
+
+    @classmethod
+    def of(cls, case: Case) -> "Inputs":
+        """The files of a case as they are now."""
+        return cls({path: state for path in _all_of(case) if (state := _state(path))})
+
+    def require_unchanged(self) -> None:
+        """StageError where a file is another one by now; one that is gone has been read, or its frame says so."""
+        for path, before in self.states.items():
+            now = _state(path)
+            if now and now != before:
+                what = f"{path} was written to, or replaced, while this case was computed from it"
+                do = "allowed: files that stay as they are; once it is complete, give the same command again"
+                raise StageError(FrameStatus.INPUT_CHANGED, f"{what} ({before[0]} bytes before, {now[0]} now); {do}")
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether every file is still as it was."""
+        with suppress(StageError):
+            self.require_unchanged()
+            return True
+        return False
+
+
+ANY = Inputs({})
+"""Files that nobody watches."""
+
+
+def described(case: Case) -> list[dict[str, Any]]:
+    """Every input file of a case, once: its key in the manifest, path, hash and size."""
+    named = {path: key for key, path in reversed(_named(case).items()) if path.exists()}
+    return [{"key": key, "path": str(p), "sha256": file_hash(p), "bytes": _size(p)} for p, key in named.items()][::-1]
+
+
+def _named(case: Case) -> dict[str, Path]:
+    """Input files by key: the case's own, another simulator's wires, and those of the case whose clamp it borrows."""
+    others = {} if case.simulated is None else files_of(case.simulated, "simulated.")
+    return files_of(case) | others | ({} if case.entry_case is None else files_of(case.entry_case, "entry."))
+
+
+def _all_of(case: Case) -> Iterator[Path]:
+    """Every file that is read for a case: folders with all that is in them, headers with what holds their voxels."""
+    for path in dict.fromkeys(_named(case).values()):
+        if path.exists():
+            yield from (path, *(path.rglob("*") if path.is_dir() else parts_of(path)))
+
+
+def _state(path: Path) -> State | None:
+    """The state of a file; None where it is not there."""
+    try:
+        stat = path.stat()
+    except OSError:
+        return None
+    return stat.st_size, stat.st_mtime_ns, stat.st_ino
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, or of all files of a folder."""
+    return sum(p.stat().st_size for p in path.rglob("*") if p.is_file()) if path.is_dir() else path.stat().st_size
