@@ -47,3 +47,12 @@ def test_another_scan_is_another() -> None:
     changed = first.values.copy()
     changed[3, 4, 5] += 1
     assert known_by(Volume(changed)) != known_by(first)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "int16", "uint16", "float32"])
+def test_a_scan_in_other_units_is_the_same_scan(kind: str) -> None:
+    """One insertion as raw values and in Hounsfield units counted as two, and one could be calibrated and judged."""
+    values = np.random.default_rng(2).integers(0, 99, (7, 9, 11))
+    keys = {known_by(Volume((gain * values + offset).astype(kind))) for gain in (1, 2) for offset in (0, 3, 50)}
+    assert len(keys) == 1
+    assert known_by(Volume(np.zeros((3, 3, 3), kind))) not in keys
