@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.guard import reachable, read_json, read_text, told
 from pipeline.load.outside import millimetres
+from pipeline.load.stated import stated_in
 from pipeline.load.surfaces import RAS_TO_LPS, read_vtp
 from pipeline.model import Array, Curve
 
@@ -28,7 +29,10 @@ def markups_in(path: Path) -> list[dict[str, Any]]:
     return [markup for markup in markups if markup.get("controlPoints")]
 
 
-SYSTEMS = {"LPS": 1.0, "1": 1.0, "RAS": RAS_TO_LPS, "0": RAS_TO_LPS}
+AS_THEY_ARE = np.ones(3)
+SYSTEMS: dict[str, NDArray[np.float64]] = {
+    "LPS": AS_THEY_ARE, "1": AS_THEY_ARE, "RAS": RAS_TO_LPS, "0": RAS_TO_LPS,
+}  # fmt: skip
 
 
 def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
@@ -92,7 +96,7 @@ READERS = {".csv": read_csv_points, ".vtp": read_vtp_points, ".mrk.json": read_m
 
 
 def read_curve(path: Path) -> Curve:
-    """One curve, LPS mm, ordered from entry to tip; its uncertainty is unknown (NaN).
+    """One curve, LPS mm, ordered from entry to tip; its uncertainty is unknown (NaN). A table is LPS mm, or says what.
 
     Repeated points are dropped. Raises LoadError for another kind of file, fewer than two points or a NaN.
     """
@@ -100,6 +104,9 @@ def read_curve(path: Path) -> Curve:
     if kind is None:
         raise refused(path, repr(path.suffix), ", ".join(READERS), "export the curve in one of these")
     points = READERS[kind](path)
+    if kind == ".csv":
+        space, unit = stated_in(path, kind)
+        points = points * SYSTEMS[space or "LPS"] * millimetres(path, unit or "mm")
     if len(points):
         reachable(path, points)
     if len(points):

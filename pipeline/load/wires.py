@@ -14,7 +14,8 @@ import numpy as np
 
 from pipeline.load.curves import READERS, read_csv_points
 from pipeline.load.geometry import LoadError, Source, refused, unusable
-from pipeline.load.surfaces import RAS_TO_LPS, space_of
+from pipeline.load.stated import stated_in
+from pipeline.load.surfaces import RAS_TO_LPS
 from pipeline.load.vtk import read_vtk_points
 from pipeline.model import Array
 
@@ -22,9 +23,6 @@ OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (*OF_KIND, *IN_HDF5)
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
-HEAD = 4096  # bytes of a file in which it says what it is
-_SPACE = re.compile(r"(?:SPACE|coordinateSystem)\"?\s*[:=]\s*\"?(LPS|RAS|[01]\b)", re.IGNORECASE)
-_UNIT = re.compile(r"(?:units?|coordinateUnits)\"?\s*[:=]\s*\"?([A-Za-z]+)|lengths in (\w+)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
     except LoadError as error:
         return OtherFile(path.name, problem=str(error).removeprefix(f"{path}: "), unclear=True)
     # all readers but that of tables convert a file that states RAS by themselves
-    turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not _stated(path, kind)[0])
+    turned = in_space == "RAS" and (OF_KIND[kind] is read_csv_points or not stated_in(path, kind)[0])
     factor = 1.0 if kind == ".mrk.json" else UNITS_MM[in_unit]  # the reader of .mrk.json converts units itself
     return _checked(path.name, points * factor * (RAS_TO_LPS if turned else 1.0))
 
@@ -124,7 +122,9 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
 def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
     """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
     agreed = []
-    for what, own, given, key in zip(("space", "unit"), _stated(path, kind), (space, unit), ("LPS", "mm"), strict=True):
+    for what, own, given, key in zip(
+        ("space", "unit"), stated_in(path, kind), (space, unit), ("LPS", "mm"), strict=True
+    ):
         if own and given and own != given:
             raise unusable(path, f"{what}: the file says {own}, stated was {given}; correct one of them")
         if not own and not given:
@@ -135,25 +135,6 @@ def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
     if agreed[1] not in UNITS_MM:
         raise unusable(path, f"unit {agreed[1]!r}; allowed: {', '.join(UNITS_MM)}")
     return agreed[0], agreed[1]
-
-
-def _stated(path: Path, kind: str) -> tuple[str, str]:
-    """Space and unit that a file states, or that its format implies; empty where neither says."""
-    with path.open("rb") as file:
-        head = file.read(HEAD).decode("latin-1")
-    default = ("", "")
-    if kind == ".csv":
-        rows = [line for line in head.splitlines() if line.strip()]
-        names = {c.strip().lower() for r in rows if not r.lstrip().startswith("#") for c in r.split(",")[:40]}
-        head = "\n".join(line for line in rows if line.lstrip().startswith("#"))
-        default = ("LPS", "mm") if {"x_mm", "y_mm", "z_mm"} <= names else ("", "")
-    else:
-        # 3D Slicer's files: LPS and mm unless they say otherwise; in VTK's it writes the space
-        slicer, vtk = kind == ".mrk.json", space_of(head.encode("latin-1"))
-        default = ("LPS" if slicer else vtk, "mm" if slicer or vtk else "")
-    space, unit = _SPACE.search(head), _UNIT.search(head)
-    said = {"1": "LPS", "0": "RAS"}.get(space[1], space[1].upper()) if space else default[0]
-    return said, (unit[1] or unit[2]).lower() if unit else default[1]
 
 
 def _checked(name: str, points: Array) -> OtherFile:

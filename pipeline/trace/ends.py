@@ -16,6 +16,9 @@ from pipeline.trace.tube import Tube
 EDGE_VOXELS = 2.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
 it at most (100 traces at 5 to 90 degrees, CNR 4 to 30; nearly all outside); tips in the scan are right to 0.4."""
+PADDED = 0.03
+"""Share of flat voxels around a curve's end (4 of 123) from which it ends at the padding around the reconstruction."""
+_AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract(p, 3)) <= 3.0], float) - 3.0
 MOST_APART = 3.0
 """Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
@@ -64,10 +67,25 @@ def _named(image: Subtraction, point: Array) -> str:
     return ", ".join(f"{x:.1f}" for x in image.world(point[None])[0])
 
 
-def _at_edge(image: Subtraction, point: Array) -> bool:
-    """Whether a point lies within EDGE_VOXELS of the end of the scan."""
-    index = point / image.spacing + image.region.corner
-    return bool(np.any((index < EDGE_VOXELS) | (index > np.array(image.scan.shape) - 1 - EDGE_VOXELS)))
+def _at_edge(image: Subtraction, points: Array) -> bool:
+    """Whether a curve (n, 3) ends within EDGE_VOXELS of the end of the scan, or of what was reconstructed of it."""
+    index = points / image.spacing + image.region.corner
+    shape = np.array(image.scan.shape)
+    if np.any((index[-1] < EDGE_VOXELS) | (index[-1] > shape - 1 - EDGE_VOXELS)):
+        return True
+    # a scan without any noise is flat beside the rest of the wire, too
+    return _flat_near(image, index[-1]) > PADDED and _flat_near(image, index[len(index) // 2]) <= PADDED
+
+
+def _flat_near(image: Subtraction, index: Array) -> float:
+    """Share of the voxels about a place of the scan that are to the last bit what all six beside them are.
+
+    Noise makes none; outside the cylinder that a scanner reconstructs there is one grey.
+    """
+    grey, around = image.scan.values, np.rint(index + _AROUND).astype(int)
+    around = np.clip(around, 1, np.array(image.scan.shape) - 2)
+    beside = (grey[tuple((around + step).T)] for step in (*np.eye(3, dtype=int), *-np.eye(3, dtype=int)))
+    return float(np.mean(np.all([one == grey[tuple(around.T)] for one in beside], axis=0)))
 
 
 def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, float]:
@@ -103,7 +121,7 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
         (missing_mm > 0.0, FrameStatus.TRACE_AMBIGUOUS,
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
          "look whether the picture shows more of it, or correct opacity in the manifest"),
-        (_at_edge(image, points[-1]), FrameStatus.TRACE_LEFT_SCAN,
+        (_at_edge(image, points), FrameStatus.TRACE_LEFT_SCAN,
          f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
          "leave this frame out, or scan a larger field"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,

@@ -222,10 +222,24 @@ def test_curves_come_back_as_they_were_written(tmp_path):
         np.testing.assert_allclose(read_curve(tmp_path / name).points_mm, points, rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5"])
+@pytest.mark.parametrize(
+    ("said", "turned", "factor"),
+    [("# space: RAS", -1, 1), ("# space: LPS\n# unit: m", 1, 1000), ("# unit: cm\n# space: RAS", -1, 10)],
+)
+def test_a_table_says_its_space_and_unit(tmp_path, said, turned, factor):
+    """As wires of other simulators do: a traced curve in RAS was taken for LPS, 20 mm beside the vessel."""
+    points = np.array([[1.0, 2, 3], [4, 5, 6], [7, 8, 10]])
+    lines = [",".join(map(str, p)) for p in points]
+    (tmp_path / "a.csv").write_text("\n".join([said, "x,y,z", *lines]), encoding="utf-8")
+    np.testing.assert_allclose(read_curve(tmp_path / "a.csv").points_mm, points * factor * [turned, turned, 1])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x_mm,y_mm,z_mm\n1,2,3", "a,b\n1,2", "1,2,nan\n3,4,5", "# unit: foot\nx,y,z\n1,2,3\n4,5,6"]
+)
 def test_a_curve_that_is_none_is_refused(tmp_path, text):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(LoadError, match="expected"):
+    with pytest.raises(LoadError, match=r"expected|allowed"):
         read_curve(tmp_path / "a.csv")
 
 

@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays.cores import on_cores
+from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop
 from pipeline.load.lumens import read_lumen
+from pipeline.model import Lumen
 from pipeline.run.projections import slabs
 from pipeline.run.stages.known import Context, Known
 from pipeline.segment import segment
 from pipeline.segment.given import given_lumen
+from pipeline.segment.shown import beside_the_wall
 from pipeline.status import StageError
 from reports.frames_file import ScanCrop
 
@@ -22,6 +25,7 @@ def segment_vessel(run: Context, known: Known) -> Known:
         with log.timed("segment"):
             lumen = given_lumen(read_lumen(case.lumen, config.segment.least_voxels), config.segment)
         log.assumptions += lumen.warnings
+        log.warnings += _held_against(run, known, lumen)
         return replace(known, lumen=lumen)
     assert known.scans is not None
     scan = known.scans.first
@@ -36,6 +40,19 @@ def segment_vessel(run: Context, known: Known) -> Known:
     log.warnings += lumen.warnings
     log.progress("segment", 1, 1, f"{int(np.count_nonzero(lumen.distance.values < 0))} voxels")
     return replace(known, lumen=lumen)
+
+
+def _held_against(run: Context, known: Known, lumen: Lumen) -> list[str]:
+    """What the case's first scan, if it has one, says of the user's own lumen."""
+    scan = None if known.scans is None else known.scans.first
+    if scan is None:
+        return []
+    try:
+        shown = run.load(Crop(scan, scan.box_of(corners_mm(lumen.distance)), run.config.load))
+    except StageError:  # said where it is read to be traced
+        return []
+    with run.log.timed("segment"):
+        return beside_the_wall(lumen, shown)
 
 
 def scan_at_entry(run: Context, known: Known) -> ScanCrop | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -462,3 +462,18 @@ def touching(rng, seed):
 @case("plain, slices of 0.4 to 0.6 mm")
 def uneven_voxels(rng, seed):
     return Draft(rng, spacing=(0.3, 0.3, rng.uniform(0.4, 0.6))).scan((16, 8, 4)[seed % 3], reference=seed % 2 == 0)
+
+
+@case("wire out of the round field of view")
+def leaves_the_circle(rng, seed):
+    """What a scanner reconstructs is a cylinder in its box; around it there is one grey, in both scans."""
+    d = Draft(rng)
+    scene = d.scan((8, 16)[seed % 2], reference=seed % 4 < 3)
+    away = np.linalg.norm((scene.wire - scene.entry)[:, :2], axis=1)
+    reach = rng.uniform(0.5, 0.9) * away.max()
+    grid = scene.frame
+    at = [grid.origin_mm[k] + grid.spacing_mm[k] * np.arange(grid.shape[k]) - scene.entry[k] for k in (0, 1)]
+    out = np.hypot(*np.meshgrid(*at, indexing="ij"))[..., None] > reach
+    grey = (0.0, r.TISSUE, -1000.0)[seed // 4 % 3]
+    scans = [s and replace(s, values=np.where(out, grey, s.values)) for s in (scene.frame, scene.reference)]
+    return replace(scene, frame=scans[0], reference=scans[1])

@@ -1,0 +1,93 @@
+"""Whether a lumen that the user brings lies where a scan shows the vessel: larger, smaller, or moved aside.
+
+Grey across a wall is a blurred step. Where the wall is off by w along its outward normal n, grey is the step's at
+``d - w``, with d the given signed distance: w = larger + n . shift is found by least squares at voxels near the wall.
+"""
+
+import numpy as np
+from scipy import ndimage
+from scipy.special import ndtr
+
+from pipeline.arrays.grids import spread
+from pipeline.model import Array, Lumen, Volume
+
+NEAR_VOXELS = 3.0
+"""The most by which a wall is moved; voxels are looked at up to twice as far outside the given one."""
+CLEAR_VOXELS = 1.5
+"""Distance from a wall from which its blur leaves grey alone."""
+POINTS = 30_000
+LEAST_POINTS = 500
+BLUR_VOXELS = 0.9
+"""The scanner's blur as it is usual; twice as much moves nothing, as a step's middle stays where it is."""
+LEAST_NOISES = 2.0
+"""Contrast over a voxel's noise below which a scan is not asked."""
+ROUNDS = 8
+OFF_VOXELS = 0.5
+"""From here on the lumen is off: the wall of `segment` is found to 0.15 voxel, a map's staircase to 0.3."""
+
+
+def beside_the_wall(lumen: Lumen, scan: Volume) -> list[str]:
+    """A sentence where a lumen is larger, smaller or elsewhere than the vessel that a scan without wire shows."""
+    voxel = float(np.max(scan.spacing_mm))
+    points, normals, distance = _near(lumen, 2.0 * NEAR_VOXELS * voxel)
+    index = scan.to_index(points)
+    seen = np.all((index > 0) & (index < np.array(scan.shape) - 1), axis=1)
+    if np.count_nonzero(seen) < LEAST_POINTS:
+        return []
+    grey = ndimage.map_coordinates(scan.values, index[seen].T, order=1, output=np.float64)
+    found = _offset(grey, normals[seen], distance[seen] / voxel)
+    if found is None:
+        return []
+    larger, shift = found[0] * voxel, found[1:] * voxel
+    off = []
+    if abs(larger) > OFF_VOXELS * voxel:
+        off.append(f"{abs(larger):.2f} mm {'outside' if larger < 0 else 'inside'} the wall that the scan shows")
+    if np.linalg.norm(shift) > OFF_VOXELS * voxel:
+        away = ", ".join(f"{-s:.2f}" for s in shift)
+        off.append(f"({away}) mm (LPS) away from where the scan shows the vessel")
+    told = " and ".join(off)
+    return [f"the given lumen lies {told}: check its registration, its unit and how it was segmented"] * bool(off)
+
+
+def _near(lumen: Lumen, reach_mm: float) -> tuple[Array, Array, Array]:
+    """Voxel centres (n, 3) inside and near the wall, LPS mm, with outward normal (n, 3) and signed distance (n,)."""
+    grid = lumen.distance
+    near = np.flatnonzero(grid.values < reach_mm)
+    index = np.stack(np.unravel_index(near[:: max(1, len(near) // POINTS)], grid.shape), axis=1)
+    index = index[np.all((index > 0) & (index < np.array(grid.shape) - 1), axis=1)]
+    slope = [
+        (grid.values[tuple((index + step).T)] - grid.values[tuple((index - step).T)]) / grid.spacing_mm[axis]
+        for axis, step in enumerate(np.eye(3, dtype=int))
+    ]
+    normals = np.stack(slope, axis=1).astype(float) @ grid.direction.T
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    return grid.to_mm(index), normals, grid.values[tuple(index.T)].astype(float)
+
+
+def _offset(grey: Array, normals: Array, distance: Array) -> Array | None:
+    """By how much the seen wall lies outside the given one, and its shift (3,), all in voxels; None where unseen."""
+    design = np.concatenate([np.ones((len(grey), 1)), normals], axis=1)
+    found = np.zeros(4)
+    for _ in range(ROUNDS):
+        from_wall = distance - design @ found
+        levels = _levels(grey, from_wall)
+        if levels is None:
+            return None
+        inside, outside = levels
+        at = from_wall / BLUR_VOXELS
+        rest = (grey - outside) / (inside - outside) - ndtr(-at)
+        kept = np.abs(rest) < 3.0 * max(spread(rest), 1e-6)  # a bone, another vessel, a wire
+        slope = (np.exp(-0.5 * at**2) / (BLUR_VOXELS * np.sqrt(2.0 * np.pi)))[kept, None] * design[kept]
+        known = slope.T @ slope
+        known += 1e-3 * np.trace(known) * np.eye(4)  # a straight tube does not show where along itself it lies
+        found = np.clip(found + np.linalg.solve(known, slope.T @ rest[kept]), -NEAR_VOXELS, NEAR_VOXELS)
+    return found
+
+
+def _levels(grey: Array, from_wall: Array) -> tuple[float, float] | None:
+    """Grey inside and outside a wall; None where it is no step that could be told from noise."""
+    deep, out = from_wall < -CLEAR_VOXELS, from_wall > CLEAR_VOXELS
+    if min(np.count_nonzero(deep), np.count_nonzero(out)) < LEAST_POINTS // 10:
+        return None
+    inside, outside = float(np.median(grey[deep])), float(np.median(grey[out]))
+    return None if abs(inside - outside) < LEAST_NOISES * spread(grey[out]) else (inside, outside)
