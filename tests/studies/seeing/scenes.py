@@ -477,3 +477,12 @@ def leaves_the_circle(rng, seed):
     grey = (0.0, r.TISSUE, -1000.0)[seed // 4 % 3]
     scans = [s and replace(s, values=np.where(out, grey, s.values)) for s in (scene.frame, scene.reference)]
     return replace(scene, frame=scans[0], reference=scans[1])
+
+
+@case("a piece of wire in the reference, where the wire ends")
+def left_in_reference(rng, seed):
+    d = Draft(rng, radius=2.2, room=0.8)
+    scene = d.scan((8, 16)[seed % 2])
+    piece = d.path[-round(rng.uniform(5.0, 10.0) / 0.05) :: 6]
+    left = r.METAL * r.wire(d.lattice, piece, d.wire_radius, np.ones(len(piece)))
+    return replace(scene, reference=replace(scene.reference, values=scene.reference.values + left))
