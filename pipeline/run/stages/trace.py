@@ -23,6 +23,7 @@ from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.repeated import known_by, once
 from pipeline.run.stages.thickness import too_thin
+from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
@@ -55,6 +56,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
+    run.log.warnings += wire_in_reference(run, work.reference, known.lumen)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
