@@ -14,6 +14,7 @@ from pipeline.arrays.grids import unflattened
 from pipeline.model import Array, Lumen, Volume
 from pipeline.register.rigid import Motion, edge_mask, rigid
 from pipeline.register.shift import StaticPoints, fit_motion, static_points
+from pipeline.register.slide import hidden, slid
 from solver.grid import Grid
 
 __all__ = ["Anchor", "Motion", "Registration", "anchor", "register"]
@@ -31,6 +32,8 @@ LEAST_POINTS = 200
 """Fewer points show no motion."""
 BAND_VOXELS = 2.0
 """How far from the wall the first look's points lie: a blurred wall is as wide."""
+LOOSE_MM = 0.5
+"""Motion that the frame does not show from which that is said: a tip of a well traced wire is known to 0.1 mm."""
 BAD_MISFIT_VOXELS = 0.6
 """Residual of the first look from which it is not believed: a wall elsewhere altogether leaves more than 1."""
 
@@ -41,6 +44,11 @@ class Anchor:
 
     reference: Volume
     wall: StaticPoints
+
+    @cached_property
+    def hides(self) -> bool:
+        """Whether the wall may move in some way, as a straight tube along itself, without its scans showing it."""
+        return len(self.wall.points_mm) >= LEAST_POINTS and hidden(self.wall)
 
     @cached_property
     def edges(self) -> NDArray[np.bool_]:
@@ -59,7 +67,8 @@ class Registration:
 
     moved_voxels : largest displacement of a wall point.  left_voxels : what a fit of the wall alone still asks for.
     misfit_voxels : residual of that fit, as the uncertainty of one point.  centre_shift_mm : (3,) of the
-    wall's centroid; the motion's own shift is that of the world's origin, which may be far away.
+    wall's centroid; the motion's own shift is that of the world's origin, which may be far away.  loose_mm : how far
+    along (or about) itself the vessel may have moved besides, and the frame shows it as well.
     """
 
     motion: Motion = field(default_factory=Motion)
@@ -68,6 +77,7 @@ class Registration:
     left_voxels: float = 0.0
     misfit_voxels: float = 0.0
     centre_shift_mm: Array = field(default_factory=lambda: np.zeros(3))
+    loose_mm: float = 0.0
 
     @property
     def trusted(self) -> bool:
@@ -87,8 +97,14 @@ class Registration:
         shift = ", ".join(f"{s:.3f}" for s in self.centre_shift_mm)
         return (
             f"registered: phantom moved by ({shift}) mm and {self.motion.angle_deg:.2f} degrees, "
-            f"{self.moved_voxels:.2f} voxel at most; {self.left_voxels:.2f} voxel left"
+            f"{self.moved_voxels:.2f} voxel at most; {self.left_voxels:.2f} voxel left{self.doubt}"
         )
+
+    @property
+    def doubt(self) -> str:
+        """What the vessel does not show of the motion, where it is more than LOOSE_MM; empty where nothing."""
+        said = f"; along, or about, itself the vessel may lie {self.loose_mm:.1f} mm off: the frame shows no difference"
+        return said * (self.loose_mm > LOOSE_MM)
 
 
 def _thinned(grid: Grid, mask: NDArray[np.bool_], count: int) -> Array:
@@ -134,11 +150,11 @@ def register(frame: Volume, to: Anchor, skip_voxels: float) -> Registration:
     moved = _largest(look.motion, wall)
     if moved < skip_voxels and look.misfit_voxels < BAD_MISFIT_VOXELS:
         return Registration(moved_voxels=moved, left_voxels=moved, misfit_voxels=look.misfit_voxels)
-    motion = _best(frame, to)
+    motion, loose = slid(frame, to.structures, _best(frame, to))
     last = fit_motion(frame, wall, motion, rounds=1)
     left = _largest(last.motion.after(motion), wall)
     if last.misfit_voxels > BAD_MISFIT_VOXELS:
         return Registration(moved_voxels=moved, left_voxels=left, misfit_voxels=last.misfit_voxels)
-    return Registration(
-        motion, True, _largest(motion, wall), left, last.misfit_voxels, motion.displacement_mm(wall.centre_mm)
-    )
+    shift = motion.displacement_mm(wall.centre_mm)
+    loose_mm = loose * wall.voxel_mm
+    return Registration(motion, True, _largest(motion, wall), left, last.misfit_voxels, shift, loose_mm)

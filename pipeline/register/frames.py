@@ -8,6 +8,11 @@ from pipeline.model import Lumen, Volume
 from pipeline.register import Anchor, Registration, anchor, register
 from pipeline.register.rigid import Motion
 
+HIDES = (
+    "the vessel's wall hardly shows a motion of the phantom along, or about, the vessel itself, as that of a straight "
+    "tube: it is taken to have made none; what it made is in lengths and depths"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
@@ -68,7 +73,7 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
         return [alignment.reason], []
     known = [(n, r) for n, r in found.items() if r is not None]
     still = [(r.moved_voxels, n) for n, r in known if not r.applied and r.trusted]
-    texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied]
+    texts = [f"frame {n}: {r.sentence}" for n, r in known if r.applied and not r.doubt]
     if still:
         most, where = max(still)
         texts.insert(
@@ -76,7 +81,9 @@ def sentences_of(alignment: Alignment, found: Mapping[int, Registration | None])
             f"no registration applied to {len(still)} of {len(found)} frames: the phantom moved {most:.2f} voxel at "
             f"most (frame {where}), below trace.register_skip_voxels = {alignment.skip_voxels}",
         )
-    return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted]
+    if alignment.anchor.hides and known:
+        texts.append(HIDES)
+    return texts, [f"frame {n}: {r.sentence}" for n, r in known if not r.trusted or (r.applied and r.doubt)]
 
 
 def record(found: Registration | None) -> dict[str, object] | None:

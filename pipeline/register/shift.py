@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.grids import MAD, in_memory_order
+from pipeline.arrays.grids import MAD, in_memory_order, unflattened
 from pipeline.arrays.jets import Blurred, jets_at, values_at
 from pipeline.model import Array, Volume
 from pipeline.register.rigid import Motion
@@ -21,9 +21,13 @@ BORDER_VOXELS = 3.0
 """Points nearer to the edge of a scan have no full Gaussian."""
 TUKEY = 4.685
 """Tukey's constant: 95 % as good as least squares where there is no metal, blind to residuals beyond 4.7 sd."""
-ABOVE_NOISE = 3.0
+ABOVE_NOISE = 1.5
 """Squared steepness along a direction, over what noise alone gives, from which it shows motion: a tube cut off by the
-scan's ends has none along its axis, and fits to noise were 0.4 voxel off."""
+scan's ends has none along its axis, and fits to noise were 0.4 voxel off. Gently curved ones have 2 to 3."""
+FLAT, FLAT_POINTS = 0.25, 4000
+"""Share of a scan's voxels that lie in nothing but noise at the least, and how many are looked at."""
+OF_FLAT = 1.2125
+"""That quantile of the squared length of three normal numbers."""
 METAL_SCALES = 5.0
 """Brighter than expected by this many scales is metal."""
 METAL_VOXELS = 4.0
@@ -48,7 +52,8 @@ STILL_VOXELS = 0.002
 @dataclass(frozen=True, eq=False)
 class StaticPoints:
     """Points (n, 3) LPS mm on structures that do not move against each other, with the reference's blurred grey (n,)
-    and its gradient (n, 3) per mm; blur_mm : of both; voxel_mm : the unit in which motion is judged.
+    and its gradient (n, 3) per mm; blur_mm : of both; voxel_mm : the unit in which motion is judged; noise : standard
+    deviation of each of the gradient's components by noise alone.
     """
 
     points_mm: Array
@@ -56,6 +61,7 @@ class StaticPoints:
     gradient: Array
     blur_mm: float
     voxel_mm: float
+    noise: float
 
     @property
     def centre_mm(self) -> Array:
@@ -94,28 +100,35 @@ def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
     voxel = float(np.min(grid.spacing_mm))
     field = Blurred(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel)
     jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
-    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel)
+    anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)
+    steep = jets_at(field, anywhere * grid.spacing_mm)[:, 1:4]
+    noise = float(np.sqrt(np.quantile(np.sum(steep**2, axis=1), FLAT) / OF_FLAT))
+    return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel, noise)
 
 
-def _seen(normal: Array, right: Array, scale: float) -> Array:
-    """Solve the 8 normal equations; of the six motions, those that the structures do not show stay zero."""
+def _seen(normal: Array, right: Array, scale: float, noise: float) -> Array:
+    """Solve the 8 normal equations; of the six motions, those that the structures do not show stay zero.
+
+    noise : of a gradient's component, per voxel.
+    """
     a, b, c = normal[:6, :6], normal[:6, 6:], normal[6:, 6:]
     to_grey = np.linalg.solve(c, np.column_stack([b.T, right[6:]]))
     power, axes = np.linalg.eigh(a - b @ to_grey[:, :6])
-    # the noise of a gradient, per voxel, is half that of the grey in a blur of one voxel, and the misfit has two scans'
-    noise = normal[7, 7] * scale**2 / 4.0
-    shown = power > max((scale / UNSEEN_VOXELS) ** 2, ABOVE_NOISE * noise, 1e-9 * power[-1])
+    shown = power > max((scale / UNSEEN_VOXELS) ** 2, ABOVE_NOISE * normal[7, 7] * noise**2, 1e-9 * power[-1])
     amounts = np.where(shown, axes.T @ (right[:6] - b @ to_grey[:, 6]) / np.where(shown, power, 1.0), 0.0)
     motion = axes @ amounts
     return np.concatenate([motion, to_grey[:, 6] - to_grey[:, :6] @ motion])
 
 
-def _reweighted(design: Array, grey: Array, used: NDArray[np.bool_]) -> tuple[Array, float, Array]:
-    """Robust solution of design @ x = grey, its scale (sd) and all residuals; points not ``used`` have no say."""
+def _reweighted(design: Array, grey: Array, used: NDArray[np.bool_], noise: float) -> tuple[Array, float, Array]:
+    """Robust solution of design @ x = grey, its scale (sd) and all residuals; points not ``used`` have no say.
+
+    noise : see ``_seen``.
+    """
     weights, solution, scale, residual = used.astype(float), np.zeros(8), 0.0, grey
     for _ in range(REWEIGHTS):
         weighted = design * weights[:, None]
-        solution = _seen(weighted.T @ design, weighted.T @ grey, scale)
+        solution = _seen(weighted.T @ design, weighted.T @ grey, scale, noise)
         residual = grey - design @ solution
         scale = MAD * float(np.median(np.abs(residual[used]))) + 1e-9
         weights = used * np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 0.0, None) ** 2
@@ -141,10 +154,10 @@ def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[A
     arm = (at_mm - motion.moved(s.centre_mm)) / radius
     design = np.column_stack([-h * gradient, -h * np.cross(arm, gradient), s.grey - s.grey.mean(), np.ones(len(grey))])
     slope = h * s.steepness
-    solution, scale, residual = _reweighted(design, grey, np.ones(len(grey), bool))
+    solution, scale, residual = _reweighted(design, grey, np.ones(len(grey), bool), h * s.noise)
     clear = ~near_metal(s.points_mm, residual > METAL_SCALES * scale, METAL_VOXELS * h)
     if MOST_METAL * len(grey) < np.count_nonzero(clear) < len(grey):
-        solution, scale, _ = _reweighted(design, grey, clear)
+        solution, scale, _ = _reweighted(design, grey, clear, h * s.noise)
     shown = LEAST_GAIN < solution[6] < 1.0 / LEAST_GAIN
     return solution[:6] * np.repeat([h, h / radius], 3), scale / max(slope, 1e-9) if shown else float("inf")
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+from scipy.special import ndtr
 
 from data_synthetic import catalogue
 from data_synthetic.catalogue.study import Study
@@ -16,6 +18,7 @@ from pipeline.register.frames import alignment_of, record, sentences_of
 from pipeline.register.rigid import rigid
 from pipeline.register.shift import fit_motion
 from pipeline.segment import segment
+from solver import Grid
 
 VOXEL = 0.5
 SKIP = 0.1
@@ -162,3 +165,31 @@ def test_a_tube_without_ends_does_not_show_that_it_slid() -> None:
         found = register(volume(study, study.frame(number)), to, SKIP)
         assert not found.applied
         assert found.moved_voxels < 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_vessel_that_slid_along_itself_is_found_or_said_to_be_loose(seed: int) -> None:
+    """Gently curved, and alone in its scans: least squares stopped 0.4 to 1.9 mm short, "0.00 voxel left"."""
+    z = np.linspace(-5.0, 40.0, 900)
+    axis = np.stack([2.5 * np.sin(z / 13.0 + seed), 2.0 * np.cos(z / 17.0 + 2.0 * seed), z], axis=1)
+    lattice = Grid(np.zeros((56, 56, 100), np.float32), np.full(3, 0.3), np.array([-8.4, -8.4, 2.0]))
+    points = lattice.to_mm(np.stack(np.meshgrid(*map(np.arange, lattice.shape), indexing="ij"), axis=-1).reshape(-1, 3))
+    rng = np.random.default_rng(seed)
+
+    def distance(curve: np.ndarray) -> np.ndarray:
+        found = cKDTree(curve).query(points, distance_upper_bound=4.0)[0]
+        return np.minimum(found, 4.0).reshape(lattice.shape) - 1.6
+
+    def scan(curve: np.ndarray) -> Volume:
+        grey = 100.0 + 1000.0 * ndtr(-distance(curve) / 0.25) + 25.0 * rng.normal(size=lattice.shape)
+        return Volume(grey.astype(np.int16), lattice.spacing_mm, lattice.origin_mm)
+
+    turn, shift = rng.normal(size=(2, 3))
+    turn, shift = np.radians(2.0) * turn / np.linalg.norm(turn), 2.0 * shift / np.linalg.norm(shift)
+    true = Motion.about([0.0, 0.0, 17.0], turn, shift)
+    fixed = anchor(scan(axis), Lumen(lattice.with_values(distance(axis).astype(np.float32))))
+    found = register(scan(true.moved(axis)), fixed, SKIP)
+    off = np.linalg.norm(found.motion.moved(fixed.wall.points_mm) - true.moved(fixed.wall.points_mm), axis=1)
+    assert found.applied
+    assert np.sqrt(np.mean(off**2)) < max(0.2, found.loose_mm)
+    assert ("along, or about, itself" in found.sentence) == (found.loose_mm > 0.5)

@@ -74,7 +74,11 @@ def test_what_can_be_seen_is_traced(case, seed):
         ("wire out of the scan at a shallow angle", 1, "TRACE_LEFT_SCAN"),
         ("wire out of the round field of view", 0, "TRACE_LEFT_SCAN"),  # cut where the padding begins, and ok
         ("wire out of the round field of view", 5, "TRACE_LEFT_SCAN"),
-        ("a piece of wire in the reference, where the wire ends", 2, "TRACE_AMBIGUOUS"),  # cut where that begins, and ok
+        (
+            "a piece of wire in the reference, where the wire ends",
+            2,
+            "TRACE_AMBIGUOUS",
+        ),  # cut where that begins, and ok
         ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
         ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
         ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
