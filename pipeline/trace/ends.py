@@ -4,17 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.arrays.jets import Blurred, values_at
-from pipeline.arrays.polyline import tip_tangent
 from pipeline.model import Array
 from pipeline.status import FrameStatus
+from pipeline.trace.ahead import dark_ahead, hidden_ahead
 from pipeline.trace.attempt import Attempt
 from pipeline.trace.onward import seen_outside
 from pipeline.trace.reach import end_range
 from pipeline.trace.section import fills_vessel
-from pipeline.trace.subtraction import CREST_VOXELS, Subtraction
+from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
-from pipeline.trace.ways import cone
 
 EDGE_VOXELS = 2.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
@@ -22,9 +20,6 @@ it at most (100 traces at 5 to 90 degrees, CNR 4 to 30; nearly all outside); tip
 PADDED = 0.03
 """Share of flat voxels around a curve's end (4 of 123) from which it ends at the padding around the reconstruction."""
 _AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract(p, 3)) <= 3.0], float) - 3.0
-HIDDEN, HIDDEN_VOXELS, HIDDEN_RAD = 0.4, 4, 0.5
-"""Share of the wire's brightness, and of the contrast medium's, that the reference has beyond the curve's end at the
-least, over what length, and how far off the curve's last direction."""
 MOST_APART = 3.0
 """Slice distance over pixel size from which no curve is accepted: of 22 wires in slices of 2 mm and pixels of 0.5 mm,
 with insertion_mm stated, 5 had the stated length and 3 of these were over 1.5 pixels off, at the tip or all along."""
@@ -94,25 +89,6 @@ def _flat_near(image: Subtraction, index: Array) -> float:
     return float(np.mean(np.all([one == grey[tuple(around.T)] for one in beside], axis=0)))
 
 
-def _hidden_beyond(image: Subtraction, points: Array) -> bool:
-    """Whether the reference, within the lumen ahead of a curve's end (n, 3), is as bright as the wire: it has one, too.
-
-    Subtraction leaves nothing there: a wire that reaches as far in the frame seems to end where that one begins.
-    """
-    h, inside, outside = image.voxel, *image.wall_greys
-    away = h * np.arange(2.0, 2.0 + HIDDEN_VOXELS)[:, None]
-    rays = np.stack(
-        [points[-1] + away * to for to in cone(tip_tangent(points, HIDDEN_VOXELS * h), HIDDEN_RAD, 0.5 * HIDDEN_RAD)]
-    )
-    rays = rays[(image.depth_at(rays.reshape(-1, 3)).reshape(rays.shape[:2]) < -h).all(axis=1)]
-    if image.modelled or not len(rays):
-        return False
-    ahead, frame = rays.reshape(-1, 3), Blurred(image.scan.values, image.spacing, CREST_VOXELS * h)
-    reference = values_at(frame, ahead + image.region.corner * image.spacing) - image.along(ahead)
-    least = HIDDEN * max(float(np.median(image.along(points))), abs(inside - outside))
-    return bool(reference.reshape(rays.shape[:2]).mean(axis=1).max() - inside > least)
-
-
 def _end_range(image: Subtraction, attempt: Attempt) -> tuple[float, float, float]:
     """How much further back and further on the wire may end, and the most that is allowed of either, mm.
 
@@ -147,11 +123,14 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
          "look whether the picture shows more of it, or correct opacity in the manifest"),
         (_at_edge(image, points), FrameStatus.TRACE_LEFT_SCAN,
-         f"a curve that ends at the edge of the scan, after {length_mm:.1f} mm", "a tip inside it",
-         "leave this frame out, or scan a larger field"),
-        (_hidden_beyond(image, points), FrameStatus.TRACE_AMBIGUOUS,
+         f"a curve that ends at the edge of the scan, or of what it shows (padding, saturated voxels), after "
+         f"{length_mm:.1f} mm", "a tip inside it", "leave this frame out, or scan a larger field"),
+        (hidden_ahead(image, points), FrameStatus.TRACE_AMBIGUOUS,
          "a line that goes on where the reference has one, too", "a reference without a wire, or any piece of one",
          "look at the reference; name another one, or none"),
+        (dark_ahead(image, points), FrameStatus.TRACE_AMBIGUOUS,
+         "a dark line ahead of the curve's end", "a tip with nothing beyond it",
+         "look whether the wire goes on, less dense than the contrast medium: its end is not seen then"),
         (max(back_mm, on_mm) > sure_mm, FrameStatus.TRACE_AMBIGUOUS,
          f"a faint end that may lie {back_mm:.1f} mm further back or {on_mm:.1f} mm further on",
          f"{sure_mm:.1f} mm", _against_dim_ends(attempt)),

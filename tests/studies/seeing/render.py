@@ -153,7 +153,7 @@ def _splat(out, lattice, points, mass):
     index = (points - lattice.origin) / lattice.spacing
     blur = lattice.blur * lattice.spacing.min() / lattice.spacing
     half = int(np.ceil(4 * blur.max())) + 1
-    keep = (mass > 0) & np.all((index > -half) & (index < np.array(lattice.shape) + half), axis=1)
+    keep = (mass != 0) & np.all((index > -half) & (index < np.array(lattice.shape) + half), axis=1)
     index, mass = index[keep], mass[keep]
     base = np.rint(index).astype(int)
     rows, weights = [], []

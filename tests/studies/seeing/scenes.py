@@ -486,3 +486,10 @@ def left_in_reference(rng, seed):
     piece = d.path[-round(rng.uniform(5.0, 10.0) / 0.05) :: 6]
     left = r.METAL * r.wire(d.lattice, piece, d.wire_radius, np.ones(len(piece)))
     return replace(scene, reference=replace(scene.reference, values=scene.reference.values + left))
+
+
+@case("an end of plastic, darker than the contrast medium")
+def dark_end(rng, seed):
+    d = Draft(rng, radius=2.2, room=0.6)
+    d.opacity = np.where(d.from_tip < rng.uniform(4.0, 8.0), -rng.uniform(0.2, 0.4), 1.0)
+    return d.scan((8, 16)[seed % 2], reference=seed % 4 < 2)
