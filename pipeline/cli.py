@@ -65,6 +65,7 @@ def parsers() -> tuple[Parser, dict[str, Parser]]:
     """The parser of the whole command line, and that of each verb by its name."""
     parser = Parser(
         prog="wireval",
+        allow_abbrev=False,
         description="Validate simulated guide wires against 3D scans.",
         epilog="Exit codes: 0 all ok; 1 some case failed or regressed; 2 input wrong, nothing run; 130 interrupted; "
         "143 terminated.",
@@ -77,7 +78,7 @@ def parsers() -> tuple[Parser, dict[str, Parser]]:
     verbs: dict[str, Parser] = {}
     for name in VERBS:
         verb = importlib.import_module(f"pipeline.commands.{name}")
-        verbs[name] = commands.add_parser(name, help=verb.HELP, description=verb.HELP)
+        verbs[name] = commands.add_parser(name, help=verb.HELP, description=verb.HELP, allow_abbrev=False)
         verb.add_arguments(verbs[name])
         for action in verbs[name]._actions:
             if action.type is Path:

@@ -237,4 +237,6 @@ def _list_in_words(node: Schema, definitions: Schema | None, how: Mapping[str, A
     least = "a list (not empty) of " if node.get("minItems") else "a list of "
     if "$comment" not in items and items.get("type") in SEVERAL and "pattern" not in items:
         return least + SEVERAL[items["type"]] + _limits(items, how["exact"])
-    return least + ("tables" if "$ref" in items else in_words(items, definitions, **how))
+    return least + (
+        "tables, each under its name in [[double brackets]]" if "$ref" in items else in_words(items, definitions, **how)
+    )

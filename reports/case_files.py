@@ -22,12 +22,15 @@ _MOST_NAMED = 5
 
 @dataclass(frozen=True, eq=False)
 class CaseFiles:
-    """What is on disk of one case; absent tables are empty, an absent result.json is an empty mapping."""
+    """What is on disk of one case; absent tables are empty, an absent result.json is an empty mapping.
+
+    samples : the compared points; None where they are not read.
+    """
 
     folder: Path
     result: Mapping[str, Any]
     errors: pd.DataFrame
-    points: pd.DataFrame
+    samples: pd.DataFrame | None
     timings: pd.DataFrame
     scan: ScanCrop | None
     frames: tuple[int, ...]
@@ -36,6 +39,11 @@ class CaseFiles:
     def name(self) -> str:
         """Identifier of the case; the folder's name where result.json is missing."""
         return str(self.result.get("case", self.folder.name))
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """Every compared point; read now where it was not with the rest, since it is by far the largest table."""
+        return tables.read_if_there(self.folder / POINTS.file, POINTS) if self.samples is None else self.samples
 
     @property
     def good(self) -> pd.DataFrame:
@@ -72,7 +80,7 @@ def read_case(folder: Path, points: bool = True, rest: bool = True) -> CaseFiles
     The page of a run needs neither.
     """
     errors = tables.read_if_there(folder / ERRORS.file, ERRORS)
-    samples = tables.read_if_there(folder / POINTS.file if points else None, POINTS)
+    samples = tables.read_if_there(folder / POINTS.file, POINTS) if points else None
     timings = tables.read_if_there(folder / TIMINGS.file if rest else None, TIMINGS)
     scan, numbers = _frames(folder / "frames.h5", rest)
     return CaseFiles(folder, read_json(folder / "result.json"), errors, samples, timings, scan, numbers)

@@ -18,7 +18,7 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
-    from pipeline.study.plausible import first_of, implausible, leads_out
+    from pipeline.study.plausible import first_of, implausible, leads_out, odd_depths
     from pipeline.study.same_scans import shared
     from reports.case_files import counted
 
@@ -28,7 +28,8 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
-    ways = [f"case {one.id!r}: {text}" for one in manifest.cases for text in leads_out(one, first_of(one, config))]
+    scans = [(one, first_of(one, config)) for one in manifest.cases]
+    ways = [f"case {one.id!r}: {t}" for one, scan in scans for t in (*leads_out(one, scan), *odd_depths(one, scan))]
     for note in (*implausible(manifest.cases), *ways, *shared(manifest.cases)):
         say(f"warning: {note}")
     frames = sum(case.frame_count for case in manifest.cases)

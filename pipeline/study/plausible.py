@@ -69,6 +69,22 @@ def leads_out(case: Case, header: Header | None) -> list[str]:
     ]
 
 
+SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
+"""Least depth that an insertion reaches, and most times that a vessel's way may be as long as its scan's diagonal."""
+
+
+def odd_depths(case: Case, header: Header | None) -> list[str]:
+    """A sentence where the stated depths are in another unit than mm. header : of a scan of the case."""
+    if not case.insertion_mm:
+        return []
+    deepest = max(case.insertion_mm)
+    diagonal = np.inf if header is None else float(np.linalg.norm(np.array(header.shape) * header.spacing_mm))
+    if SHALLOWEST_MM <= deepest <= LONGEST_WAY * diagonal:
+        return []
+    than = f"and the scan is {diagonal:.0f} mm across" if deepest > SHALLOWEST_MM else "no wire is seen to move by that"
+    return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm?"]
+
+
 def _to_the_edge(case: Case, header: Header, sign: float) -> float:
     """How far the scan reaches from the entry along its direction, or against it, mm."""
     points = np.asarray(case.entry_mm) + sign * np.outer([0.0, 1.0], case.entry_direction)

@@ -42,9 +42,7 @@ class Results:
     @property
     def points(self) -> pd.DataFrame:
         """Every compared point of all cases; read when asked for, since it is by far the largest table."""
-        return _of_all(
-            {name: tables.read_if_there(c.folder / POINTS.file, POINTS) for name, c in self.cases.items()}, POINTS
-        )
+        return _of_all({name: case.points for name, case in self.cases.items()}, POINTS)
 
     def __repr__(self) -> str:
         """What a prompt shows: where it lies, the counts, a row a case, no more than ten."""

@@ -17,7 +17,7 @@ from pipeline.compare.branches import branches_of
 from pipeline.compare.config import CompareConfig
 from pipeline.compare.metrics import Way, scored
 from pipeline.model import Curve, Lumen, arc_length
-from pipeline.run.stages.compare import _too_near
+from pipeline.run.stages.compare import _too_near, _truth_elsewhere
 from pipeline.run.stages.known import Frame
 from solver import Solution, Status
 from solver.grid import Grid
@@ -241,13 +241,23 @@ def test_the_distal_errors_are_of_the_last_millimetres() -> None:
     assert result["distal10_rms_mm"] > result["distal20_rms_mm"] > result["rms_mm"] > 0.0
 
 
-@pytest.mark.parametrize(("off_mm", "sigma_mm", "said"), [(4e-16, 0.05, 1), (0.02, 0.05, 0), (4e-16, np.nan, 0)])
+@pytest.mark.parametrize(
+    ("off_mm", "sigma_mm", "said"), [(4e-16, 0.05, 1), (0.02, 0.05, 0), (0.004, np.nan, 1), (0.02, np.nan, 0)]
+)
 def test_a_wire_that_lies_nearer_to_traces_than_these_are_known_is_no_news(
     off_mm: float, sigma_mm: float, said: int
 ) -> None:
-    """A simulator that handed the traces back came first, without a word. Own curves state no uncertainty."""
+    """A simulator that handed the traces back came first, without a word; so did own traces that were its wires."""
     curve = Curve(np.zeros((5, 3)), np.full(5, sigma_mm))
     errors = cast(Any, SimpleNamespace(error_mm=np.full(5, off_mm)))
     warnings = _too_near([Frame(0, curve=curve, comparison=errors), Frame(1)])
     assert len(warnings) == said
     assert all("made from the traces" in text for text in warnings)
+
+
+@pytest.mark.parametrize(("off_mm", "said"), [(0.05, 0), (17.0, 1)])
+def test_a_truth_that_lies_elsewhere_is_no_truth(off_mm: float, said: int) -> None:
+    """One in RAS gave trace_tip_mm of 48 mm beside wires that agreed to 0.07 mm, without a word."""
+    curve = Curve(np.array([[0.0, 0, 0], [0, 0, 1]]), np.full(2, 0.05))
+    frames = [Frame(n, curve=curve, truth={"trace_mean_mm": off_mm}) for n in range(3)]
+    assert len(_truth_elsewhere([*frames, Frame(3)])) == said

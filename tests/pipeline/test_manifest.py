@@ -6,11 +6,13 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from pipeline.load import Header, Source
 from pipeline.load.order import natural_key
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible, measured_otherwise
+from pipeline.study.plausible import implausible, measured_otherwise, odd_depths
 from pipeline.study.settings import Config
 
 GOOD = """
@@ -161,6 +163,15 @@ def test_a_wire_in_another_unit_is_a_warning(tmp_path: Path, change: tuple[str, 
     assert implausible(read_manifest(written(tmp_path, GOOD)).cases) == []
     notes = implausible(read_manifest(written(tmp_path, GOOD.replace(*change))).cases)
     assert f"wire 'soft': {said}" in notes[0]
+
+
+@pytest.mark.parametrize(("depths", "said"), [("[0.014, 0.039]", 1), ("[14, 39]", 0), ("[1400, 3900]", 1)])
+def test_depths_in_another_unit_are_a_warning(tmp_path: Path, depths: str, said: int) -> None:
+    """0.039 mm and 3.9 m of wire in a scan of 48 mm: "no problem found"."""
+    text = GOOD.replace('frames = "frames/*.mha"', f'reference = "frames/a.mha"\ninsertion_mm = {depths}')
+    header = Header(Source(tmp_path), (96, 96, 96), np.full(3, 0.5), np.zeros(3), np.eye(3), "int16")
+    (case,) = read_manifest(written(tmp_path, text)).cases
+    assert len(odd_depths(case, header)) == said
 
 
 @pytest.mark.parametrize(("radius_mm", "modulus_gpa"), [(0.18, 9.5), (0.444, 9.5), (0.444, 158.4), (0.1, 60.0)])

@@ -38,7 +38,7 @@ def _empty_case(folder: Path, **changes: Any) -> CaseFiles:
         "folder": folder,
         "result": {},
         "errors": tables.read_if_there(None, ERRORS),
-        "points": tables.read_if_there(None, POINTS),
+        "samples": tables.read_if_there(None, POINTS),
         "timings": tables.read_if_there(None, TIMINGS),
         "scan": None,
         "frames": (),
@@ -88,7 +88,7 @@ def _heat_case(tmp_path: Path) -> CaseFiles:
         "error_mm": np.concatenate([a / 10 for a in arcs]),
     }
     tables.write(tmp_path / "points.csv.gz", POINTS, columns)
-    return _empty_case(tmp_path, points=tables.read(tmp_path / "points.csv.gz", POINTS))
+    return _empty_case(tmp_path, samples=tables.read(tmp_path / "points.csv.gz", POINTS))
 
 
 def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
@@ -218,7 +218,7 @@ def test_one_scored_frame_shows_its_predictors(tmp_path: Path) -> None:
 
 def test_the_clamps_reach_is_blank_as_it_is_not_scored(tmp_path: Path) -> None:
     case = _heat_case(tmp_path)
-    case = replace(case, points=case.points[case.points["arc_mm"] >= 2.0])
+    case = replace(case, samples=case.points[case.points["arc_mm"] >= 2.0])
     drawing = CASE_FIGURES["error_along_wire"](case)
     assert drawing is not None
     assert drawing.table["arc_mm"].min() == pytest.approx(2.0, abs=0.25)

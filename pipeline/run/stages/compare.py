@@ -33,7 +33,7 @@ def compare_frames(run: Context, known: Known) -> Known:
         clues.known_ways()
     frames, entries = _all_compared(run, known, clues, simulated, entered)
     known = replace(known, frames=frames, entries=entries)
-    run.log.warnings += _too_near(known.frames)
+    run.log.warnings += [*_too_near(known.frames), *_truth_elsewhere(known.frames)]
     return budgeted(run, known)
 
 
@@ -101,6 +101,23 @@ NEAREST = 0.2
 """Share of the traces' standard deviation below which no wire lies near them that does not know them."""
 
 
+NEAREST_MM = 0.01
+"""The same where the curves are the user's own, of unknown standard deviation: no scan shows a wire so well."""
+TRUTH_MM = 2.0
+"""Distance of traced wires from the true ones, median of the frames' means, from which they are not the same wires."""
+
+
+def _truth_elsewhere(frames: Sequence[Frame]) -> list[str]:
+    """A warning where the true wires of a synthetic study lie elsewhere than the traced ones."""
+    off = [f.truth["trace_mean_mm"] for f in frames if f.trusted_curve is not None and "trace_mean_mm" in f.truth]
+    if not off or not np.median(off) > TRUTH_MM:
+        return []
+    return [
+        f"the true wires lie {np.median(off):.1f} mm from the traced ones (median of the frames' means): is truth in "
+        "mm, in LPS, and of these frames? the columns of the truth say nothing before that"
+    ]
+
+
 def _too_near(frames: Sequence[Frame]) -> list[str]:
     """A warning where wires lie nearer to the traces than these can be known."""
     compared = [(f.comparison, f.curve) for f in frames if f.ok and f.comparison is not None and f.curve is not None]
@@ -108,11 +125,12 @@ def _too_near(frames: Sequence[Frame]) -> list[str]:
         return []
     off = rms(np.concatenate([comparison.error_mm for comparison, _ in compared]))
     sigma = float(np.median(np.concatenate([curve.sigma_mm for _, curve in compared])))
-    if not off < NEAREST * sigma:
+    known_to = f"which are known to {sigma:.2g} mm: " if np.isfinite(sigma) else ""
+    if not off < (NEAREST * sigma if np.isfinite(sigma) else NEAREST_MM):
         return []
     return [
-        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, which are known to {sigma:.2g} mm: only "
-        "wires that were made from the traces are so near; their errors say nothing about a simulator"
+        f"the simulated wires lie {off:.2g} mm (rms) from the traced ones, {known_to}only wires that were made from "
+        "the traces, or traces from the wires, are so near; their errors say nothing about a simulator"
     ]
 
 

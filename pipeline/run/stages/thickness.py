@@ -30,7 +30,7 @@ def too_thin(
     if not known or 2.0 * radius_mm < LEAST_VOXELS * most:
         return []
     seen = 2.0 * float(np.sqrt(max(0.0, float(np.median(blurs)) ** 2 - scanner_blur_mm**2)))
-    if seen >= LEAST_SHARE * radius_mm:
+    if seen == 0.0 or seen >= LEAST_SHARE * radius_mm:  # no line is sharper than the scanner: its blur is misjudged
         return []
     return [
         f"the traced wire looks {2.0 * seen:.2f} mm thick at most, and radius_mm = {radius_mm:g} says "
