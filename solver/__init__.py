@@ -5,7 +5,7 @@
     for solution in Insertion(wire, wall, entry_mm, entry_direction).to_depths([10.0, 20.0]):
         solution.joints_mm, solution.status, solution.contact_force_N
 
-The seed is Alderliesten, Konings & Niessen, MICCAI 2002; equation numbers are its numbers. Units: mm, N, rad.
+The paper is Alderliesten, Konings & Niessen, MICCAI 2002; equation numbers are its numbers. Units: mm, N, rad.
 
 | seed            | here                                                                | unit       | equation      |
 |-----------------|---------------------------------------------------------------------|------------|---------------|

@@ -74,7 +74,7 @@ class Settings:
     tolerance : Newton decrement relative to the energy.     max_iterations : of one relaxation; the closed form
     may use five hundred sweeps for each.
     quadrature : of the wall's energy. "tip" integrates it under the last segments and sums joints elsewhere,
-    "joints" is the seed's sum over joints (half a weight at the tip), "segments" integrates under all of them.
+    "joints" is the paper's sum over joints (half a weight at the tip), "segments" integrates under all of them.
     """
 
     method: str = "newton"

@@ -35,7 +35,7 @@ CLOSED_FORM_SHORTEST_MM = 1.0
 
 
 def settings(*, quick: bool = False) -> list[SolverSetting]:
-    """All settings of the study; ``quick`` leaves the default and the seed's method, at fewer segment lengths."""
+    """All settings of the study; ``quick`` leaves the default and the paper's method, at fewer segment lengths."""
     segments = QUICK_SEGMENTS_MM if quick else SEGMENTS_MM
     variants = VARIANTS[:1] if quick else VARIANTS
     shortest = CLOSED_FORM_SHORTEST_MM * (2 if quick else 1)

@@ -28,7 +28,7 @@ class SolverConfig:
     """The energy minimisation."""
 
     method: Annotated[str, AfterValidator(_known), Field(json_schema_extra={"enum": [*METHODS]})] = "newton"
-    """newton, or the seed's closed_form."""
+    """newton, or the closed_form of Alderliesten et al. (MICCAI 2002)."""
     segment_mm: Segment = "auto"
     """Length of the wire's rigid segments; auto halves it until that changes nothing."""
     hull: Annotated[str, Field(pattern=rf"^(offset|samples:{SAMPLES})$", json_schema_extra=HULLS)] = "offset"

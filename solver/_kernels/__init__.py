@@ -7,7 +7,7 @@ chain            a wire cut into segments               friction         Coulomb
 energy           total energy (eq. 1-7)                 forces           forces and moments of a wire at rest
 rollout          joints and frames from the controls    blocks           a node's and a joint's part of Newton's step
 newton           the step, by a Riccati recursion       newton_straight  the same for a straight round wire
-newton_method    one iteration of Newton's method       closed_form      one sweep of the seed's eq. 8-10
+newton_method    one iteration of Newton's method       closed_form      one sweep of the paper's eq. 8-10
 minimise         the loop around either method          crossing         whether a way passes through a wall
 start            the wire laid along a curve            insertion        the steps to a depth
 handle           what these work on, behind one pointer shaft            the wire between hand and entry

@@ -212,7 +212,7 @@ class Introducer(NamedTuple):
     """Where the wire is clamped, and how far one step may go.
 
     entry : (3,) mm.     frame : (3, 3) at roll 0, columns are material axes 1, 2 and the direction.
-    load : (3,) dead force on the tip, N.     translate : the seed's start shape instead of sliding.
+    load : (3,) dead force on the tip, N.     translate : the paper's start shape instead of sliding.
     idle_roll : rolling changes nothing.     step, turn : longest step, mm and degrees.     rise : how much deeper in
     the wall a step may lead the tip, mm.     margin : how far a joint may leave the grid, mm.
     weight : (3,) of the wire, N per mm of it.

@@ -1,6 +1,6 @@
 """The law of the wall: what it costs the wire to be d mm beyond the lumen, d > 0. No other file of the solver knows it.
 
-Hooke's law, the seed's eq. 6 and 7: ½ k d² per mm of wire. Arguments: the wall's stiffness k in N/mm per mm of wire,
+Hooke's law, the paper's eq. 6 and 7: ½ k d² per mm of wire. Arguments: the wall's stiffness k in N/mm per mm of wire,
 the length of wire in mm that a look-up point stands for, and d in mm. At d = 0 energy and force must be 0; no function
 here is asked about d < 0.
 """
