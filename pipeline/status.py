@@ -15,7 +15,6 @@ class FrameStatus(Enum):
     REPEATED = (
         "the scan has the voxels of an earlier frame, and a scan counts once; take one of the two out of the case"
     )
-    INPUT_CHANGED = "a file of the case was changed while the case was computed from it; the message names it"
     SEGMENT_FAILED = "no lumen could be segmented; the message has the reason"
     NO_WIRE = "no wire was found in this frame; check that the scan shows one and that entry_mm lies on it"
     TRACE_FAILED = "the wire could not be followed as one curve from the entry; the message has the reason"
@@ -51,6 +50,7 @@ class FrameStatus(Enum):
     )
     VIEW_FAILED = "the wire cannot be held against its projection; the message has the reason"
     SIMULATE_FAILED = "the simulation stopped before this depth; the message has the reason"
+    INPUT_CHANGED = "a file of the case was changed while the case was computed from it; the message names it"
 
     @property
     def identifier(self) -> str:

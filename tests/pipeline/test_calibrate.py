@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -37,6 +38,7 @@ from pipeline.study.manifest import read_manifest
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.settings import Config
 from solver import Grid, VesselWall
+from tests.pipeline.test_manifest import GOOD, written
 
 WIRE = Wire("w", 0.18, [(0.0, 0.5), (10.0, 0.5), (30.0, 2.0)], [(0.0, 0.1), (8.0, 0.1), (8.0, 0.0)])
 SETTINGS = SolverConfig(segment_mm=0.5)
@@ -355,7 +357,7 @@ def test_other_simulators_are_scored_with_parameters_too(study, capsys):
     assert "none.toml: no such file" in capsys.readouterr().err
 
 
-def test_what_was_assumed_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_assumed_is_no_problem(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Information used to be counted among the problems where every case was left out."""
 
     def no_wire(run: Context) -> SimpleNamespace:
@@ -365,9 +367,9 @@ def test_what_was_assumed_is_no_problem(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("pipeline.run.calibration.run_stages", no_wire)
     heard: list[str] = []
     with pytest.raises(InputError) as error:
-        gathered([SimpleNamespace(id="a")], Config(), Store(None), heard.append)  # type: ignore[list-item]
+        gathered(read_manifest(written(tmp_path, GOOD)).cases, Config(), Store(None), heard.append)
     assert len(error.value.problems) == 1
-    assert heard == ["a: the phantom did not move"]
+    assert [text.partition(": ")[2] for text in heard] == ["the phantom did not move"]
 
 
 def test_a_wire_that_is_thin_in_its_voxels_is_warned_of():

@@ -13,8 +13,8 @@ def wire_in_reference(run: Context, reference: Volume | None, lumen: Lumen) -> l
     """A warning where a wire can be traced in the reference as in a frame; a case without a reference has none."""
     if reference is None or run.case.traces:
         return []
-    case = run.case
-    seen = run.stored(
+    case, aside = run.case, run.part()  # in a log of its own: what is counted is of the frames
+    seen = aside.stored(
         "trace", trace, reference, lumen, case.entry_mm, case.entry_direction, reference=None, config=run.config.trace
     )
     if seen.status is not FrameStatus.OK or seen.length_mm < LEAST_MM:
