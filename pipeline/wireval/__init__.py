@@ -78,20 +78,24 @@ def run(
     settings: Settings | None = None,
     jobs: int = 1,
     sweep: Mapping[str, Sequence[object]] | None = None,
+    fail_if: str | Sequence[str] = (),
     **more: bool | str | Sequence[str],
 ) -> Results:
     """Run the whole pipeline over every case of a manifest (or of a folder of scans) into a folder; the results.
 
-    sweep : ``{"simulate.wall_scale": [0.5, 2]}`` runs again with each of these values.     more : any other option of
-    ``wireval run`` by its long name, as ``fresh=True``, ``only=["run1"]``, ``until="trace"``, ``quiet=True``.
+    settings : ``{"solver.segment_mm": 0.5}``, as --set takes them.     sweep : ``{"simulate.wall_scale": [0.5, 2]}``
+    runs again with each of these values.     fail_if : ``"rms_mm>0.5"``, or several; those that hold are told in
+    ``results.closed``, and ``results.ok`` is False.     more : any other option of ``wireval run`` by its long name, as
+    ``fresh=True``, ``only=["run1"]``, ``until="trace"``, ``quiet=True``.
 
     A frame or case that fails raises nothing: ``results.failures`` has its sentence. Running the same again keeps what
     is finished; a shard that gets none of the cases leaves no files, and empty tables. Raises InputError where nothing
     could be run.
     """
     points = [f"{name}={','.join(map(str, values))}" for name, values in (sweep or {}).items()]
-    _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, **more)
-    return read_run(Path(out))
+    gates = [fail_if] if isinstance(fail_if, str) else list(fail_if)
+    _carried_out("run", manifest, out=out, settings=settings, jobs=jobs, sweep=points, fail_if=gates, **more)
+    return read_run(Path(out), gates)
 
 
 def score(

@@ -1,11 +1,12 @@
 """What a run left in its folder, as pandas frames."""
 
-from collections.abc import Sized
-from dataclasses import dataclass
+from collections.abc import Sequence, Sized
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
 
+from pipeline.run.gate import gate
 from pipeline.status import InputError
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
@@ -21,7 +22,8 @@ class Results:
 
     summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
     of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
-    cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.
+    cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
+    each ``fail_if`` of the run that did not hold.
     """
 
     out: Path
@@ -31,11 +33,14 @@ class Results:
     failures: pd.DataFrame
     sweep: pd.DataFrame
     cases: dict[str, CaseFiles]
+    closed: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """Whether every case that was to be run is here, whole, all its frames ok, and all had the same settings."""
-        if not len(self.summary) or len(self.failures) or not_run(self.out) or mixed_settings(self.out):
+        """Whether every case that was to be run is here, whole, all its frames ok, with the same settings; and no gate
+        closed.
+        """
+        if self.closed or not len(self.summary) or len(self.failures) or not_run(self.out) or mixed_settings(self.out):
             return False
         return not any(amiss(case.folder) for case in self.cases.values())
 
@@ -68,9 +73,15 @@ def read_results(out: str | Path) -> Results:
     return _results(out, cases)
 
 
-def read_run(out: Path) -> Results:
-    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases."""
-    return read_results(out) if find_cases(out) else _results(out, {})
+def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
+    """What a run has just left: nothing, in empty tables, where it was a shard that got none of the cases.
+
+    gates : its ``fail_if``.
+    """
+    found = read_results(out) if find_cases(out) else _results(out, {})
+    pooled = {str(name): value for row in found.overall.head(1).to_dict("records") for name, value in row.items()}
+    pooled = {name: value for name, value in pooled.items() if not pd.isna(value)}
+    return replace(found, closed=tuple(filter(None, (gate(text).closed(pooled) for text in gates))))
 
 
 def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:

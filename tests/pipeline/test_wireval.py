@@ -48,6 +48,7 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert list(results.errors["case"]) == ["straight"] * 2
     assert list(results.sweep["parameter"]) == [PLAIN, "simulate.wall_scale"]
     assert results.cases["straight"].result["config"]["solver"]["segment_mm"]["value"] == 2.0
+    assert len(results.cases["straight"].points) == len(results.points) > 0, "read when it is asked for"
     last = results.points[results.points["frame"] == 1]
     rms = (last["error_mm"] ** 2).mean() ** 0.5
     assert rms == pytest.approx(results.errors["rms_mm"].iloc[1], rel=1e-6)
@@ -57,6 +58,10 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     assert len(repr(results).splitlines()) < 13
     assert len(repr(results)) < 1000
     assert wireval.read_results(tmp_path / "out").errors.equals(results.errors)
+    again = wireval.run(study, tmp_path / "out", fail_if=["rms_mm>0.001", "rms_mm>9"], resume=True, **kept)
+    assert not again.ok, "a closed gate was seen on the terminal alone"
+    assert len(again.closed) == 1
+    assert "--fail-if rms_mm>0.001" in again.closed[0]
 
 
 def test_verbs_are_called_as_they_are_typed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
