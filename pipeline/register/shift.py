@@ -101,8 +101,9 @@ def static_points(reference: Volume, points_mm: Array) -> StaticPoints:
     field = Blurred(grid.values, grid.spacing_mm, BLUR_VOXELS * voxel)
     jets = jets_at(field, grid.to_index(points) * grid.spacing_mm)
     anywhere = unflattened(np.arange(0, grid.values.size, 1 + grid.values.size // FLAT_POINTS), grid.shape)
-    steep = jets_at(field, anywhere * grid.spacing_mm)[:, 1:4]
-    noise = float(np.sqrt(np.quantile(np.sum(steep**2, axis=1), FLAT) / OF_FLAT))
+    steep = np.sum(jets_at(field, anywhere * grid.spacing_mm)[:, 1:4] ** 2, axis=1)
+    steep = steep[steep > 1e-12 * max(float(steep.max()), 1e-12)]  # not the padding around what was reconstructed
+    noise = float(np.sqrt(np.quantile(steep, FLAT) / OF_FLAT)) if len(steep) else 0.0
     return StaticPoints(points, jets[:, 0], jets[:, 1:4] @ grid.direction.T, BLUR_VOXELS * voxel, voxel, noise)
 
 

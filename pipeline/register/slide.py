@@ -92,7 +92,7 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
         return motion, 0.0
     rest = np.stack([_rest(frame, s, one, seen) for one in motions])
     here = len(rest) // 2
-    scale = spread(rest[here])
+    scale = max(spread(rest[here]), 1e-9)  # a scan without noise
     metal = np.min(rest, axis=0) > METAL_SCALES * scale
     clear = ~near_metal(s.points_mm[seen], metal, METAL_VOXELS * s.voxel_mm)
     square = np.minimum(np.abs(rest[:, clear]) / scale, CUT) ** 2
