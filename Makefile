@@ -31,7 +31,7 @@ calibrated: setup
 	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED) --forces --no-blind
 
 test: setup lint
-	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # the pages in a browser (needs a Chromium on the path, and the network once)
 browser: setup

@@ -4,12 +4,31 @@ from __future__ import annotations
 
 import os
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 # what a script starts in the background ignores Ctrl-C, and so would all that tests start and interrupt
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+LONGEST = (
+    "test_run.py",
+    "test_catalogue.py",
+    "test_package.py",
+    "test_score.py",
+    "test_stress.py",
+    "test_documents.py",
+)
+"""One to three minutes each, some in two tests: begun last, every other worker would wait for them."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first, then those of most tests; each file in its own order."""
+    count = Counter(item.path for item in items)
+    place = {name: n for n, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (place.get(item.path.name, len(place)), -count[item.path], item.path))
 
 
 @pytest.fixture(scope="session")
