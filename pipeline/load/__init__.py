@@ -78,7 +78,9 @@ def read_header(
         header = _format_of(source.path).read_header(source, config)
     if spacing_mm is not None:
         spacing = np.asarray(spacing_mm, float)
-        note = f"{source.path.name}: spacing {spacing.tolist()} mm taken from the manifest"
+        said = f", where the file has {header.spacing_mm.round(4).tolist()}"
+        said *= not np.allclose(spacing, header.spacing_mm, rtol=1e-3)
+        note = f"{source.path.name}: spacing {spacing.tolist()} mm taken from the manifest{said}"
         header = replace(header, spacing_mm=spacing, assumed=(*header.assumed, note))
     return judged(header)
 

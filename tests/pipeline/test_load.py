@@ -365,7 +365,9 @@ def test_a_spacing_from_the_manifest_is_reported_as_assumed(tmp_path: Path) -> N
     sitk.WriteImage(image_of(numbered()), str(tmp_path / "scan.mha"))
     header = read_header(tmp_path / "scan.mha", spacing_mm=(0.5, 0.5, 0.5))
     np.testing.assert_array_equal(header.spacing_mm, 0.5)
-    assert "taken from the manifest" in header.assumed[0]
+    assert f"taken from the manifest, where the file has {np.round(SPACING, 4).tolist()}" in header.assumed[0]
+    same = read_header(tmp_path / "scan.mha", spacing_mm=SPACING)
+    assert same.assumed[-1].endswith("taken from the manifest")
 
 
 def unpacked(archive: Path, folder: Path) -> Path:
