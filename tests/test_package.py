@@ -10,7 +10,7 @@ UNREACHABLE = "No matching distribution found", "Could not find a version"
 """What pip says where no index answers."""
 
 
-@pytest.mark.parametrize("target", ["package", "docs"])
+@pytest.mark.parametrize("target", ["package", pytest.param("docs", marks=pytest.mark.slow)])
 def test_is_made_from_a_checkout(target: str, tmp_path: Path) -> None:
     # mkdocs takes a broken link for an error; the wheel is installed outside the checkout, run, and type-checked
     if not (ROOT / ".venv/.ready").exists():

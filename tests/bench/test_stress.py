@@ -27,7 +27,7 @@ from solver import relax
 
 SEED = 400
 SAMPLE = 100
-SECONDS = 15.0
+SECONDS = 8.0
 
 
 def test_a_random_part_of_the_scenes_ends_as_it_may() -> None:
