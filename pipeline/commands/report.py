@@ -47,8 +47,9 @@ def main(args: argparse.Namespace) -> int:
         why = "the run into it has finished no case: run it again" if begun else "this is not an output of wireval run"
         hint = next(iter(above), why)
         return complain([f"{args.out}: no cases/*/result.json below it; {hint}"], str(args.out), "; nothing was drawn")
-    if misleading_links(args.out):
-        return complain(misleading_links(args.out), str(args.out), "; nothing was drawn")
+    links = misleading_links(args.out)
+    if links:
+        return complain(links, str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
     write_sweep(args.out, heads)
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))

@@ -74,6 +74,11 @@ class StaticPoints:
         return float(np.sqrt(np.mean(np.sum((self.points_mm - self.centre_mm) ** 2, axis=1))))
 
     @property
+    def lever_mm(self) -> float:
+        """The radius, by which turns are made shifts; that of one point is a voxel."""
+        return max(self.radius_mm, self.voxel_mm)
+
+    @property
     def steepness(self) -> float:
         """Root mean square gradient, per mm."""
         return float(np.sqrt(np.mean(np.sum(self.gradient**2, axis=1))))
@@ -144,23 +149,40 @@ def near_metal(points_mm: Array, metal: NDArray[np.bool_], reach_mm: float) -> N
     return np.asarray(np.isfinite(gap))
 
 
+def changes(s: StaticPoints, at_mm: Array, motion: Motion) -> Array:
+    """Change of the frame's grey (n, 6) at moved points (n, 3), by shifts and turns (about the centroid) of a voxel."""
+    gradient = s.gradient @ motion.rotation.T
+    arm = (at_mm - motion.moved(s.centre_mm)) / s.lever_mm
+    return -s.voxel_mm * np.column_stack([gradient, np.cross(arm, gradient)])
+
+
+def moved_by(motion: Motion, s: StaticPoints, voxels: Array) -> Motion:
+    """The motion, and then shifts and turns (6,) as ``changes`` counts them."""
+    by = s.voxel_mm * voxels
+    return motion.then(Motion.about(motion.moved(s.centre_mm), by[3:] / s.lever_mm, by[:3]))
+
+
+def grey_at(frame: Volume, s: StaticPoints, at_mm: Array) -> Array:
+    """The frame's grey (n,) at points (n, 3), in the blur of the static points'."""
+    grid, _ = in_memory_order(frame)
+    return values_at(Blurred(grid.values, grid.spacing_mm, s.blur_mm), grid.to_index(at_mm) * grid.spacing_mm)
+
+
 def _step(s: StaticPoints, at_mm: Array, grey: Array, motion: Motion) -> tuple[Array, float]:
-    """Six motion parameters (shift mm, turn rad about the centroid) that the residuals ask for, and the misfit.
+    """The six amounts (voxels, see ``changes``) of motion that the residuals ask for, and the misfit.
 
     Unknowns also hold a gain and an offset of grey, since contrast drifts between scans. The misfit is infinite where
     the gain says that there is no such wall here.
     """
-    h, radius = s.voxel_mm, max(s.radius_mm, s.voxel_mm)
-    gradient = s.gradient @ motion.rotation.T
-    arm = (at_mm - motion.moved(s.centre_mm)) / radius
-    design = np.column_stack([-h * gradient, -h * np.cross(arm, gradient), s.grey - s.grey.mean(), np.ones(len(grey))])
+    h = s.voxel_mm
+    design = np.column_stack([changes(s, at_mm, motion), s.grey - s.grey.mean(), np.ones(len(grey))])
     slope = h * s.steepness
     solution, scale, residual = _reweighted(design, grey, np.ones(len(grey), bool), h * s.noise)
     clear = ~near_metal(s.points_mm, residual > METAL_SCALES * scale, METAL_VOXELS * h)
     if MOST_METAL * len(grey) < np.count_nonzero(clear) < len(grey):
         solution, scale, _ = _reweighted(design, grey, clear, h * s.noise)
     shown = LEAST_GAIN < solution[6] < 1.0 / LEAST_GAIN
-    return solution[:6] * np.repeat([h, h / radius], 3), scale / max(slope, 1e-9) if shown else float("inf")
+    return solution[:6], scale / max(slope, 1e-9) if shown else float("inf")
 
 
 def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, rounds: int = ROUNDS) -> Fit:
@@ -168,16 +190,13 @@ def fit_motion(frame: Volume, s: StaticPoints, start: Motion | None = None, roun
 
     Good for motions below the width of a blurred wall, about 1.5 voxels; metal is outvoted.
     """
-    grid, _ = in_memory_order(frame)
     motion, misfit = start or Motion(), float("inf")
     for _ in range(rounds):
         at = motion.moved(s.points_mm)
         if np.mean(inside(frame, at)) < MOST_SEEN:
             return Fit(motion, float("inf"))
-        field = Blurred(grid.values, grid.spacing_mm, s.blur_mm)
-        grey = values_at(field, grid.to_index(at) * grid.spacing_mm)
-        step, misfit = _step(s, at, grey, motion)
-        motion = motion.then(Motion.about(motion.moved(s.centre_mm), step[3:], step[:3]))
-        if np.linalg.norm(step[:3]) + np.linalg.norm(step[3:]) * s.radius_mm < STILL_VOXELS * s.voxel_mm:
+        step, misfit = _step(s, at, grey_at(frame, s, at), motion)
+        motion = moved_by(motion, s, step)
+        if np.linalg.norm(step[:3]) + np.linalg.norm(step[3:]) < STILL_VOXELS:
             break
     return Fit(motion, misfit)

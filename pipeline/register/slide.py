@@ -8,8 +8,7 @@ a quarter of its noise, and went unseen.
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays.grids import in_memory_order, spread
-from pipeline.arrays.jets import Blurred, values_at
+from pipeline.arrays.grids import spread
 from pipeline.model import Array, Volume
 from pipeline.register.rigid import Motion
 from pipeline.register.shift import (
@@ -17,8 +16,11 @@ from pipeline.register.shift import (
     METAL_SCALES,
     METAL_VOXELS,
     StaticPoints,
+    changes,
     fit_motion,
+    grey_at,
     inside,
+    moved_by,
     near_metal,
 )
 
@@ -56,7 +58,7 @@ def slid(frame: Volume, s: StaticPoints, motion: Motion) -> tuple[Motion, float]
 def hidden(s: StaticPoints) -> bool:
     """Whether the structures can move in some way, along or about themselves, that is lost in noise."""
     power, _ = _power(s, Motion())
-    return bool(power[0] < ABOVE_NOISE * len(s.points_mm) * s.noise**2)
+    return bool(power[0] < ABOVE_NOISE * len(s.points_mm) * (s.voxel_mm * s.noise) ** 2)
 
 
 def _weak_axes(s: StaticPoints, motion: Motion) -> Array:
@@ -67,9 +69,7 @@ def _weak_axes(s: StaticPoints, motion: Motion) -> Array:
 
 def _power(s: StaticPoints, motion: Motion) -> tuple[Array, Array]:
     """Squared change of the points' grey with six motions (6,), least first, and the motions (6, 6), in columns."""
-    gradient = s.gradient @ motion.rotation.T
-    arm = (motion.moved(s.points_mm) - motion.moved(s.centre_mm)) / max(s.radius_mm, s.voxel_mm)
-    design = np.column_stack([gradient, np.cross(arm, gradient)])
+    design = changes(s, motion.moved(s.points_mm), motion)
     power, axes = np.linalg.eigh(design.T @ design)
     return np.asarray(power), np.asarray(axes)
 
@@ -79,12 +79,9 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
 
     Also the distance (voxels) to the farthest place that fits as well.
     """
-    radius = max(s.radius_mm, s.voxel_mm)
 
     def settled(voxels: float) -> Motion:
-        by = voxels * s.voxel_mm * axis
-        start = motion.then(Motion.about(motion.moved(s.centre_mm), by[3:] / radius, by[:3]))
-        return fit_motion(frame, s, start, rounds=SETTLE).motion
+        return fit_motion(frame, s, moved_by(motion, s, voxels * axis), rounds=SETTLE).motion
 
     motions = [settled(voxels) for voxels in OFFSETS_VOXELS]
     seen = np.all([inside(frame, one.moved(s.points_mm)) for one in motions], axis=0)
@@ -110,8 +107,7 @@ def _best_along(frame: Volume, s: StaticPoints, motion: Motion, axis: Array) -> 
 def _rest(frame: Volume, s: StaticPoints, motion: Motion, seen: NDArray[np.bool_]) -> Array:
     """The frame's blurred grey at the moved points that are ``seen``, less the reference's in its gain."""
     at, here = np.ascontiguousarray(motion.moved(s.points_mm)[seen]), s.grey[seen]
-    grid, _ = in_memory_order(frame)
-    grey = values_at(Blurred(grid.values, grid.spacing_mm, s.blur_mm), grid.to_index(at) * grid.spacing_mm)
+    grey = grey_at(frame, s, at)
     gain, offset = np.polyfit(here, grey, 1)
     rest = grey - gain * here - offset
     return np.asarray(rest - np.median(rest))

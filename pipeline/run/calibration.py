@@ -19,7 +19,7 @@ from pipeline.run.log import Log
 from pipeline.run.stages import Context, run_stages
 from pipeline.run.stages.given import trial_of
 from pipeline.run.stages.load import each_frame
-from pipeline.status import InputError, StageError
+from pipeline.status import InputError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Config
 
@@ -78,10 +78,8 @@ def gathered(cases: Sequence[Case], config: Config, store: Store, say: Say) -> G
         log = Log(lambda *_: None)
         run = Context(case, config, store, log, until="trace", inputs=Inputs.of(case))
         known = run_stages(run)
-        try:
-            run.inputs.require_unchanged()
-        except StageError as error:
-            known = known.failed("load", error)
+        changed = run.inputs.changed()
+        known = known.failed("load", changed) if changed else known
         frames = [frame for frame in known.frames if frame.trusted_curve is not None]
         notes += [f"{case.id}: {text}" for text in (*log.assumptions, *log.warnings)]
         if known.failure is not None or len(frames) < LEAST_FRAMES:

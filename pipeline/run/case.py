@@ -23,7 +23,6 @@ from pipeline.run.provenance import code_state, package_version, peak_memory_mib
 from pipeline.run.stages import Context, Known, run_stages
 from pipeline.run.store import code_of, digest
 from pipeline.run.view import LumenFiles, write_view
-from pipeline.status import StageError
 from pipeline.study.manifest import Case
 from pipeline.study.settings import Resolved
 from reports import tables
@@ -145,10 +144,9 @@ def _compute(job: Job, hashed: Callable[[], None], inputs: Inputs, progress: Cas
         known = run_stages(run)
         hashed()
         result = _written(job, known, log, files, clock)
-        try:
-            inputs.require_unchanged()  # now that its key is made: that, too, is of the files as they were
-        except StageError as error:
-            result = _written(job, known.failed("load", error), log, files, clock)
+        changed = inputs.changed()  # asked now that its key is made: that, too, is of the files as they were
+        if changed:
+            result = _written(job, known.failed("load", changed), log, files, clock)
         result.write(job.folder)
         ledger.write(job.folder, result.key)
     finally:

@@ -5,7 +5,6 @@ would be taken for that of the new file, and kept.
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,22 +32,15 @@ class Inputs:
         """The files of a case as they are now."""
         return cls({path: state for path in _all_of(case) if (state := _state(path))})
 
-    def require_unchanged(self) -> None:
-        """StageError where a file is another one by now; one that is gone has been read, or its frame says so."""
+    def changed(self) -> StageError | None:
+        """What ends the case where a file is another one by now; one that is gone was read, or its frame says so."""
         for path, before in self.states.items():
             now = _state(path)
             if now and now != before:
                 what = f"{path} was written to, or replaced, while this case was computed from it"
                 do = "allowed: files that stay as they are; once it is complete, give the same command again"
-                raise StageError(FrameStatus.INPUT_CHANGED, f"{what} ({before[0]} bytes before, {now[0]} now); {do}")
-
-    @property
-    def unchanged(self) -> bool:
-        """Whether every file is still as it was."""
-        with suppress(StageError):
-            self.require_unchanged()
-            return True
-        return False
+                return StageError(FrameStatus.INPUT_CHANGED, f"{what} ({before[0]} bytes before, {now[0]} now); {do}")
+        return None
 
 
 ANY = Inputs({})

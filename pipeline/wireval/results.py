@@ -23,7 +23,7 @@ class Results:
     summary : a row a case.     overall : one row over all validation cases, with intervals.     errors : a row a frame,
     of all cases.     failures : what is not ok, and why.     sweep : a row for each value of a sweep.
     cases : each case's folder, read: ``results.cases["run1"].read_frame(3).simulated_mm``.     closed : a sentence for
-    each ``fail_if`` of the run that did not hold.
+    each ``fail_if`` of the run that holds.
     """
 
     out: Path
@@ -79,8 +79,8 @@ def read_run(out: Path, gates: Sequence[str] = ()) -> Results:
     gates : its ``fail_if``.
     """
     found = read_results(out) if find_cases(out) else _results(out, {})
-    pooled = {str(name): value for row in found.overall.head(1).to_dict("records") for name, value in row.items()}
-    pooled = {name: value for name, value in pooled.items() if not pd.isna(value)}
+    known = found.overall.head(1).dropna(axis=1).to_dict("records")
+    pooled = {str(name): value for row in known for name, value in row.items()}
     return replace(found, closed=tuple(filter(None, (gate(text).closed(pooled) for text in gates))))
 
 

@@ -219,7 +219,7 @@ class Context:
             asked = previous is None or previous.asked
             with self.log.timed(stage, of_frame):
                 result = function(*volumes, **named, **({} if previous is None else {"previous": previous}))
-            if self.store.root and self.inputs.unchanged:
+            if self.store.root and self.inputs.changed() is None:
                 if previous is not None and previous.asked and not asked:
                     self.store.put(stage, key, ASKS)
                     key = key_of(function, inputs, named, previous.curve)
