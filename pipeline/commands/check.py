@@ -18,11 +18,16 @@ def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
     from pipeline.study.check import check
+    from pipeline.study.manifest import ManifestError
     from pipeline.study.plausible import first_of, implausible, leads_out, odd_depths
     from pipeline.study.same_scans import shared
     from reports.case_files import counted
 
-    manifest, config = given(args), resolved_settings(args).config
+    config = resolved_settings(args).config
+    try:
+        manifest = given(args)
+    except ManifestError as error:  # the scans of its sound cases are looked at all the same
+        raise InputError([*error.problems, *check(error.sound, config)]) from None
     problems = check(manifest.cases, config)
     if problems:
         raise InputError(problems)

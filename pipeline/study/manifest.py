@@ -6,6 +6,7 @@ Everything that is wrong with it is listed at once.
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +30,7 @@ from pipeline.model import OverWire, Uncertainty, Wall, Wire
 from pipeline.ranges import Axis, Depth, Direction, Finite, NonNegative, Number, Point, Positive
 from pipeline.status import InputError, did_you_mean
 from pipeline.study.borrowed import borrowing_problems
+from pipeline.study.catheter import catheter_problems
 from pipeline.study.others import OthersText
 from pipeline.study.sources import MaskText, PathText, Sources, SourceText, Strict
 from pipeline.toml_words import not_toml
@@ -160,7 +162,8 @@ class Case(Strict):
         # a single file may hold many volumes; their number is known once its header is read
         one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
         problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
-        problems += self._over_the_wire()
+        if self.catheter is not None:
+            problems += catheter_problems(self.catheter, self.wire.radius_mm, self.insertion_mm or ())
         if problems:
             raise saying(*problems)
         return self
@@ -174,22 +177,6 @@ class Case(Strict):
             return []
         found = f"material_axis = {list(self.material_axis)} is within {LEAST_ACROSS_DEG:g} degrees of entry_direction"
         return [f"{found}; give a direction across the wire, where its curved tip points at roll 0, or leave it out"]
-
-    def _over_the_wire(self) -> list[str]:
-        """What is wrong with the catheter."""
-        if self.catheter is None:
-            return []
-        radius, own = self.catheter.radius_mm, self.wire.radius_mm
-        problems = [f"catheter radius_mm = {radius:g} is no more than the wire's {own:g}; a catheter goes over it"]
-        problems *= radius <= own
-        tips = self.catheter.insertion_mm
-        depths = self.insertion_mm or ()
-        each = tips if isinstance(tips, tuple) else (tips,) * len(depths)
-        for frame, (tip, depth) in enumerate(zip(each, depths, strict=False)):
-            if tip > depth:
-                what = f"catheter insertion_mm = {tip:g} of frame {frame} is deeper than the wire, {depth:g}"
-                problems.append(f"{what}; a wire whose tip lies inside the catheter is not modelled")
-        return problems
 
 
 def not_one_per_frame(lists: dict[str, Any], count: int) -> list[str]:
@@ -242,7 +229,11 @@ class ManifestTables(Strict):
 
 
 class ManifestError(InputError):
-    """The manifest cannot be used."""
+    """The manifest cannot be used. sound : those of its cases with which nothing is wrong in themselves."""
+
+    def __init__(self, problems: Sequence[str], sound: Sequence[Case] = ()) -> None:
+        super().__init__(problems)
+        self.sound = sound
 
 
 @dataclass(frozen=True)
@@ -268,12 +259,21 @@ def read_manifest(path: Path) -> Manifest:
         raise ManifestError([str(error)]) from None
     except (ValueError, RecursionError) as error:
         raise ManifestError([not_toml(path, text, error)]) from None
+    context: dict[str, Any] = {"folder": path.parent}
     try:
-        tables = ManifestTables.model_validate(data, context={"folder": path.parent})
+        tables = ManifestTables.model_validate(data, context=context)
     except ValidationError as error:
-        raise ManifestError([f"{path}: {text}" for text in _problems(data, error)]) from None
+        raise ManifestError([f"{path}: {text}" for text in _problems(data, error)], [*_sound(data, context)]) from None
     held = {f"case:{case.id}": case for case in tables.case}
     return Manifest(path, tuple(case.model_copy(update={"entry_case": held.get(case.entry)}) for case in tables.case))
+
+
+def _sound(data: dict[str, Any], context: dict[str, Any]) -> Iterator[Case]:
+    """Those cases of a refused manifest that are right in themselves. context : with its wires, where these are."""
+    cases = data.get("case")
+    for table in cases if isinstance(cases, list) else ():
+        with suppress(ValidationError):
+            yield Case.model_validate(table, context=context)
 
 
 _schema = cache(ManifestTables.model_json_schema)

@@ -400,6 +400,21 @@ def test_check_tells_a_copied_frame_and_one_that_is_cut_short_at_once(
     assert "cut short" in said
 
 
+def test_check_names_missing_scans_beside_a_wrong_key(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Files were looked for only once all keys were right: a second round of corrections."""
+    folder = shutil.copytree(study, tmp_path / "study")
+    (folder / "reference.mha").unlink()
+    wrong = "".join(f"[[case]]{text}\n" for text in (folder / "manifest.toml").read_text("utf-8").split("[[case]]")[1:])
+    with (folder / "manifest.toml").open("a", encoding="utf-8") as file:
+        file.write(wrong.replace('id = "straight"', 'id = "other"').replace("entry_mm", "entry_m"))
+    assert main(["check", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert "case 'other' entry_m: unknown key; did you mean 'entry_mm'?" in said
+    assert f"case 'straight': {folder / 'reference.mha'}: no such file or folder" in said
+
+
 def test_many_damaged_cases_are_a_line_and_few_a_line_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for count in (2, 60):
         out = tmp_path / str(count)
