@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Exit 0 when nothing is wrong, with what is assumed; raises InputError with every problem."""
     from pipeline.status import InputError
-    from pipeline.study.check import check
+    from pipeline.study.check import check, frames_of
     from pipeline.study.manifest import ManifestError
     from pipeline.study.plausible import first_of, implausible, leads_out, odd_depths
     from pipeline.study.same_scans import shared
@@ -37,6 +37,6 @@ def main(args: argparse.Namespace) -> int:
     ways = [f"case {one.id!r}: {t}" for one, scan in scans for t in (*leads_out(one, scan), *odd_depths(one, scan))]
     for note in (*implausible(manifest.cases), *ways, *shared(manifest.cases)):
         say(f"warning: {note}")
-    frames = sum(case.frame_count for case in manifest.cases)
+    frames = sum(frames_of(case, config) for case in manifest.cases)
     say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")
     return 0

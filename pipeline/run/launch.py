@@ -30,6 +30,7 @@ from pipeline.run.sweep import SweepPoint, found_heads, heads_of, lost_points, w
 from pipeline.run.watch import Watch
 from pipeline.run.workers import NO_LIMITS, Limits
 from pipeline.status import UsageError, did_you_mean
+from pipeline.study.check import frames_of
 from pipeline.study.manifest import Case, Manifest
 from pipeline.study.settings import to_toml
 from reports.atomic import WriteError, remove_leftovers, write_text, writing
@@ -222,7 +223,8 @@ def intention(plan: Plan) -> list[str]:
     lines = []
     for job in plan.jobs:
         known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
-        lines.append(f"{job.case.id}: {counted(job.case.frame_count, 'frame')}, {known} -> {job.folder}")
+        frames = counted(frames_of(job.case, job.settings.config), "frame")
+        lines.append(f"{job.case.id}: {frames}, {known} -> {job.folder}")
     lines += [
         f"sweep {point.parameter} = {point.value}: {counted(len(plan.cases), 'case')} -> {plan.out / point.folder}"
         for point in plan.points

@@ -16,7 +16,7 @@ from pipeline.load import (
     require_whole,
 )
 from pipeline.load.curves import read_curve, read_truth
-from pipeline.load.guard import status_of
+from pipeline.load.guard import is_folder, status_of
 from pipeline.load.lumens import read_lumen
 from pipeline.load.masks import mask_header
 from pipeline.load.views import read_views
@@ -83,6 +83,12 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
         except ParametersError as error:
             problems += error.problems
     return again + problems + list(_lumen_problems(case, config))
+
+
+def frames_of(case: Case, config: Config) -> int:
+    """How many frames a case has: a file may hold several, which its header tells; a folder is one series."""
+    held = (1 if is_folder(one.path) else read_header(one, config.load).item_count for one in case.frames)
+    return sum(held) or case.frame_count
 
 
 def _read(_content: object) -> None:

@@ -102,11 +102,16 @@ def test_an_anatomy_file_becomes_a_study(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["nrrd", "nii.gz", "dicom", "h5"])
-def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str) -> None:
+def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """An oblique scan, so that a swapped axis or a lost direction would put the entry outside the vessel."""
     words = ["synth", "oblique", "-o", str(tmp_path / "study"), "--frames", "2", "--size", "64", "--format", kind]
     assert main(words) == 0
-    assert main(["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"]) == 0
+    run = ["run", str(tmp_path / "study" / "manifest.toml"), "-o", str(tmp_path / "out"), "--no-cache"]
+    for asked in (["check", run[1]], [*run, "--dry-run"]):
+        capsys.readouterr()
+        assert main(asked) == 0
+        assert "2 frames" in capsys.readouterr().out, "those of one HDF5 group, too, which were 1"
+    assert main(run) == 0
 
 
 def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Path) -> None:
