@@ -27,7 +27,8 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 
 def add_quiet(parser: argparse._ActionsContainer) -> None:
     """-q."""
-    parser.add_argument("-q", "--quiet", action="store_true", help="print the result alone")
+    says = "print the result alone; warnings and failures to stderr"
+    parser.add_argument("-q", "--quiet", action="store_true", help=says)
 
 
 def add_verbosity(parser: argparse.ArgumentParser) -> None:

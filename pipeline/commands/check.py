@@ -19,8 +19,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check, frames_of
     from pipeline.study.manifest import ManifestError
-    from pipeline.study.plausible import first_of, implausible, leads_out, odd_depths
-    from pipeline.study.same_scans import shared
+    from pipeline.study.plausible import doubts
     from reports.case_files import counted
 
     config = resolved_settings(args).config
@@ -33,9 +32,7 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(problems)
     for note in assumed_in(manifest.cases):
         say(f"assumed, not confirmed: {note}")
-    scans = [(one, first_of(one, config)) for one in manifest.cases]
-    ways = [f"case {one.id!r}: {t}" for one, scan in scans for t in (*leads_out(one, scan), *odd_depths(one, scan))]
-    for note in (*implausible(manifest.cases), *ways, *shared(manifest.cases)):
+    for note in doubts(manifest.cases, config):
         say(f"warning: {note}")
     frames = sum(frames_of(case, config) for case in manifest.cases)
     say(f"{args.manifest}: {counted(len(manifest.cases), 'case')}, {counted(frames, 'frame')}: no problem found")

@@ -52,7 +52,7 @@ def add_what_is_seen(parser: argparse.ArgumentParser) -> None:
 
 
 def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
-    """The manifest; one that is inferred from scans is printed.
+    """The manifest; one that is inferred from scans is printed, except with -q.
 
     keep : folder in which an inferred one is left as manifest.inferred.toml; None leaves nothing.
     """
@@ -73,7 +73,8 @@ def given(args: argparse.Namespace, keep: Path | None = None) -> "Manifest":
             raise InputError([f"{', '.join(unused)}: of a folder of scans; {path} is a manifest, which says it itself"])
         return read_manifest(path)
     text, seen, _ = inferred(args)
-    say("\n".join([text, *seen]))
+    if not getattr(args, "quiet", False):  # not every verb has it
+        say("\n".join([text, *seen]))
     if keep is None:
         keep = Path(tempfile.mkdtemp())
         atexit.register(shutil.rmtree, keep, ignore_errors=True)  # until then its hash may be asked for

@@ -14,6 +14,7 @@ from pipeline.commands.given import INFERRED, add_calibrated, add_manifest, assu
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
 
+    from pipeline.run.aggregate import Totals
     from pipeline.run.gate import Gate
     from pipeline.run.launch import Plan
     from pipeline.run.workers import Limits
@@ -65,14 +66,14 @@ def main(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.aggregate import write_tests
     from pipeline.run.batch import require_cluster
-    from pipeline.run.last_words import failure_lines, last_line
+    from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
     from pipeline.status import InputError
     from pipeline.study.check import check
     from pipeline.study.coarse import too_coarse
+    from pipeline.study.plausible import doubts
     from reports.inside import misleading_links
-    from reports.verdict import remarks, warned
 
     plan = _plan(args)
     if not plan.cases:
@@ -85,7 +86,8 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     if args.dry_run:
-        for line in intention(plan):
+        doubtful = doubts(plan.cases, plan.template.settings.config)
+        for line in [*(f"warning: {text}" for text in doubtful), *intention(plan)]:
             say(line)
         return 0
     require_cluster(plan.address)  # before OUT is claimed
@@ -94,12 +96,22 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     closed = [why for why in held.values() if why]
     if args.junit:
         write_tests(args.junit, found_results(plan.out), held)
-    for line in [*failure_lines(plan), *closed]:
-        sys.stderr.write(f"{line}\n")
-    for text in [*([] if args.quiet else warned(plan.out)), *(f"warning: {text}" for text in remarks(totals.pooled))]:
-        say(text)
+    _tell(plan, totals, closed)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1
+
+
+def _tell(plan: "Plan", totals: "Totals", closed: "Sequence[str]") -> None:
+    """What went wrong, on stderr, and what to bear in mind; warnings are not among the result, which -q prints."""
+    from pipeline.run.last_words import failure_lines
+    from reports.verdict import remarks, warned
+
+    warnings = warned(plan.out)
+    for line in [*failure_lines(plan), *closed, *(warnings if plan.template.quiet else ())]:
+        sys.stderr.write(f"{line}\n")
+    of_the_result = [f"warning: {text}" for text in remarks(totals.pooled)]
+    for line in [*(() if plan.template.quiet else warnings), *of_the_result]:
+        say(line)
 
 
 def _plan(args: argparse.Namespace) -> "Plan":
@@ -124,7 +136,7 @@ def _plan(args: argparse.Namespace) -> "Plan":
     points = tuple(points_of(args.sweep, settings_of(args)))
     manifest, cases, notes = _to_score(args, manifest)
     notes = (*(f"assumed: {text}" for text in assumed_in(cases)), *notes)
-    for note in notes:
+    for note in () if args.quiet else notes:
         say(note)
     if cases:  # else nothing is written
         _guard(args, manifest, {case.id for case in cases}, settings)

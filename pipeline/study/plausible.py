@@ -1,6 +1,6 @@
 """What a manifest says and hardly can be: a wire that no guide wire is, an entry that leads out of the scan."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.load import Header, read_header
 from pipeline.model import Wire
 from pipeline.study.manifest import Case
+from pipeline.study.same_scans import shared
 from pipeline.study.settings import Config
 
 RADII_MM = (0.1, 0.5)
@@ -93,6 +94,15 @@ def _to_the_edge(case: Case, header: Header, sign: float) -> float:
     limit = np.where(step > 0.0, np.array(header.shape) - 0.5, -0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(max(0.0, np.nanmin(np.where(step != 0.0, (limit - start) / step, np.inf))))
+
+
+def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
+    """All that is doubtful in a study, by its manifest and the headers of its scans, a sentence each."""
+    yield from implausible(cases)
+    for case in cases:
+        scan = first_of(case, config)
+        yield from (f"case {case.id!r}: {text}" for text in (*leads_out(case, scan), *odd_depths(case, scan)))
+    yield from shared(cases)
 
 
 MEASURES = "compare.skip_mm", "compare.sample_mm", "compare.simulated_nulls", "trace.length_tolerance_mm"

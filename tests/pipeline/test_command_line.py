@@ -157,6 +157,7 @@ def test_a_guess_without_a_reference_is_called_poor_by_all(
     assert main(["check", str(scans)]) == 0
     assert "such a guess is several mm off" in capsys.readouterr().out
     main(["run", str(scans), "-o", str(tmp_path / "out"), "--until", "load", "-q"])
+    assert len(capsys.readouterr().out.splitlines()) == 1, "-q: neither the manifest nor what it assumes"
     case = json.loads(next((tmp_path / "out").glob("cases/*/result.json")).read_text(encoding="utf-8"))
     assert {text.partition(":")[0] for text in case["assumptions"]} >= {"wire", "roll_deg", "material_axis"}
     assert main(["init", str(scans), "--to", str(tmp_path / "m.toml"), "--entry", "1,2,3", "--direction", "0,0,1"]) == 0
@@ -499,3 +500,10 @@ def test_check_sees_an_entry_direction_that_is_turned_round(study: Path, capsys:
     (study / "back.toml").write_text(back, encoding="utf-8")
     assert main(["check", str(study / "back.toml")]) == 0
     assert "entry_direction leads out of the scan" in capsys.readouterr().out
+    run = ["run", str(study / "back.toml"), "-o", str(study.parent / "back")]
+    assert main([*run, "--dry-run"]) == 0
+    assert "warning: case 'straight': entry_direction leads out of the scan" in capsys.readouterr().out
+    main([*run, "-q", "--until", "load"])
+    heard = capsys.readouterr()
+    assert "warning: entry_direction leads out of the scan" in heard.err
+    assert len(heard.out.splitlines()) == 1, "-q prints the result alone"
