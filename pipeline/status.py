@@ -28,7 +28,7 @@ class FrameStatus(Enum):
     TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
     TRACE_WRONG_WAY = (
         "more of the wire lies behind the entry than beyond it; check that entry_direction points the way the wire is "
-        "pushed, or state insertion_mm"
+        "pushed, or state insertion_mm where it is not stated"
     )
     LENGTH_MISMATCH = (
         "the traced length disagrees with insertion_mm by more than trace.length_tolerance_mm; "

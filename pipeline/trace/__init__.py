@@ -13,7 +13,7 @@ from pipeline.trace.attempt import EntryPose
 from pipeline.trace.coarse import coarse_lumen, coarse_scan, times
 from pipeline.trace.config import TraceConfig
 from pipeline.trace.elsewhere import brightest_line
-from pipeline.trace.explain import explained, missed_mm
+from pipeline.trace.explain import explained, hardly_begun, missed_mm
 from pipeline.trace.stated import Opacity
 from pipeline.trace.subtraction import subtracting
 from pipeline.trace.verdict import near_rotation_plane
@@ -119,10 +119,6 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
-HARDLY_BEGUN = 0.25
-"""Share of the stated depth below which a trace may have been followed the wrong way."""
-
-
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
     """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
@@ -130,6 +126,6 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     note = f"trace: length: got {curve.length_mm:.2f} mm; expected {expected_mm:.2f} mm (insertion_mm) to within "
     note += f"{config.length_tolerance_mm} mm; look at the picture, then correct the manifest or "
     note += "trace.length_tolerance_mm"
-    if curve.length_mm < HARDLY_BEGUN * float(expected_mm or 0.0):
+    if hardly_begun(curve.length_mm, expected_mm):
         note += "; or entry_direction points back along the wire: turn it round"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

@@ -50,7 +50,8 @@ class Attempt:
 
     pieces : all crests that were seen; known : points (n, 3) that count as explained besides the tube's.
     behind_mm : length of the line before the path's first point, outside the entry.  goes_on : whether something faint
-    is seen past its tip.  confirmed : whether the manifest states a length.  late_mm : wire missing at the entry.
+    is seen past its tip.  confirmed : whether the manifest states a length.  short : whether it is hardly any of that
+    length.  late_mm : wire missing at the entry.
     """
 
     tube: Tube
@@ -62,6 +63,7 @@ class Attempt:
     behind_mm: float = 0.0
     goes_on: bool = False
     confirmed: bool = False
+    short: bool = False
     late_mm: float = 0.0
 
     @property

@@ -154,9 +154,9 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
 def of_the_way(attempt: Attempt, length_mm: float) -> tuple[Objection, ...]:
     """Why a curve may run the wrong way: said before all else, since what else is odd of it follows from that."""
     return (
-        (attempt.behind_mm > length_mm and not attempt.confirmed, FrameStatus.TRACE_WRONG_WAY,
+        (attempt.behind_mm > length_mm and (attempt.short or not attempt.confirmed), FrameStatus.TRACE_WRONG_WAY,
          f"{length_mm:.1f} mm of wire beyond the entry and {attempt.behind_mm:.1f} mm behind it", "more beyond it",
-         "turn entry_direction round, or state insertion_mm if this is right"),
+         "turn entry_direction round" + ", or state insertion_mm if this is right" * (not attempt.confirmed)),
     )  # fmt: skip
 
 

@@ -105,9 +105,19 @@ def _read_off(image: Subtraction, attempt: Attempt | None, entry: EntryPose) -> 
     points = attempt.tube.at(u)
     length = float(arc_length(image.world(points))[-1])
     late = float((points[0] - entry.point) @ entry.direction)
-    attempt = replace(attempt, confirmed=entry.expected_mm is not None, late_mm=late)
+    stated = entry.expected_mm
+    attempt = replace(attempt, confirmed=stated is not None, short=hardly_begun(length, stated), late_mm=late)
     verdict = judge(image, attempt, points, _on_bridges(points, attempt, image.voxel), length)
     return [Candidate(attempt, points, *point_sigmas(attempt.tube, u), length, verdict)]
+
+
+HARDLY_BEGUN = 0.25
+"""Share of the stated depth below which a trace may have been followed the wrong way."""
+
+
+def hardly_begun(length_mm: float, expected_mm: float | None) -> bool:
+    """Whether a length is next to nothing of the expected depth, farther off it than an entry is looked for."""
+    return expected_mm is not None and length_mm < min(HARDLY_BEGUN * expected_mm, expected_mm - ENTRY_REACH_MM)
 
 
 def missed_mm(length_mm: float, expected_mm: float | None, config: TraceConfig) -> float:

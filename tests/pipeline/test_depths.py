@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.model import Curve
 from pipeline.run.log import Log
-from pipeline.run.stages.depths import in_step, shrinking
+from pipeline.run.stages.depths import in_step, shrinking, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.known import Frame
 from pipeline.run.stages.repeated import once
@@ -154,3 +154,17 @@ def test_a_trace_that_hardly_begins_may_run_the_wrong_way() -> None:
     assert "entry_direction points back along the wire" in short.note
     assert long.status is FrameStatus.LENGTH_MISMATCH
     assert "entry_direction" not in long.note
+
+
+def test_a_direction_turned_round_is_said_once_for_all_frames() -> None:
+    """Two of six frames had advice of their own: to look for a second device, or for a fainter end."""
+    back, odd = FrameStatus.TRACE_WRONG_WAY, FrameStatus.TRACE_AMBIGUOUS
+    seen = [f.failed("trace", odd if f.index < 2 else back, "its own") for f in frames([0.1] * 6, DEPTHS)]
+    turned = turned_round(seen)
+    assert {(f.status, f.stage) for f in turned} == {("trace_wrong_way", "trace")}
+    (said,) = {f.message for f in turned}
+    assert "in 4 of 6 frames; expected more beyond it; entry_direction seems to be reversed" in said
+    trusted = frames([9.9], DEPTHS[:1])
+    assert turned_round([*seen, *trusted]) == [*seen, *trusted], "one that goes on beyond the entry speaks against it"
+    few = [f.failed("trace", odd) for f in frames([0.1] * 5, DEPTHS[:5])] + seen[-1:]
+    assert turned_round(few) == few

@@ -111,6 +111,13 @@ def test_what_cannot_be_told_is_refused(case, seed, status):
         assert "check that the frame shows a wire" in row.text
 
 
+def test_a_stated_depth_does_not_hide_that_the_direction_is_turned_round():
+    """It was a length that disagrees, to be corrected in the manifest."""
+    row = look("entry_direction the wrong way round", 3, expected_mm=30.0)
+    assert row.status == "TRACE_WRONG_WAY", row.text
+    assert "state insertion_mm" not in row.text
+
+
 def test_a_dim_end_may_be_a_catheters_unless_the_depth_is_stated():
     case, seed = "dim distal part, x 0.15 to 0.2", 518
     assert "state the wire's opacity if its end is so" in look(case, seed).text

@@ -46,6 +46,22 @@ def in_step(frames: Sequence[Frame], voxel_mm: float) -> list[Frame]:
     return out
 
 
+def turned_round(frames: Sequence[Frame]) -> list[Frame]:
+    """The frames; where no trace is trusted and most run the wrong way, all that were looked at say so, and it once.
+
+    Along a direction that is turned round the other frames met noise, or another vessel: their advice leads astray.
+    """
+    back = [f for f in frames if f.status == FrameStatus.TRACE_WRONG_WAY.identifier]
+    if any(f.trusted_curve is not None for f in frames) or 2 * len(back) <= len(frames):
+        return list(frames)
+    note = (
+        f"trace: wire: got more of it behind the entry than beyond it in {len(back)} of {len(frames)} frames; expected "
+        "more beyond it; entry_direction seems to be reversed: it points the way the wire is pushed; turn it round"
+    )
+    wrong = FrameStatus.TRACE_WRONG_WAY
+    return [f if f.curve is None else f.cleared(f.curve).failed("trace", wrong, note) for f in frames]
+
+
 def shrinking(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning where a traced wire gets shorter from one frame to the next and no depths are stated."""
     seen = [(f.index, c.length_mm) for f in frames if (c := f.trusted_curve) is not None and np.isnan(f.expected_mm)]

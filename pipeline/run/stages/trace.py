@@ -17,7 +17,7 @@ from pipeline.run.log import Log
 from pipeline.run.projections import grey_window, projections
 from pipeline.run.stages.before import NOTHING, Before
 from pipeline.run.stages.beside import beside_what_is_seen
-from pipeline.run.stages.depths import in_step, shrinking
+from pipeline.run.stages.depths import in_step, shrinking, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
@@ -51,7 +51,7 @@ def trace_frames(run: Context, known: Known) -> Known:
     run.log.assumptions += assumed
     frames, doubtful_gaps = own_gaps(frames, voxel_mm)
     run.log.warnings += doubtful_gaps
-    frames = in_step(frames, voxel_mm)
+    frames = in_step(turned_round(frames), voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
