@@ -29,6 +29,7 @@ DOTS_PER_INCH = 110
 WIDTH_INCH = 8.0
 LOG_FROM_RATIO = 20.0  # below a range of 20 a linear axis reads better
 LEAST_MM = 1e-3  # of a logarithmic axis: a trace is known to 0.01 mm at best, and equal curves differ by 1e-16
+ROOM_ABOVE = 0.06  # of the largest value: half a marker is 0.03 of a panel 1.5 inches high
 _ERROR_COLOURS = LinearSegmentedColormap.from_list("error", (SIMULATED, FAR))  # the viewer's
 _COLOURS = LinearSegmentedColormap.from_list("sequential", SEQUENTIAL)
 _ERROR_TICKS_MM = (ERROR_SCALE_MM[0], 0.1, 0.5, ERROR_SCALE_MM[1])  # no more: the bar beside two cases is an inch high
@@ -153,8 +154,15 @@ def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
         if known.min() < LEAST_MM:
             _end_at_least(axes)
     else:
-        # an axis of 1e-16 mm would make differences of nothing
-        axes.set_ylim(bottom=0.0, top=LEAST_MM if len(known) and known.max() < LEAST_MM else None)
+        from_zero(axes)
+        if len(known) and known.max() < LEAST_MM:
+            axes.set_ylim(0.0, LEAST_MM)  # an axis of 1e-16 mm would make differences of nothing
+
+
+def from_zero(axes: Axes) -> None:
+    """Let y begin at zero and end beyond the largest marker: matplotlib's margin is a share of the values' span."""
+    most = axes.dataLim.y1
+    axes.set_ylim(bottom=0.0, top=most * (1.0 + ROOM_ABOVE) if 0.0 < most < np.inf else None)
 
 
 def _end_at_least(axes: Axes) -> None:

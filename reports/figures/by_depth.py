@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from reports.case_files import CaseFiles
 from reports.colours import BAD, SIMULATED, TRACED
-from reports.figures._drawing import Drawing, FrameAxis, frames_of, legend, new_figure, plain, positive_axis
+from reports.figures._drawing import Drawing, FrameAxis, frames_of, from_zero, legend, new_figure, plain, positive_axis
 from reports.figures._style import GREY, SLATE, Look, lines, predictors
 from reports.schema import ERRORS
 from reports.tables import has
@@ -68,7 +68,7 @@ def tip_by_depth(case: CaseFiles) -> Drawing | None:
     if len(wrong):
         _line(top, wrong, "tip_mm", OTHER_BRANCH, marker="X", linestyle="", color=BAD)
     positive_axis(top, [good[column] for column in tips])
-    bottom.set_ylim(bottom=0.0)
+    from_zero(bottom)
     _mark_failed(top, case)
     _finish({top: "tip distance, mm", bottom: "tip angle, degrees"})
     table = _table(case, [*tips, *angles, "branch_ok"])
@@ -125,7 +125,7 @@ def forces_by_depth(case: CaseFiles) -> Drawing | None:
         return None
     figure, (top, forces), (bottom, overlaps) = _two_panels(good, 4.6, "force_by_depth", "overlap_by_depth")
     top.axhline(0.0, color="0.6", linewidth=0.8)
-    bottom.set_ylim(bottom=0.0)
+    from_zero(bottom)
     _finish({top: "push force, N", bottom: "deepest overlap\nwith the wall, mm"})
     return Drawing(figure, _table(case, [*forces, *overlaps]), frames=_depths(case, top, bottom))
 

@@ -407,6 +407,16 @@ def test_equal_curves_do_not_stretch_an_axis_down_to_rounding() -> None:
     assert axes.get_ylim() == (0.0, LEAST_MM)
 
 
+def test_the_largest_of_nearly_equal_values_has_room_for_its_marker() -> None:
+    """The axis ended 0.05 of their span above it, and cut it in half."""
+    axes = Figure().subplots()
+    axes.plot([0, 1, 2], [0.1, 0.101, 0.1005], marker="o")
+    positive_axis(axes, [[0.1, 0.101, 0.1005]])
+    low, high = axes.get_ylim()
+    assert low == 0.0
+    assert high > 1.04 * 0.101
+
+
 def test_errors_have_the_colours_of_the_viewer_in_figures(tmp_path: Path) -> None:
     """They had two scales: blue to pink in the viewer, dark to bright in the maps."""
     case = read_case(write_run(tmp_path / "out", (FakeCase("c", frames=3),)) / "cases" / "c")
@@ -514,7 +524,9 @@ def test_the_caption_speaks_of_a_cross_where_there_is_one(frame: int | None, tmp
     drawing = CASE_FIGURES["tip_by_depth"](read_case(path.parent))
     assert drawing is not None
     (entry,) = [entry for entry in declared("case") if entry["figure"] == "tip_by_depth"]
-    assert ("filled cross" in caption(entry["bad"], drawing.table)) == (frame is not None)
+    said = caption(entry["bad"], drawing.table)
+    assert ("filled cross" in said) == (frame is not None)
+    assert "by tens of degrees" in said, "any angle but a constant one swings"
 
 
 def test_a_clamp_from_the_manifest_is_no_fault_by_itself(tmp_path: Path) -> None:
