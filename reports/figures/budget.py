@@ -13,6 +13,7 @@ from reports.schema import BUDGET, ENTRIES
 from reports.tables import has, read_if_there
 
 _ROW_INCH, _REST_INCH = 0.24, 1.1
+MORE_ALONE = "more alone than together"
 
 
 def budget(case: CaseFiles) -> Drawing | None:
@@ -30,7 +31,16 @@ def budget(case: CaseFiles) -> Drawing | None:
         _by_source(next(panels), sources)
     if len(entries):
         _by_entry(next(panels), entries)
-    return Drawing(figure, pd.concat(shown))
+    note = pd.Series(MORE_ALONE, index=_more_alone(sources), dtype="string")  # the caption says why where there is one
+    return Drawing(figure, pd.concat(shown, ignore_index=True).assign(note=note))
+
+
+def _more_alone(sources: pd.DataFrame) -> "pd.Index[int]":
+    """Rows of single inputs, which stand above that of all of them, that have a longer bar than these."""
+    every = sources["source"].eq("inputs")
+    columns = ["u_mm", "distal_u_mm"]
+    single, most = sources.loc[~every.cummax(), columns], sources.loc[every, columns].max()
+    return single.index[single.gt(most).any(axis="columns")]
 
 
 def _by_source(axes: Axes, table: pd.DataFrame) -> None:

@@ -307,6 +307,18 @@ def test_no_caption_speaks_of_u_val_where_no_bar_is_of_it(tmp_path: Path) -> Non
     assert "twice u val" in said["budget"]
 
 
+@pytest.mark.parametrize(("roll", "ends", "said"), [(0.1, 0.2, False), (0.4, 0.2, True), (0.1, 0.5, True)])
+def test_a_source_that_is_larger_than_all_of_them_is_explained(
+    roll: float, ends: float, said: bool, tmp_path: Path
+) -> None:
+    """It looked like an error of the table. u_val and the error may be larger than the inputs, of course."""
+    rows = [("roll", roll, ends), ("inputs", 0.3, 0.4), ("u_val", 0.5, 0.6), ("error", 0.9, 0.9)]
+    table = [{"source": n, "sigma": "", "u_mm": u, "distal_u_mm": distal} for n, u, distal in rows]
+    tables.write(tmp_path / "budget.csv", BUDGET, table)
+    drawn = {s["figure"]: s["read"] for s in draw_sections("case", _empty_case(tmp_path), tmp_path, False)}
+    assert ("inputs do not add up" in drawn["budget"]) == said
+
+
 def test_release_frames_show_both_probabilities(tmp_path: Path) -> None:
     errors = {"frame": [0, 1], "status": ["ok", "ok"], "insertion_mm": [5.0, 9.0], "release": [np.nan, 0.7]}
     tables.write(tmp_path / "errors.csv", ERRORS, pd.DataFrame(errors | {"release_real": [np.nan, 0.3]}))
