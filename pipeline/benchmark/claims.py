@@ -241,11 +241,12 @@ def measure_claims(
     Leaves claims.csv, a row a claim, and orders.csv, a row for each point that an order was fitted to.
     """
     found = []
+    say("promises of the solver, a line each: what is measured, beside its aim where one is set")
     for claim in chain.from_iterable(study() for study in studies):
         found.append(claim)
-        verdict = {None: "", True: "met", False: "NOT MET"}[claim.met]
-        unit = claim.unit if claim.unit != "1" else ""
-        say(f"{claim.claim}: {claim.value:.4g} {unit} [{claim.aim}] {verdict}")
+        verdict = {None: "", True: ": met", False: ": NOT MET"}[claim.met]
+        unit = f" {claim.unit}" * (claim.unit != "1")
+        say(f"{claim.claim}: {claim.value:.4g}{unit}" + f"; aim {claim.aim}{verdict}" * bool(claim.aim))
     table = pd.DataFrame([asdict(claim) for claim in found])
     table[list(CLAIMS.names)].to_csv(out / CLAIMS_CSV, index=False)
     points = table[table["sizes"].str.len() > 0].explode(["sizes", "errors"]).drop(columns="unit")

@@ -30,6 +30,14 @@ VARIANTS = (
 CLOSED_FORM = SolverSetting(1.0, "closed_form", quadrature="joints", tolerance=1e-6, max_iterations=20_000)
 ASKED = ("method", "segment_mm", "hull", "quadrature", "tolerance")
 """The columns in which a row tells its setting."""
+SHOWN = (
+    ("scene", "scene", "<18", ""), ("method", "method", "<12", ""), ("segment, mm", "segment_mm", ">11", "g"),
+    ("hull", "hull", "<11", ""), ("quadrature", "quadrature", "<10", ""), ("tolerance", "tolerance", ">9", "g"),
+    ("ms per mm", "ms_per_mm", ">9", ".4f"), ("shape off, mm", "shape_error_mm", ">13", ".5f"),
+    ("tip off, mm", "tip_error_mm", ">11", ".5f"), ("iterations per mm", "iterations", ">17", ".2f"),
+    ("outcome", "status", "<1", ""),
+)  # fmt: skip
+"""What the terminal shows of a row: heading, column, width and form."""
 CLOSED_FORM_SHORTEST_MM = 1.0
 """Sweeps grow with the square of the number of joints: below 1 mm one insertion takes minutes."""
 
@@ -84,18 +92,16 @@ def _row(scene: BenchScene, setting: SolverSetting, run: Run, seconds: float, li
 def measure_cost(scenes: Sequence[BenchScene], out: Path, say: Callable[[str], None], *, quick: bool) -> None:
     """Run time against error: a line and a row for each scene and setting, then the settings to use."""
     rows, chosen = [], settings(quick=quick)
+    say("run time of a mm of insertion, and what the wire is off in the end, a line for each scene and setting:")
     for scene in scenes:
         long = [s for s in dict.fromkeys(setting.segment_mm for setting in chosen) if not scene.follows(s)]
         if long:
             lengths = ", ".join(f"{s:g}" for s in long)
             say(f"{scene.name}: left out: segments of {lengths} mm cannot follow the wire's rest curvature")
+    say("  ".join(f"{heading:{width}}" for heading, _, width, _ in SHOWN))
     for row in costs(scenes, chosen, 1 if quick else 3):
         rows.append(row)
-        say(
-            f"{row['scene']:18s} {row['method']:12s} {row['segment_mm']:5g} mm {row['hull']:11s} {row['quadrature']:9s}"
-            f" {row['tolerance']:6g}  {row['ms_per_mm']:9.4f} ms/mm  shape {row['shape_error_mm']:.5f}"
-            f"  tip {row['tip_error_mm']:.5f} mm  {row['iterations']:6.2f} it/mm  {row['status']}"
-        )
+        say("  ".join(f"{row[column]:{width}{form}}" for _, column, width, form in SHOWN))
     table = pd.DataFrame(rows)
     table.to_csv(out / SOLVER_CSV, index=False)
     for line in advice(table):

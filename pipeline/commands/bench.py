@@ -54,7 +54,7 @@ def _measured(args: argparse.Namespace) -> int:
     except (ManifestError, NoScene, LoadError) as error:
         return complain(getattr(error, "problems", [str(error)]), str(args.manifest))
     args.out.mkdir(parents=True, exist_ok=True)
-    say(f"machine: {page.machine()}")
+    say(f"machine: {page.machine()}\n{_takes(args)}")
     sound = True
     if args.stress:
         count = args.scenes or (QUICK_SCENES if args.quick else SCENES)
@@ -70,6 +70,14 @@ def _measured(args: argparse.Namespace) -> int:
         sound &= measure_claims(args.out, say, [*STUDIES, friction, *studies] if plain else studies)
     say(f"report: {page.write_page(args.out)}")
     return 0 if sound else 1
+
+
+def _takes(args: argparse.Namespace) -> str:
+    """How long the measurements take, as far as it is known before."""
+    if args.manifest is not None:
+        return "this takes minutes for each case, with short segments most of all: a line for each setting that is done"
+    slow = "" if args.quick else "; --quick is the shorter way"
+    return f"this takes minutes, from five on with two free cores: a line for each measurement that is done{slow}"
 
 
 def _wrong(args: argparse.Namespace) -> list[str]:
