@@ -13,7 +13,7 @@ from pipeline.calibrate.fit import Linear, Problem
 from pipeline.calibrate.residuals import Evidence
 from pipeline.calibrate.search import Fit, fitted, held_at_prior
 from pipeline.calibrate.trials import replayed
-from pipeline.calibrate.unknowns import Unknown
+from pipeline.calibrate.unknowns import Unknown, spread_in_words
 from pipeline.model import Array
 from pipeline.simulate.config import SolverConfig
 
@@ -92,7 +92,7 @@ def _judged(unknown: Unknown, fit: Fit, profile: tuple[tuple[float, float], ...]
     flat = [v for v, rise in near if not rise >= RISE]
     why = ""
     if sd > unknown.enough:
-        known, enough = (f"{100 * s:.3g} %" if unknown.logarithmic else f"{s:.3g}" for s in (sd, unknown.enough))
+        known, enough = (spread_in_words(s, logarithmic=unknown.logarithmic) for s in (sd, unknown.enough))
         why = f"known to {known} only; {enough} or less counts as seen"
     elif flat:
         why = f"the objective hardly rises towards {', '.join(f'{unknown.shown(v):.3g}' for v in flat)}"

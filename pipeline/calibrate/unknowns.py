@@ -47,6 +47,12 @@ class Unknown:
         return float(np.exp(value)) if self.logarithmic else value
 
 
+def spread_in_words(sd: float, *, logarithmic: bool) -> str:
+    """A standard deviation without an exponent; of the logarithm of a factor in per cent of it."""
+    value = 100.0 * sd if logarithmic else sd
+    return (f"{value:.3g}" if value < 1000.0 else f"{value:.0f}") + " %" * logarithmic
+
+
 def _factor(name: str, sd: float, most: float, step: float, what: str) -> Unknown:
     return Unknown(name, 0.0, sd, -float(np.log(most)), float(np.log(most)), step, SEEN_LOG, what)
 

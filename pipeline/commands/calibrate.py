@@ -52,6 +52,7 @@ def main(args: argparse.Namespace) -> int:
 
 def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Fit, write, and say what was found."""
+    from pipeline.calibrate.unknowns import spread_in_words
     from pipeline.run.calibration import calibrate, file_in, gathered
     from pipeline.run.calibration_files import flattened, misfit, write_parameters, write_record
     from reports.calibration import render_calibration
@@ -63,8 +64,9 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
     written = write_parameters(file, found, fit)
     write_record(args.out / "calibration.json", found, fit)
     for one in written.estimate:
-        sd = f"{100 * one.sd:.2g} %" if one.logarithmic else f"{one.sd:.2g}"
-        verdict = "" if one.seen else f"  not seen, as stated; fitted {one.value:g}: {one.why}"
+        sd = spread_in_words(one.sd, logarithmic=one.logarithmic)
+        unseen = f"  not seen in these traces, stays as stated; the fit alone gave {one.value:g}: {one.why}"
+        verdict = "" if one.seen else unseen
         say(f"{one.name:20s} {one.used:10g}  +- {sd:8s}{verdict}")
     for warning in (*misfit(fit), *flattened(found)):
         say(f"warning: {warning}")
@@ -80,6 +82,7 @@ def _fit(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", 
 
 def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config", store: "Store") -> int:
     """Predict and say."""
+    from pipeline.calibrate.unknowns import spread_in_words
     from pipeline.run.calibration import design
     from pipeline.run.calibration_files import write_design
     from reports.calibration import render_design
@@ -89,7 +92,8 @@ def _design(args: argparse.Namespace, cases: "tuple[Case, ...]", config: "Config
         say(f"planned: {note}")
     for row in rows:
         verdict = "seen" if row.seen else "not seen"
-        say(f"{row.unknown.name:20s} +- {row.sd:8.3g}  ({row.unknown.enough:g} counts as seen)  {verdict}")
+        sd, enough = (spread_in_words(s, logarithmic=row.unknown.logarithmic) for s in (row.sd, row.unknown.enough))
+        say(f"{row.unknown.name:20s} +- {sd:8s}  ({enough} or less counts as seen)  {verdict}")
     write_design(args.out / "design.json", rows, notes)
     say(f"page: {render_design(args.out)}")
     return 0

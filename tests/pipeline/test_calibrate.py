@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from pipeline.calibrate.fit import Problem
 from pipeline.calibrate.residuals import Evidence, weights_of
 from pipeline.calibrate.search import own_roll
 from pipeline.calibrate.trials import OWN, Point, Trial, replayed
-from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, unknowns
+from pipeline.calibrate.unknowns import BENDING, FRICTION, REST, ROLL, TAPER, bent, spread_in_words, unknowns
 from pipeline.cli import main
 from pipeline.compare.pooled import is_pooled
 from pipeline.model import Clamp, Curve, Lumen, Wall, Wire
@@ -307,7 +308,8 @@ def test_the_verb_writes_what_it_reads(study, capsys):
     assert [used.case for used in found.used] == ["a"]
     assert {"taper", "roll_offset_deg"} <= set(found.unseen)
     said = capsys.readouterr().out
-    assert "not seen, as stated" in said
+    assert "not seen in these traces, stays as stated; the fit alone gave" in said
+    assert not re.search(r"\d[eE][+-]?\d+ %", said), "it was +- 1e+02 %"
     assert "calibrated with a: 0 of 6 parameters seen.  parameters: " in said.splitlines()[-1]
     for one in found.estimate:
         assert f"{one.name:20s} {one.used:10g}  +-" in said, "the number that runs take, not one of another fit"
@@ -319,7 +321,9 @@ def test_the_verb_writes_what_it_reads(study, capsys):
 
 def test_a_planned_study_has_a_page(study, capsys):
     assert main(["calibrate", str(study / "manifest.toml"), "-o", str(study / "plan"), "--design"]) == 0
-    assert f"page: {study / 'plan' / 'design.html'}" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"page: {study / 'plan' / 'design.html'}" in said
+    assert "20 % or less counts as seen" in said
     page = (study / "plan" / "design.html").read_text(encoding="utf-8")
     assert "a: 3 frames, voxels of" in page
     assert "a tip with a curve, seen free of the wall" in page, "what would show the roll of a straight wire"
@@ -402,3 +406,5 @@ def test_how_well_a_factor_is_known_is_said_in_per_cent() -> None:
     said = [_judged(free[name], fit, ()).why for name in (TAPER, FRICTION)]
     assert said[0] == "known to 103 % only; 20 % or less counts as seen"
     assert said[1] == "known to 0.0754 only; 0.02 or less counts as seen"
+    assert spread_in_words(0.9951, logarithmic=True) == "99.5 %"  # it was 1e+02 %
+    assert spread_in_words(12.34, logarithmic=True) == "1234 %"
