@@ -86,8 +86,12 @@ class UsageError(InputError):
 
 
 def did_you_mean(key: str, allowed: Iterable[str]) -> str:
-    """Sentence naming the nearest allowed key, whatever its capitals, or all of them."""
-    names = sorted(allowed)
+    """Sentence naming the nearest allowed key, whatever its capitals, or all of them.
+
+    A key that lacks nothing but the end of an allowed one, as its unit, is nearest to that.
+    """
+    names, low = sorted(allowed), key.lower()
     small = {name.lower(): name for name in names}
-    close = get_close_matches(key, names, n=1) or [small[one] for one in get_close_matches(key.lower(), small, n=1)]
-    return f"did you mean {close[0]!r}?" if close else f"allowed: {', '.join(names)}"
+    longer = sorted((name for name in small if name.startswith(f"{low}_")), key=len)
+    close = [low] * (low in small) or longer or get_close_matches(low, small, n=1)
+    return f"did you mean {small[close[0]]!r}?" if close else f"allowed: {', '.join(names)}"

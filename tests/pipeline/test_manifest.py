@@ -63,6 +63,8 @@ def test_natural_order() -> None:
     ("change", "expected"),
     [
         (("radius_mm", "radus_mm"), "unknown key; did you mean 'radius_mm'?"),
+        (("wire = ", "roll = 60\nwire = "), "roll: unknown key; did you mean 'roll_deg'?"),  # it was 'role'
+        (("wire = ", "Insertion = [60]\nwire = "), "did you mean 'insertion_mm'?"),
         (('wire = "soft"', 'wire = "sofd"'), "not among [wires.*]; did you mean 'soft'?"),
         (("radius_mm = 0.18", "radius_mm = -1"), "radius_mm = -1: expected a number from 0.001 to 20"),
         (("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]"), "length zero"),
