@@ -72,7 +72,7 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _plans(args: argparse.Namespace) -> "dict[str, Plan]":
-    """A run for each simulator, the solver's own last; raises InputError."""
+    """A run for each simulator, the solver's own last; raises InputError or, for what was typed, UsageError."""
     from pipeline.run.cache import default_root
     from pipeline.run.calibrated import as_calibrated
     from pipeline.run.case import Job

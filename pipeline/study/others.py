@@ -9,7 +9,7 @@ from pydantic.config import JsonDict
 
 from pipeline.load.order import natural_key
 from pipeline.load.wires import KINDS, kind_of
-from pipeline.status import InputError
+from pipeline.status import UsageError
 from pipeline.study.sources import NAMES, Sources, Strict
 
 
@@ -34,12 +34,12 @@ def found_for(case: str, place: Path, alone: bool) -> list[str]:
     """The files that a place holds for a case, in natural order: of ``--curves``, a folder, a file or a pattern.
 
     A folder holds one of its own for each case (``CASE/`` or ``CASE.h5``) or is an output of `wireval run`; where the
-    manifest has one case, it may hold the files themselves. Raises InputError where none of this is so.
+    manifest has one case, it may hold the files themselves. Raises UsageError where none of this is so.
     """
     if any(mark in place.name for mark in "*?["):
         return _sorted(place.parent.glob(place.name)) if alone else _refuse(case, place, "a pattern serves one case")
     if not place.exists():
-        return _refuse(case, place, "no such file or folder")
+        raise UsageError([f"--curves {place}: no such file or folder"])
     if place.is_file():
         return [str(place)] if alone else _refuse(case, place, "one file serves one case")
     named = [place / "cases" / case / "frames.h5", place / case, place / f"{case}.h5", *[place] * alone]
@@ -66,20 +66,20 @@ def _sorted(paths: Any) -> list[str]:
 def _refuse(case: str, place: Path, why: str) -> list[str]:
     do = f"give a folder with one file a frame in {case}/ (left empty, every frame counts as failed), "
     do += "or the output of a run of this manifest"
-    raise InputError([f"case {case!r}: --curves {place}: {why}; {do}"])
+    raise UsageError([f"case {case!r}: --curves {place}: {why}; {do}"])
 
 
 def named(texts: Sequence[str]) -> dict[str, Path]:
-    """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises InputError."""
+    """``NAME=PLACE`` texts by name; one without a name is called as its folder is. Raises UsageError."""
     found: dict[str, Path] = {}
     for text in texts:
         name, equals, place = text.partition("=") if "=" in text and not Path(text).exists() else ("", "", text)
         name = name if equals else Path(place).absolute().stem
         if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or name.lower() == "wireval":
-            raise InputError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
+            raise UsageError([f"--curves {text!r}: the name {name!r}: letters, digits, - . _, and not 'wireval'"])
         if not place:
-            raise InputError([f"--curves {text!r}: no place after the name; write NAME=DIR"])
+            raise UsageError([f"--curves {text!r}: no place after the name; write NAME=DIR"])
         if name.lower() in map(str.lower, found):  # they name folders, which some disks do not tell apart
-            raise InputError([f"--curves {text!r}: the name {name!r} is taken; write NAME={place}"])
+            raise UsageError([f"--curves {text!r}: the name {name!r} is taken; write NAME={place}"])
         found[name] = Path(place)
     return found

@@ -314,7 +314,7 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
     (bare / "deeper").mkdir(parents=True)
     (bare / "notes.txt").touch()
     for curves, out, said in (
-        (tmp_path / "nowhere", "o", "no such file or folder"),
+        (tmp_path / "nowhere", "o", f"\n--curves {tmp_path / 'nowhere'}: no such file or folder\n"),
         (bare, "o", "no wire in it (.csv, .vtp, .mrk.json, .vtk, .h5, .hdf5); found deeper/, notes.txt; give a folder"),
         (mixed, "o", ".csv and .vtp files"),
         (f"wireval={full}", "o", "the name 'wireval'"),
@@ -322,7 +322,9 @@ def test_where_curves_are_looked_for(known: Known, tmp_path: Path, capsys: pytes
         (full, "full", "holds no score"),
     ):
         assert main(["score", str(known[0]), "--curves", str(curves), "-o", str(tmp_path / out), *QUICK]) == 2
-        assert said in capsys.readouterr().err
+        heard = capsys.readouterr().err
+        assert said in f"\n{heard}"
+        assert heard.endswith("1 problem in the command line; nothing was run\n"), "it was in the manifest"
 
 
 @pytest.mark.parametrize("names", [("sofa", "SOFA"), ("Wireval",)])
