@@ -34,7 +34,8 @@ def _require_name(name: str, info: ValidationInfo) -> None:
         allowed = f"allowed: {LONGEST_NAME}, and {LONGEST_PATTERN} for a whole path"
         raise saying(f"{info.field_name}: a name of {longest} bytes in a path of {len(name)}; {allowed}")
     if not Path(name).is_absolute() and Path(os.path.normpath(name)).parts[:1] == ("..",):
-        where = "leads out of the manifest's folder; give such a path as an absolute one"
+        meant = os.path.normpath((Path((info.context or {}).get("folder", "")) / name).absolute())
+        where = f"leads out of the manifest's folder; if it is meant, write {meant!r}"
         raise saying(f"{info.field_name} = {name!r} {where}")
 
 

@@ -94,7 +94,7 @@ def test_uint16_beyond_32767_is_not_folded(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("frames", '"../frames/*.mha"', "leads out of the manifest's folder"),
+        ("frames", '"../frames/*.mha"', "leads out of the manifest's folder; if it is meant, write '/"),
         ("frames", '["a/../../b.mha"]', "leads out of the manifest's folder"),
         ("frames", '"/**/*.mha"', "whole machine"),
         ("frames", "[]", "an empty list"),

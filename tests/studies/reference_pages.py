@@ -146,9 +146,11 @@ def manifest() -> str:
     parts = [
         "# The manifest\n",
         NOTE,
-        "TOML; paths are relative to the file; an unknown key is an error that names the nearest known one. `wireval\n"
-        "init FOLDER` writes one from a folder of scans, `wireval check FILE` lists every problem at once. For\n"
-        "editors: [manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
+        "TOML; paths are relative to the file and stay below its folder: one that leads out of it (`../scans`) is\n"
+        "refused, so that it is plain what a manifest reads elsewhere; write such a path as an absolute one. An\n"
+        "unknown key is an error that names the nearest known one. `wireval init FOLDER` writes one from a folder of\n"
+        "scans, `wireval check FILE` lists every problem at once. For editors:\n"
+        "[manifest.schema.json](../schema/manifest.schema.json) (in the first line: `#:schema PATH`).\n",
     ]
     names = {"Wire": "[wires.NAME]", "Case": "[[case]]", "Wall": "[case.wall]", "OverWire": "[case.catheter]"}
     names |= {"Uncertainty": "[case.uncertainty]", "Others": "[case.simulated]"}
