@@ -69,7 +69,10 @@ class CaseFiles:
         return dict(self.result.get("summary", {}))
 
     def read_frame(self, frame: int) -> FrameArrays:
-        """Read the arrays of one frame from the disk; kept by nobody."""
+        """Read the arrays of one frame from the disk; kept by nobody. Raises KeyError, naming those that there are."""
+        if frame not in self.frames:
+            there = f"there are {listed([*map(str, self.frames)])}" if self.frames else "there is none"
+            raise KeyError(f"case {self.name!r} has no arrays of frame {frame!r}; {there}")
         return frames_file.read_frame(self.folder / "frames.h5", frame)
 
 

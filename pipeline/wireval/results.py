@@ -3,17 +3,26 @@
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 
 import pandas as pd
 
 from pipeline.run.gate import gate
-from pipeline.status import InputError
+from pipeline.status import InputError, did_you_mean
 from reports import tables
 from reports.case_files import CaseFiles, amiss, find_cases, not_run, read_case
 from reports.origin import mixed_settings
 from reports.schema import ERRORS, FAILURES, OVERALL_FILE, POINTS, SUMMARY, SWEEP, Table
 
 _SHOWN = ["case", "status", "frames", "frames_ok", "rms_mm", "tip_median_mm", "skill_strongest", "strongest_null"]
+
+
+class Cases(dict[str, CaseFiles]):
+    """The folders of cases by id."""
+
+    def __missing__(self, name: object) -> NoReturn:
+        """KeyError that names what there is."""
+        raise KeyError(f"no case {name!r}; {did_you_mean(str(name), self) if self else 'there is none'}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,7 +41,7 @@ class Results:
     errors: pd.DataFrame
     failures: pd.DataFrame
     sweep: pd.DataFrame
-    cases: dict[str, CaseFiles]
+    cases: Cases
     closed: tuple[str, ...] = ()
 
     @property
@@ -90,7 +99,7 @@ def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:
 
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items()}, ERRORS)
-    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), cases)
+    return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), Cases(cases))
 
 
 def _of_all(by_case: dict[str, pd.DataFrame], kind: Table) -> pd.DataFrame:

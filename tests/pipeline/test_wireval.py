@@ -53,6 +53,10 @@ def test_a_run_gives_frames(study: Path, tmp_path: Path) -> None:
     rms = (last["error_mm"] ** 2).mean() ** 0.5
     assert rms == pytest.approx(results.errors["rms_mm"].iloc[1], rel=1e-6)
     assert results.cases["straight"].read_frame(1).simulated_mm is not None
+    with pytest.raises(KeyError, match="no case 'strait'; did you mean 'straight'"):
+        results.cases["strait"]
+    with pytest.raises(KeyError, match="case 'straight' has no arrays of frame 2; there are 0, 1"):
+        results.cases["straight"].read_frame(2)
     assert "straight" in results._repr_html_()
     assert "1 case, 2 frames, 0 failures" in repr(results)
     assert len(repr(results).splitlines()) < 13
