@@ -47,13 +47,13 @@ class _Found:
         return self.site.grid.with_values(read_only(self.wall.values))
 
 
-def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig) -> _Found:
+def _found(grid: Grid, seeds_mm: ArrayLike, config: SegmentConfig, wire: bool) -> _Found:
     region = METHOD(grid, seeds_mm, config)
     shown, region, least = evened(grid, region, lambda filled: METHOD(filled, seeds_mm, config))
     site = prepare(shown, region.voxels, region.taps, config.margin_mm, region.thin)
-    wall = wall_of(site, region.levels, config.outer_mm)
+    wall = wall_of(site, region.levels, config.outer_mm, wire)
     blur = scanner_blur(wall.blur_mm, region.taps, float(np.min(grid.spacing_mm)))
-    return _Found(shown, region, least, site, wall, blur)
+    return _Found(shown, region, min(least, wall.least), site, wall, blur)
 
 
 def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: SegmentConfig, wire_mm: float) -> _Found:
@@ -62,7 +62,7 @@ def _around_wire(grid: Grid, found: _Found, seeds_mm: ArrayLike, config: Segment
     if seed is None:
         return found
     try:
-        vessel = _found(grid, seed, config)
+        vessel = _found(grid, seed, config, wire=True)
     except StageError:  # nothing but tissue around it
         return found
     return vessel if swallowed(found.distance, vessel.distance) else found
@@ -81,7 +81,7 @@ def segment(
     """
     config = config or SegmentConfig()
     grid, axes = in_memory_order(volume)
-    found = _found(grid, seeds_mm, config)
+    found = _found(grid, seeds_mm, config, wire_radius_mm is not None)
     if wire_radius_mm is not None:
         found = _around_wire(grid, found, seeds_mm, config, wire_radius_mm)
     grid, region, site, wall, blur = found.grid, found.region, found.site, found.wall, found.blur

@@ -1,17 +1,12 @@
-"""From a mask and grey values to a signed distance: half-level surface, closest points, correction of the blur's bias.
+"""From a mask and grey to a signed distance: half-level surface, closest points, correction of the blur's bias.
 
-Blur puts the half-level surface of a curved wall inside the true wall. For a wall of small curvature the offset is
-sigma^2 (k1 + k2) / 2; for a tube as thin as the blur it is far more, so the offset is taken from the exact profile of a
-blurred cylinder (a Marcum Q function, here the non-central chi^2).
+Where the vessel is filled unevenly across, the wall's level is that of its own side.
 """
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import ncx2
 
 from pipeline.arrays.cores import in_parts
 from pipeline.arrays.grids import unflattened
@@ -21,9 +16,11 @@ from pipeline.segment._kernels.contact import Inner
 from pipeline.segment._kernels.distance import Owned, distances, lost_feet
 from pipeline.segment._kernels.voxels import extent, rebased
 from pipeline.segment._kernels.wall import PAD, Wall, dilate, feet, mean_around, smooth_lattice, surface_voxels
+from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.segment.closest import find_closest
 from pipeline.segment.contact import numbered
 from pipeline.segment.levels import GreyLevels, Index, failed, grey_around, plateau, scanner_blur
+from pipeline.segment.settled import INWARDS, Filled, filled_unevenly
 from solver.grid import Array, Grid, read_only
 
 LAYERS = 4
@@ -39,60 +36,11 @@ SURFACE_ROUNDS = 3
 NOISE_LEFT = 0.29
 """Share of a voxel's noise that moves the wall, after smoothing: with 0.6 to 0.2 mm voxels, noise of 0.03 to 0.21 of
 the contrast, the wall is off by 0.06 to 0.22 voxels (standard deviation), of which 0.07 is not due to noise."""
-INWARDS = 2.5
-"""How far inside the wall, in voxels, the grey has reached its plateau."""
-THINNEST = 1.2
-"""Radius over blur below which a blurred cylinder no longer reaches half its contrast (1.177), with a margin."""
+PLACES = 30_000
+"""Places on the wall, or so, at which its filling is looked at."""
 
 
 Shape = tuple[int, int, int]
-
-
-def _half_radius(radius: float) -> float:
-    """Radius at which a cylinder of ``radius``, blurred by sigma 1, falls to half its contrast."""
-    return float(brentq(lambda r: ncx2.cdf(radius**2, 2, r**2) - 0.5, 1e-9, radius))
-
-
-@lru_cache(maxsize=1)
-def _table() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Of blurred cylinders of radius R in units of the blur: curvature 1/r of the half-level surface (ascending), its
-    offset R - r, and the slope there over that of a flat wall, 1 / sqrt(2 pi).
-    """
-    radii = np.concatenate([np.geomspace(60.0, 2.0, 30), np.linspace(1.95, THINNEST, 30)])
-    half = np.array([_half_radius(float(r)) for r in radii])
-    d = 1e-4
-    fall = ncx2.cdf(radii**2, 2, (half - d) ** 2) - ncx2.cdf(radii**2, 2, (half + d) ** 2)
-    slope = np.sqrt(2 * np.pi) * fall / (2 * d)
-    bulge, offset, slope = (np.concatenate([[a], b]) for a, b in ((0.0, 1.0 / half), (0.0, radii - half), (1.0, slope)))
-    return bulge, offset, slope
-
-
-def blur_of_wall(steepness: NDArray[np.float64], curvature: NDArray[np.float64], contrast: float) -> float:
-    """The blur (mm) that makes a wall of this curvature (n,), 1/mm, as steep as measured (n,), grey per mm.
-
-    A flat wall falls by contrast / (sigma sqrt(2 pi)) per mm, a thin vessel's by less: a fixed point in sigma. The
-    60th percentile of steepness stands for a wall that nothing else touches.
-    """
-    bulge, _, slope = _table()
-    typical = float(np.percentile(steepness, 60))
-    bend = max(0.0, float(np.median(curvature)))
-    flat = contrast / (np.sqrt(2 * np.pi) * typical)
-    sigma = flat
-    for _ in range(20):
-        sigma = 0.5 * (sigma + flat * float(np.interp(sigma * bend, bulge, slope)))
-    return float(sigma)
-
-
-def half_level_offset(curvature: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
-    """How far the true wall lies outside the half-level surface.
-
-    curvature : (n,) sum of principal curvatures of that surface, 1/mm, positive where it bulges outwards.
-    sigma : the whole blur (scanner and smoothing), mm. Returns mm; negative where the surface is hollow.
-    """
-    scaled = sigma * np.asarray(curvature, float)
-    bulge, offset, _ = _table()
-    thin = np.interp(np.maximum(scaled, 0.0), bulge, offset)
-    return np.asarray(sigma * np.where(scaled > 0, thin, 0.5 * scaled))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +56,10 @@ class Site:
     corner: Index
     state: NDArray[np.uint8]
     near: Index
+
+    def from_first(self, feet: Array) -> Array:
+        """Places (n, 3) of the padded box, mm, from the volume's first voxel."""
+        return np.asarray(feet + (self.corner - PAD) * self.volume.spacing_mm)
 
     @property
     def grid(self) -> Grid:
@@ -169,15 +121,20 @@ def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArra
     return np.asarray(grey_around(site.volume, inwards) <= levels.brightest)
 
 
-def _corrected(wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, voxel: float) -> Wall:
-    """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood.
+def _corrected(
+    wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, site: Site, filled: Filled | None
+) -> Wall:
+    """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood, and by its own filling.
 
     Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
     """
+    voxel = float(np.min(site.volume.spacing_mm))
     bend = np.clip(wall.curvature, -1.0 / voxel, 1.0 / voxel)
     good, sharp = np.isfinite(wall.distance), bend
     bend = np.concatenate(in_parts(lambda part: mean_around(owner, part, sharp, good, 2), voxels))
     offset = half_level_offset(bend, blur_mm)
+    if filled is not None:
+        offset += blur_mm * filled.at(site.from_first(wall.foot))[0]
     foot = wall.foot + offset[:, None] * wall.normal
     return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)
 
@@ -201,12 +158,16 @@ class SignedDistance:
     values : float32, mm, negative inside, on the site's grid; ``outer_mm`` wherever the wall is further away outside.
 
     levels : the wall is at their half level.  blur_mm : the whole blur of the wall, scanner's and smoothing's.
+    wall : some places (n, 3) on it, mm from the scan's first voxel, and outward normals (n, 3).  least : the lowest
+    share of the contrast across the vessel.
     """
 
     values: NDArray[np.float32]
     levels: GreyLevels
     blur_mm: float
     counters: Counters
+    wall: tuple[Array, Array]
+    least: float = 1.0
 
     @property
     def noise_mm(self) -> float:
@@ -215,16 +176,20 @@ class SignedDistance:
         return float(NOISE_LEFT * levels.noise * np.sqrt(2 * np.pi) * self.blur_mm / levels.contrast)
 
 
-def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
-    """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface."""
+def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Filled | None = None) -> SignedDistance:
+    """The distance from the half-level surface, corrected for blur; raises StageError where there is no surface.
+
+    filled : how far the vessel is filled along its wall, where that is known to differ.
+    """
     spacing: Array = np.asarray(site.volume.spacing_mm)
     inside = sparse_zeros(site.state.shape, np.uint8)
     owner = np.full(site.state.shape, 0, np.int32)  # written to all over: in large pages, which zeros are not given
     box = Owned(owner, inside, spacing)
-    voxels, wall = _half_level_wall(site, levels.half, inside)
+    level = levels.half if filled is None else filled.level(levels)
+    voxels, wall = _half_level_wall(site, level, inside)
     good = np.isfinite(wall.distance)
     if not good.any():
-        got = f"got no place where smoothed grey is {levels.half:.0f}, half way between the vessel and its surroundings"
+        got = f"got no place where smoothed grey is {level:.0f}, half way between the vessel and its surroundings"
         do = "the vessel is thinner than its blur: scan with smaller voxels, or set segment.scale = 0"
         raise failed(got, "a surface", do)
     seen = voxels[good]
@@ -232,8 +197,10 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
     own = good.copy()
     own[good] = _own(site, levels, seen, wall.normal[good])
     own = own if own.any() else good
+    if filled is not None:
+        wall = wall._replace(steepness=wall.steepness / filled.at(site.from_first(wall.foot))[1])
     blur = blur_of_wall(wall.steepness[own], wall.curvature[own], levels.contrast)
-    wall = _corrected(wall, voxels, owner, blur, float(spacing.min()))
+    wall = _corrected(wall, voxels, owner, blur, site, filled)
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = find_closest(box, seen, wall.foot, outer_mm)
     stray = lost_feet(box, voxels, wall.foot, good)
@@ -242,11 +209,15 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDi
         visits += find_closest(box, voxels[stray], wall.foot, outer_mm)
     values = signed(box, (wall.foot, wall.normal, wall.curvature), outer_mm, PAD)
     counters = {"surface_voxels": float(len(voxels)), "distance_visits": float(visits)}
-    return SignedDistance(values, levels, blur, counters)
+    some = np.flatnonzero(good)[:: max(1, np.count_nonzero(good) // PLACES)]
+    return SignedDistance(values, levels, blur, counters, (site.from_first(wall.foot[some]), wall.normal[some]))
 
 
-def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
-    """The distance from the wall, whose level is estimated again from each surface found until it hardly changes."""
+def wall_of(site: Site, levels: GreyLevels, outer_mm: float, wire: bool = False) -> SignedDistance:
+    """The distance from the wall, whose level is estimated again from each surface found until it hardly changes.
+
+    wire : whether the scan shows one, which is brighter than the vessel.
+    """
     voxel = float(np.min(site.volume.spacing_mm))
     found = signed_distance(site, levels, outer_mm)
     for _ in range(SURFACE_ROUNDS):
@@ -260,8 +231,13 @@ def wall_of(site: Site, levels: GreyLevels, outer_mm: float) -> SignedDistance:
         levels = again
         del found  # before the next takes its place in memory
         found = signed_distance(site, levels, outer_mm)
+    distance = site.grid.with_values(read_only(found.values))
+    filled = filled_unevenly(site.volume, distance, site.corner, again, found.wall, wire)
+    if filled is not None:
+        levels = again
+        found = signed_distance(site, levels, outer_mm, filled)
     # what is left of the change moves the wall by change over steepness
     steepness = levels.contrast / (np.sqrt(2 * np.pi) * found.blur_mm)
     values = found.values
     values += np.float32((again.half - levels.half) / steepness)
-    return SignedDistance(values, again, found.blur_mm, found.counters)
+    return replace(found, levels=again, least=1.0 if filled is None else filled.least)

@@ -132,6 +132,6 @@ def warning(least: float) -> tuple[str, ...]:
     if least >= EVEN:
         return ()
     return (
-        f"segment: the vessel's contrast falls to {100 * least:.0f} % along it, allowed {100 * EVEN:.0f} %; its wall "
+        f"segment: the vessel's contrast falls to {100 * least:.0f} % in it, allowed {100 * EVEN:.0f} %; its wall "
         "was taken half way to the local level: look whether the lumen is whole, or scan again with the vessel filled",
     )

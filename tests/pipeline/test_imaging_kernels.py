@@ -12,7 +12,7 @@ from scipy.stats import ncx2
 from pipeline.arrays.jets import Blurred, jet, ridge_frame, ridge_step
 from pipeline.arrays.spare import Spare
 from pipeline.segment._kernels.wall import hessian, value_gradient
-from pipeline.segment.surface import blur_of_wall, half_level_offset
+from pipeline.segment.blurred import blur_of_wall, half_level_offset
 from pipeline.trace._kernels.tube import Blob, Claim, active_voxels, normal_equations
 from pipeline.trace.tube import Tube, fit_tube, predicted, sampled, sampling, tint_nodes
 

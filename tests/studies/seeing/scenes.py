@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from pipeline.model import Volume
@@ -493,3 +494,17 @@ def dark_end(rng, seed):
     d = Draft(rng, radius=2.2, room=0.6)
     d.opacity = np.where(d.from_tip < rng.uniform(4.0, 8.0), -rng.uniform(0.2, 0.4), 1.0)
     return d.scan((8, 16)[seed % 2], reference=seed % 4 < 2)
+
+
+@case("contrast that has settled")
+def settled(rng, seed):
+    d = Draft(rng, radius=rng.uniform(1.5, 2.5))
+    faint, edge = rng.uniform(0.4, 0.75), rng.uniform(0.1, 0.4)
+    down = np.cross(d.axis[-1] - d.axis[0], rng.normal(size=3))
+    centres = d.lattice.centres()
+    at = cKDTree(d.axis).query(centres)[1]
+    depth = (centres - d.axis[at]) @ down / np.linalg.norm(down) - rng.uniform(-0.5, 0.5) * d.radius[at]
+    share = (faint + (1 - faint) / (1 + np.exp(-depth / edge))).reshape(d.lattice.shape)
+    d.more = [(share * r.vessel(d.lattice, d.axis, d.radius), r.CONTRAST)]
+    d.level *= 0  # all of it is drawn by ``more``
+    return d.scan((8, 16)[seed // 2 % 2], reference=seed % 2 == 0)

@@ -120,7 +120,7 @@ def lumen_faults(lumen, scene):
 
 LUMENS = (
     "stenosis", "stenosis, no reference", "contrast that decays by 60 %", "layered filling", "bone that touches",
-    "0.9 mm wire, voxels of 0.1 to 0.3 mm, no reference",
+    "contrast that has settled", "0.9 mm wire, voxels of 0.1 to 0.3 mm, no reference",
 )  # fmt: skip
 
 
