@@ -23,10 +23,11 @@ PARTS = {
     "synthetic": Part(synthetic.SCENES, 1e-6),
     # single precision (6e-8) is summed over voxels there, and fits end where they change little
     "imaging": Part(imaging.SCENES, 1e-4),
-    "runs": Part(runs.SCENES, 1e-4),
+    # with eight members a budget's scores move by 2e-4 from one processor to another
+    "runs": Part(runs.SCENES, 1e-3),
     "traces": Part(traces.SCENES, 1e-4),
     # what hardly shows in the traces hangs on their last digits
     "fits": Part(fits.SCENES, 1e-3),
-    # sizes and places are what they are set to; a picture on paper is drawn
-    "pages": Part(pages.SCENES, 1e-6),
+    # sizes and places are what they are set to, but for points of a convergence study that are rounding alone
+    "pages": Part(pages.SCENES, 1e-5),
 }

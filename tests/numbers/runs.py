@@ -67,11 +67,17 @@ def everything(out: Path) -> Numbers:
 
 
 def study(
-    scene: str, *settings: str, frames: int = 2, size: int = 56, insertions: int = 1, scored: bool = False
+    scene: str,
+    *settings: str,
+    frames: int = 2,
+    size: int = 56,
+    insertions: int = 1,
+    seed: int = 4,
+    scored: bool = False,
 ) -> Numbers:
     """A scene of the catalogue written and run, and all of the output read; of the score of its own wires, if so."""
     with tempfile.TemporaryDirectory() as folder, drawn() as looks:
-        place = [f"{folder}/study", "--frames", str(frames), "--size", str(size), "--seed", "4", "-q"]
+        place = [f"{folder}/study", "--frames", str(frames), "--size", str(size), "--seed", str(seed), "-q"]
         assert main(["synth", scene, "-o", *place, "--insertions", str(insertions)]) == 0
         manifest, out = f"{folder}/study/manifest.toml", f"{folder}/out"
         main(["run", manifest, "-o", out, "--no-cache", "-q", *settings])
@@ -82,8 +88,9 @@ def study(
 
 
 SCENES: dict[str, Scene] = {
+    # of seeds 4 to 8 the one in which no member of the budget comes to rest otherwise by another processor's rounding
     "insertions": lambda: study(
-        "bend", "--sweep", "simulate.roll_offset_deg=20", "--set", "budget.members=8", insertions=2
+        "bend", "--sweep", "simulate.roll_offset_deg=20", "--set", "budget.members=8", insertions=2, seed=6
     ),
     "missing": lambda: study("missing-wire", "--set", "simulate.depth=manifest", frames=3, size=64),
     "scored": lambda: study("oblique", size=64, scored=True),
