@@ -23,8 +23,11 @@ ROOM = 2.0
 LEAST_PLACES = 200
 AROUND = 40
 """Places beside each other whose shares are averaged; each is a mean over 3^3 voxels before."""
-LOOKED_AT = 2000
-"""Places at which it is looked first whether the vessel is filled evenly."""
+WIDELY = 300
+"""The same where it is looked whether the vessel is filled evenly: with 40, correlated noise at a contrast of 4 to 6
+looks like sides filled to 0.78 of the fullest, with 300 to 0.87."""
+LOOKED_AT = 1000
+"""Places at which that is looked at."""
 FEW = 5.0
 """Percentage of the wall that may be filled otherwise before the vessel counts as filled unevenly."""
 FAINT = 0.55
@@ -78,13 +81,13 @@ def filled_unevenly(
     share = (grey_around(scan, inner[kept] + corner) - levels.outside) / levels.contrast
     share = np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
     places = cKDTree(feet[kept])
-    few = _around(places, places.data[:: max(1, places.n // LOOKED_AT)], share)
+    few = _around(places, places.data[:: max(1, places.n // LOOKED_AT)], share, min(WIDELY, places.n // 4))
     low, full = np.percentile(few, (FEW, 50.0 if wire else 100.0 - FEW))
     if low >= EVEN * full:
         return None
-    return Filled(places, _around(places, places.data, share), float(low), float(low / full))
+    return Filled(places, _around(places, places.data, share, AROUND), float(low), float(low / full))
 
 
-def _around(places: cKDTree, at: Array, values: Array) -> Array:
-    """Means (n,) of the values of the AROUND places next to points (n, 3)."""
-    return np.asarray(np.mean(values[places.query(at, AROUND)[1]], axis=1))
+def _around(places: cKDTree, at: Array, values: Array, count: int) -> Array:
+    """Means (n,) of the values of the ``count`` places next to points (n, 3)."""
+    return np.asarray(np.mean(values[places.query(at, count)[1]], axis=1))
