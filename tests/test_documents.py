@@ -66,7 +66,13 @@ def typed(line: str, done: set[tuple[str, ...]]) -> None:
         assert main(words[1:]) == 0, line
 
 
-@pytest.mark.parametrize("page", QUICK, ids=label)
+SLOW = {"calibrate.md"}
+"""Half a minute: what it shows is tested by itself."""
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.name in SLOW), id=label(p)) for p in QUICK]
+)
 def test_blocks_run_as_typed(
     page: Path, desk: Path, done: set[tuple[str, ...]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

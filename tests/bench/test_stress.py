@@ -30,6 +30,7 @@ SAMPLE = 100
 SECONDS = 8.0
 
 
+@pytest.mark.slow  # a minute; `make stress` judges them all
 def test_a_random_part_of_the_scenes_ends_as_it_may() -> None:
     run_scene(SEED, 3)  # compiles, on nobody's clock
     stop = time.perf_counter() + SECONDS

@@ -95,6 +95,7 @@ def test_in_lanes_the_same_is_told() -> None:
         np.testing.assert_allclose(told(one)[1], told(other)[1], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_softest_mode_is_the_same_wherever_its_search_begins() -> None:
     """The rung above which a wire gives way, climbed one after the other, and the direction that it gives way in."""
     insertion = into_fork(0.01)
