@@ -13,7 +13,7 @@ import pytest
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-LONGEST = ("test_run.py", "test_catalogue.py", "test_score.py", "test_stress.py", "test_documents.py")
+LONGEST = ("test_run.py", "test_catalogue.py", "test_score.py", "test_documents.py")
 """One to three minutes each, some in two tests: begun last, every other worker would wait for them."""
 
 

@@ -26,8 +26,8 @@ AROUND = 40
 WIDELY = 300
 """The same where it is looked whether the vessel is filled evenly: with 40, correlated noise at a contrast of 4 to 6
 looks like sides filled to 0.78 of the fullest, with 300 to 0.87."""
-LOOKED_AT = 1000
-"""Places at which that is looked at."""
+LOOKED_AT = 2000
+"""Places, or so, at which that is looked at, of all vessels: all places are for those that are filled unevenly."""
 FEW = 5.0
 """Percentage of the wall that may be filled otherwise before the vessel counts as filled unevenly."""
 FAINT = 0.55
@@ -76,18 +76,24 @@ def filled_unevenly(
     inner = np.rint((feet - INWARDS * h * normals) / scan.spacing_mm).astype(np.int64) - corner
     kept = np.all((inner >= 0) & (inner < distance.shape), axis=1)
     kept[kept] = distance.values[tuple(inner[kept].T)] < -ROOM * h
-    if np.count_nonzero(kept) < LEAST_PLACES:
+    at = np.flatnonzero(kept)
+    if len(at) < LEAST_PLACES:
         return None
-    share = (grey_around(scan, inner[kept] + corner) - levels.outside) / levels.contrast
-    share = np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
-    places = cKDTree(feet[kept])
-    few = _around(places, places.data[:: max(1, places.n // LOOKED_AT)], share, min(WIDELY, places.n // 4))
+
+    def read(at: Index) -> tuple[cKDTree, Array]:
+        share = (grey_around(scan, inner[at] + corner) - levels.outside) / levels.contrast
+        return cKDTree(feet[at]), np.clip(share, LOWEST, HIGHEST if wire else BRIGHTER)
+
+    step = max(1, len(at) // LOOKED_AT)
+    places, share = read(at[::step])
+    few = _around(places, share, min(WIDELY // step, places.n // 4))
     low, full = np.percentile(few, (FEW, 50.0 if wire else 100.0 - FEW))
     if low >= EVEN * full:
         return None
-    return Filled(places, _around(places, places.data, share, AROUND), float(low), float(low / full))
+    places, share = read(at)
+    return Filled(places, _around(places, share, AROUND), float(low), float(low / full))
 
 
-def _around(places: cKDTree, at: Array, values: Array, count: int) -> Array:
-    """Means (n,) of the values of the ``count`` places next to points (n, 3)."""
-    return np.asarray(np.mean(values[places.query(at, count)[1]], axis=1))
+def _around(places: cKDTree, values: Array, count: int) -> Array:
+    """Means (n,) of the values (n,) of the ``count`` places next to each."""
+    return np.asarray(np.mean(values[places.query(places.data, count)[1]], axis=1))

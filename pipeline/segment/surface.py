@@ -122,19 +122,16 @@ def _own(site: Site, levels: GreyLevels, voxels: Index, normal: Array) -> NDArra
 
 
 def _corrected(
-    wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, site: Site, filled: Filled | None
+    wall: Wall, voxels: Index, owner: NDArray[np.int32], blur_mm: float, voxel: float, blurs: Array | float
 ) -> Wall:
-    """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood, and by its own filling.
+    """The wall moved out by the blur's offset, its curvature averaged over the neighbourhood, and by so many blurs.
 
     Curvature is a second derivative of noisy grey: its mean over 5^3 voxels is what the offset is taken from.
     """
-    voxel = float(np.min(site.volume.spacing_mm))
     bend = np.clip(wall.curvature, -1.0 / voxel, 1.0 / voxel)
     good, sharp = np.isfinite(wall.distance), bend
     bend = np.concatenate(in_parts(lambda part: mean_around(owner, part, sharp, good, 2), voxels))
-    offset = half_level_offset(bend, blur_mm)
-    if filled is not None:
-        offset += blur_mm * filled.at(site.from_first(wall.foot))[0]
+    offset = half_level_offset(bend, blur_mm) + blur_mm * blurs
     foot = wall.foot + offset[:, None] * wall.normal
     return wall._replace(distance=wall.distance - offset, foot=foot, curvature=bend)
 
@@ -197,10 +194,9 @@ def signed_distance(site: Site, levels: GreyLevels, outer_mm: float, filled: Fil
     own = good.copy()
     own[good] = _own(site, levels, seen, wall.normal[good])
     own = own if own.any() else good
-    if filled is not None:
-        wall = wall._replace(steepness=wall.steepness / filled.at(site.from_first(wall.foot))[1])
-    blur = blur_of_wall(wall.steepness[own], wall.curvature[own], levels.contrast)
-    wall = _corrected(wall, voxels, owner, blur, site, filled)
+    blurs, whole = (0.0, np.ones(len(voxels))) if filled is None else filled.at(site.from_first(wall.foot))
+    blur = blur_of_wall((wall.steepness / whole)[own], wall.curvature[own], levels.contrast)
+    wall = _corrected(wall, voxels, owner, blur, float(spacing.min()), blurs)
     inside.reshape(-1)[seen] = wall.distance[good] < 0
     visits = find_closest(box, seen, wall.foot, outer_mm)
     stray = lost_feet(box, voxels, wall.foot, good)
