@@ -46,6 +46,11 @@ class Wire:
     weight_N_per_mm: Annotated[float, Field(ge=0, le=1), Number] = 0.0
     opacity: OpacityProfile | None = None
 
+    @property
+    def curved(self) -> bool:
+        """Whether any of it is curved at rest: one that is straight may be rolled at will, and has no tip's curve."""
+        return bool(np.any(np.atleast_2d(self.rest_curvature_per_mm)[:, -1]))
+
 
 @dataclass(frozen=True)
 class OverWire:

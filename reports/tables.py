@@ -7,6 +7,7 @@ import gzip
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +62,19 @@ def write_csv(path: Path, content: pd.DataFrame) -> None:
 
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""A text that begins so is a formula to a spreadsheet, which would run it: it is written after an apostrophe."""
+"""A text that begins so, and is no number, is a formula to a spreadsheet: it is written after an apostrophe."""
 
 
 def _plain_text(value: Any) -> Any:
-    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
+    formula = isinstance(value, str) and value.startswith(FORMULA)
+    return f"'{value}" if formula and not _is_number(value) else value
+
+
+def _is_number(text: str) -> bool:
+    with suppress(ValueError):
+        float(text)
+        return True
+    return False
 
 
 def _own_text(value: Any) -> Any:

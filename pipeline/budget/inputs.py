@@ -99,13 +99,12 @@ def sigmas_of(
     lumen's surface by the scan's noise.
     """
     noise = LUMEN_NOISE_VOXELS * voxel_mm if noise_mm is None else noise_mm
-    friction, curved = nominal.config.friction or 0.0, bool(np.any(wire.rest_curvature_per_mm))
+    friction = nominal.config.friction or 0.0
     defaults = {
-        # a wire that is straight at rest may be rolled at will
-        "roll_deg": ROLL_DEG * curved,
+        "roll_deg": ROLL_DEG * wire.curved,
         "lumen_mm": float(np.hypot(LUMEN_VOXELS * voxel_mm, noise)),
         "lumen_bias_mm": LUMEN_BIAS_VOXELS * voxel_mm,
-        "rest_curvature": REST_CURVATURE * curved,
+        "rest_curvature": REST_CURVATURE * wire.curved,
         "taper": TAPER * isinstance(wire.bending_stiffness_N_mm2, list),
         "wall_stiffness": WALL_STIFFNESS,
         "friction": FRICTION * friction,

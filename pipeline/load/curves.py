@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused, unusable
 from pipeline.load.guard import reachable, read_json, read_text, told
 from pipeline.load.outside import millimetres
@@ -47,15 +48,17 @@ def positions_of(path: Path, markup: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def read_markups_curve(path: Path) -> NDArray[np.float64]:
-    """Control points (n, 3) of the first markup, LPS mm."""
+    """Control points (n, 3) of the one markup of a file, LPS mm; of several, of the one that is a curve."""
     found = markups_in(path)
-    if not found:
-        raise refused(path, "no control points", "one curve", "save the curve as .mrk.json")
+    found = found if len(found) == 1 else [m for m in found if str(m.get("type", "")).endswith("Curve")]
+    if len(found) != 1:
+        several = f"{len(found)} curves with control points"
+        raise refused(path, several, "one curve", "save the wire's curve alone, as .mrk.json")
     return positions_of(path, found[0])
 
 
 def read_csv_points(path: Path) -> NDArray[np.float64]:
-    """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the first three of a bare table."""
+    """Points (n, 3), LPS mm: columns x_mm, y_mm, z_mm (or x, y, z) by name, else the three of a bare table."""
     try:
         lines = csv.reader(io.StringIO(read_text(path, CURVE_BYTES), newline=""))
         rows = [r for r in lines if r and not r[0].lstrip().startswith("#")]
@@ -71,6 +74,10 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         raise unusable(path, f"has columns {shown}; expected {needed}; write them so")
     try:
         if columns is None:
+            if len(rows[0]) != 3:
+                raise unusable(
+                    path, f"has {len(rows[0])} columns without names; expected x, y, z; name them above the table"
+                )
             return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
         return np.array([[float(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
     except (ValueError, IndexError) as error:
@@ -87,9 +94,9 @@ def _is_number(text: str) -> bool:
 
 
 def read_vtp_points(path: Path) -> NDArray[np.float64]:
-    """Points (n, 3) of the first polyline, LPS mm; all points in order where the file has no lines."""
+    """Points (n, 3) of the one curve of a file, LPS mm; all points in order where the file has no lines."""
     shapes = read_vtp(path)
-    return shapes.points_mm[shapes.lines[0]] if shapes.lines else shapes.points_mm
+    return one_chain(path, shapes.points_mm, shapes.lines) if shapes.lines else shapes.points_mm
 
 
 READERS = {".csv": read_csv_points, ".vtp": read_vtp_points, ".mrk.json": read_markups_curve}

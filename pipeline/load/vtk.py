@@ -1,10 +1,11 @@
-"""The first polyline of a legacy .vtk file (ASCII or binary, versions 2 to 5.1), as ParaView and Slicer write."""
+"""The curve of a legacy .vtk file (ASCII or binary, versions 2 to 5.1), as ParaView and Slicer write."""
 
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused
 from pipeline.load.surfaces import to_lps
 from pipeline.model import Array
@@ -40,27 +41,34 @@ class _Legacy:
 
 
 def read_vtk_points(path: Path) -> Array:
-    """Points (n, 3) of the first line, LPS where the file states its space; all in order where it has no lines."""
+    """Points (n, 3) of the one curve, LPS where the file states its space; all in order where it has no lines."""
     file = _Legacy(path)
     head, start = file.after("POINTS ")
     try:
         points = file.array(start, 3 * int(head[0]), head[1]).reshape(-1, 3)
-        order = _first_line(file, len(points))
-        points = points[order]
+        cells = _lines(file)
+        if cells and not 0 <= min(map(np.min, cells)) <= max(map(np.max, cells)) < len(points):
+            raise refused(
+                path, f"LINES of points that are not among its {len(points)}", "whole lines", "write it again"
+            )
     except (IndexError, KeyError, ValueError) as error:
         raise refused(path, f"{error!r} in POINTS or LINES", "a polyline", "export the wire as .csv or .vtp") from None
-    return to_lps(file.raw, points)
+    return to_lps(file.raw, one_chain(path, points, cells) if cells else points)
 
 
-def _first_line(file: _Legacy, count: int) -> NDArray[np.int64]:
-    """The points of the first line by their numbers."""
+def _lines(file: _Legacy) -> list[NDArray[np.int64]]:
+    """The points of every line by their numbers."""
     head, start = file.after("LINES ")
     if not head:
-        return np.arange(count)
+        return []
     kind, place = file.after("OFFSETS ")
     if kind:  # since version 5.1: where each line begins, and all their points
-        ends = file.array(place, 2, kind[0]).astype(int)
+        ends = file.array(place, int(head[0]), kind[0]).astype(np.int64)
         kind, place = file.after("CONNECTIVITY ")
-        return file.array(place, ends[1], kind[0]).astype(np.int64)
-    length = int(file.array(start, 1, "int")[0])
-    return file.array(start, length + 1, "int")[1:].astype(np.int64)
+        corners = file.array(place, int(ends[-1]), kind[0]).astype(np.int64)
+        return [cell for cell in np.split(corners, ends[1:-1]) if len(cell)]
+    rest, cells = file.array(start, int(head[1]), "int").astype(np.int64), []
+    for _ in range(int(head[0])):
+        cells.append(rest[1 : rest[0] + 1])
+        rest = rest[rest[0] + 1 :]
+    return [cell for cell in cells if len(cell)]

@@ -9,9 +9,10 @@ from pipeline.study.parameters import Parameters, ParametersError, read_paramete
 
 
 def data_of(case: Case) -> tuple[str, ...]:
-    """SHA-256 of every frame and trace of a case: identifies its data, whatever the case is called."""
-    sources = [*case.frames, *case.traces]
-    return tuple(f"{file_hash(s.path)}#{s.dataset}" for s in sources if s.path.exists())
+    """SHA-256 of every frame, trace and table of projections of a case: its data, whatever the case is called."""
+    sources = [(s.path, s.dataset) for s in (*case.frames, *case.traces)]
+    sources += [] if case.projections is None else [(case.projections, "")]
+    return tuple(f"{file_hash(path)}#{dataset}" for path, dataset in sources if path.exists())
 
 
 def as_calibrated(

@@ -58,12 +58,12 @@ def insertions_of(results: Iterable[Result]) -> dict[str, str]:
 
 
 def shared_scans(results: Sequence[Result]) -> list[str]:
-    """Sentences on cases that state different insertions but have scans in common."""
+    """Sentences on cases that state different insertions but have scans or curves in common."""
     insertions, stated = insertions_of(results), dict[str, dict[str, str]]()
     for result in results:
         stated.setdefault(insertions[result.case], {})[result.case] = result.group or result.case
     return [
-        f"cases {', '.join(groups)} have scans in common and count as one insertion"
+        f"cases {', '.join(groups)} have scans or curves in common and count as one insertion"
         for groups in stated.values()
         if len(set(groups.values())) > 1
     ]

@@ -30,8 +30,7 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bo
     voxel, most = float(spacing.min()), float(np.max(grid.values))
     starts, ends, said = [], [], []
     for curve in curves:
-        index = grid.to_index(curve.points_mm)
-        depth = _depth(grid, index)
+        index, depth = grid.to_index(curve.points_mm), outside_mm(grid, curve.points_mm)
         out = depth > OUTSIDE_VOXELS * voxel + SIGMAS * np.nan_to_num(curve.sigma_mm)
         links = np.flatnonzero(out[:-1] | out[1:])
         starts.append((index * spacing)[links])
@@ -55,13 +54,13 @@ def opened(lumen: Lumen, curves: Sequence[Curve], radius_mm: float, *, given: bo
     return replace(lumen, distance=distance, warnings=(*lumen.warnings, text))
 
 
-def _depth(grid: Grid, index: Array) -> Array:
-    """Signed distance (n,), mm, at places (n, 3) in voxels; beyond the scan's end an upper bound of it.
+def outside_mm(grid: Grid, points_mm: Array) -> Array:
+    """Signed distance (n,), mm, at places (n, 3); beyond the scan's end an upper bound of it.
 
     A scan ends half a voxel beyond the middle of its last slice, and a wire enters through that end: there the vessel
     goes on, as far as anybody sees.
     """
-    last = np.array(grid.values.shape) - 1.0
+    index, last = grid.to_index(points_mm), np.array(grid.values.shape) - 1.0
     beyond = np.maximum(np.maximum(-index, index - last) - 0.5, 0.0)
     inside = map_coordinates(grid.values, index.T, order=1, mode="nearest")
     return np.asarray(inside + np.linalg.norm(beyond * grid.spacing_mm, axis=1))

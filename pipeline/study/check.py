@@ -1,6 +1,7 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +113,7 @@ def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
             low, high = ends.min(axis=0), ends.max(axis=0)
         else:
             header = mask_header(case.lumen)
-            corners = header.grid.to_mm([[0, 0, 0], [n - 1 for n in header.shape]])
+            corners = header.grid.to_mm([*product(*((0, n - 1) for n in header.shape))])
             low, high = corners.min(axis=0), corners.max(axis=0)
     except LoadError as error:
         yield str(error)

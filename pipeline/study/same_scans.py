@@ -68,7 +68,8 @@ def shared(cases: Sequence[Case]) -> list[str]:
     first: dict[tuple[str, str], Case] = {}
     found = {}
     for case in cases:
-        for source in (*case.frames, *case.traces):
+        projected = [] if case.projections is None else [Source(case.projections)]
+        for source in (*case.frames, *case.traces, *projected):
             other = first.setdefault(_place(source), case)
             if other.id != case.id:
                 found[other.id, case.id] = source.path, other.group == case.group

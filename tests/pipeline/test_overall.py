@@ -151,8 +151,8 @@ def test_cases_with_a_scan_in_common_are_one_insertion(tmp_path: Path) -> None:
     assert overall(found_cases(tmp_path))["insertions"] == 2
     aggregate(tmp_path, {})
     text = render_index(tmp_path).read_text("utf-8")
-    assert "cases a, b, c have scans in common and count as one insertion" in text
-    assert text.count("have scans in common") == 1  # d's are its own
+    assert "cases a, b, c have scans or curves in common and count as one insertion" in text
+    assert text.count("have scans or curves in common") == 1  # d's are its own
 
 
 def test_cases_that_the_manifest_names_no_more_count_nowhere(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -458,7 +458,9 @@ def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.C
     assert main(["check", str(both)]) == 0
     assert "warning: cases 'bifurcation' and 'second' share" in capsys.readouterr().out
     assert run(both, tmp_path / "out", "--until", "compare") == 0
-    assert "cases bifurcation, second have scans in common and count as one insertion" in capsys.readouterr().err
+    assert (
+        "cases bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
+    )
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
     manifest = both / "manifest.toml"
     text = manifest.read_text(encoding="utf-8")
@@ -514,7 +516,9 @@ def test_the_same_voxels_in_other_files_are_one_insertion(
     second = second.replace("frames/*.mha", "again/*.nrrd")
     (both / "manifest.toml").write_text("[[case]]".join((head, case, second)), encoding="utf-8")
     assert run(both, tmp_path / "out", "--until", "compare") == 0
-    assert "cases bifurcation, second have scans in common and count as one insertion" in capsys.readouterr().err
+    assert (
+        "cases bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
+    )
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
 
 

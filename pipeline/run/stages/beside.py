@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from pipeline.compare.metrics import point_to_curve
 from pipeline.model import Curve
 from pipeline.run.stages.known import Frame
 from pipeline.status import FrameStatus
@@ -27,7 +27,7 @@ def beside_what_is_seen(
     for frame, wire in zip(frames, seen, strict=True):
         if wire is None or wire.status is not FrameStatus.OK or frame.curve is None or not frame.traced:
             continue
-        away = cKDTree(frame.curve.points_mm).query(wire.points_mm)[0]
+        away = point_to_curve(wire.points_mm, frame.curve.points_mm)[0]
         off, longer = float(np.median(away)), frame.curve.length_mm - wire.length_mm
         if off > max(OFF_VOXELS * voxel_mm, OFF_SIGMAS * float(np.median(wire.sigma_mm))):
             said[frame.index] = f"{off:.2f} mm off"

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pipeline.model import Clamp
+from pipeline.run.calibrated import data_of
 from pipeline.run.log import Log
 from pipeline.run.stages.given import manifest_clamp, seen_in
-from pipeline.run.stages.known import Context, Known
+from pipeline.run.stages.known import Context, Frame, Known
 from pipeline.run.stages.load import open_case
 from pipeline.run.stages.roll import with_fitted_roll
 from pipeline.run.stages.segment import segment_vessel
@@ -28,7 +29,7 @@ def clamp_of(run: Context, known: Known) -> Clamp:
         run.log.warnings += [passed] * bool(passed)
         return given
     if run.case.entry_case is not None:
-        return _of_another(run, run.case.entry_case, given)
+        return _of_another(run, run.case.entry_case, given, known.frames)
     clamp = estimated_clamp(seen, given, prior, lambda *args: _replayed(run, known, *args), voxel_mm)
     if prior.sigma_mm == 0.0:
         clamp = replace(clamp, warning="; ".join(filter(None, (clamp.warning, passed))))
@@ -37,14 +38,18 @@ def clamp_of(run: Context, known: Known) -> Clamp:
     return clamp
 
 
-def _of_another(run: Context, other: Case, given: Clamp) -> Clamp:
-    """The clamp estimated from another insertion with the same fixation; this case's own scans are not used."""
+def _of_another(run: Context, other: Case, given: Clamp, own: Sequence[Frame]) -> Clamp:
+    """The clamp estimated from another insertion with the same fixation; this case's ``own`` scans are not used."""
     silent = Context(other, run.config, run.store, Log(lambda *_: None))
     known = with_fitted_roll(silent, trace_frames(silent, segment_vessel(silent, open_case(silent, Known()))))
     clamp = clamp_of(silent, known)
-    run.log.assumptions.append(
-        f"the clamp is blind to this case's scans, it is that of case {other.id!r}: {clamp.note}"
-    )
+    mine, others = ({*data_of(case), *(f.voxels for f in of)} for case, of in ((run.case, own), (other, known.frames)))
+    if mine & others - {""}:
+        shares = "has scans of this case: it is not blind to them; name a case of another insertion"
+        run.log.warnings.append(f"the clamp is that of case {other.id!r}, which {shares}")
+    else:
+        blind = "the clamp is blind to this case's scans, it is that of case"
+        run.log.assumptions.append(f"{blind} {other.id!r}: {clamp.note}")
     run.log.warnings += [f"of case {other.id!r}: {clamp.warning}"] * bool(clamp.warning)
     return replace(clamp, material_axis=given.material_axis, down=given.down)
 

@@ -102,6 +102,11 @@ class Frame:
         good = FrameStatus.OK
         return replace(self, curve=curve, status=good.identifier, sentence=good.value, stage="", message="")
 
+    def traced_by(self, curve: Curve) -> "Frame":
+        """The same frame with its curve, failed where the curve is not to be trusted."""
+        done = replace(self, curve=curve)
+        return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
+
     def failed(self, stage: str, why: FrameStatus | Status | StageError, message: str = "") -> "Frame":
         """The same frame with what went wrong; the first failure is kept, later ones are its consequences."""
         if not self.ok:

@@ -65,9 +65,8 @@ def _too_thin(case: Case, scans: Scans) -> list[str]:
 
 def _axis_assumed(case: Case) -> list[str]:
     """A sentence where a wire with a curved tip is turned by a roll whose zero nobody has stated."""
-    curved = bool(np.any(np.atleast_2d(case.wire.rest_curvature_per_mm)[:, -1]))
     said = any(text.startswith("material_axis:") for text in case.unconfirmed)
-    if not curved or case.material_axis is not None or case.roll_deg == "fit" or said:
+    if not case.wire.curved or case.material_axis is not None or case.roll_deg == "fit" or said:
         return []
     return ["material_axis is not stated: at roll 0 the tip bends towards the world axis least along entry_direction"]
 

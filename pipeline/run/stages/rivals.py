@@ -29,9 +29,12 @@ def _simulated(known: Known) -> list[Frame]:
 def rival_ways(run: Context, known: Known) -> list[tuple[SimulateConfig, float]]:
     """Settings and extra roll (degrees) of each simulation: one without the tip's curve, then ROLLS turned ones.
 
-    Empty where they are switched off or nothing was simulated.
+    Empty where they are switched off, nothing was simulated, or the wire is straight at rest: without a curve to leave
+    out or to turn, both are the simulated wire again, which no simulator beats.
     """
-    if not run.config.compare.simulated_nulls or not _simulated(known) or not np.isfinite(known.segment_mm):
+    if not run.config.compare.simulated_nulls or not run.case.wire.curved:
+        return []
+    if not _simulated(known) or not np.isfinite(known.segment_mm):
         return []
     plain = run.config.simulate
     return [(replace(plain, rest_curvature_scale=0.0), 0.0), *((plain, 360.0 * i / ROLLS) for i in range(ROLLS))]

@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.arrays.grids import corners_mm
 from pipeline.load import Crop, Header
-from pipeline.load.curves import read_curve
 from pipeline.model import Curve, Volume
 from pipeline.register import Motion
 from pipeline.register.frames import Alignment, alignment_of, counters_of, put_in_place, sentences_of
@@ -21,46 +20,65 @@ from pipeline.run.stages.depths import in_step, shrinking, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.own_curves import as_given, given_curves, rough
 from pipeline.run.stages.repeated import known_by, once
 from pipeline.run.stages.thickness import too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
 from pipeline.run.straightened import straightened
 from pipeline.segment.opened import opened
 from pipeline.simulate import wall_of
-from pipeline.simulate.others import begun, oddity
 from pipeline.status import FrameStatus, StageError
-from pipeline.trace import cleared, of_catheter, of_length, trace
+from pipeline.trace import cleared, of_catheter, trace
+from pipeline.trace.saturated import cut_off, saturated
 
 
 def trace_frames(run: Context, known: Known) -> Known:
     """Every frame's wire, each with the previous one as a prior."""
     assert known.scans is not None
     assert known.lumen is not None
-    given = _given_traces(run)
+    given = given_curves(run)
+    voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
     if not known.scans.frames:
-        pairs = zip(known.frames, given, strict=True) if given else ()
-        return replace(known, frames=tuple(_as_given(run, *pair) for pair in pairs) or known.frames)
+        if not given:
+            return known
+        own = [as_given(run, *pair, known.lumen.distance) for pair in zip(known.frames, given, strict=True)]
+        return _with_room(run, known, _in_step(run, own, voxel_mm))
     work = _Tracing(run, known, given)
     # the wall takes a second and more with 256^3 voxels: it is made while the helpers trace
     wall = partial(wall_of, known.lumen.distance, run.config.solver.hull) if run.goes_to("simulate") else nothing
     parts = run.share("trace", work.part, len(known.frames), wall)
     for part in parts:
         run.log.add(part.log)
-    voxel_mm = float(np.min(known.lumen.distance.spacing_mm))
     frames, assumed = own_dim_ends(once([p.frame for p in parts], run.case.calibrated_scans), voxel_mm)
     run.log.assumptions += assumed
     frames, doubtful_gaps = own_gaps(frames, voxel_mm)
     run.log.warnings += doubtful_gaps
-    frames = in_step(turned_round(frames), voxel_mm)
-    run.log.warnings += shrinking(frames, voxel_mm)
+    frames = _in_step(run, turned_round(frames), voxel_mm)
     blur_mm = known.lumen.levels.get("scanner_blur_mm", float("nan"))
     run.log.warnings += too_thin(frames, blur_mm, run.case.wire.radius_mm, known.lumen.distance.spacing_mm)
+    if not given:
+        run.log.warnings += cut_off([(f.index, curve) for f in frames if (curve := f.trusted_curve) is not None])
     run.log.warnings += beside_what_is_seen(frames, [part.seen for part in parts], run.config.trace, voxel_mm)
     run.log.warnings += wire_in_reference(run, work.reference, known.lumen)
     run.log.warnings += _in_plane(frames, run.config.trace.in_plane_deg)
     assumed, doubtful = sentences_of(work.alignment, {frame.index: frame.registration for frame in frames})
     run.log.assumptions += assumed
     run.log.warnings += doubtful
+    return _with_room(run, known, frames)
+
+
+def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
+    """The frames, those out of step not to be trusted; warnings of what lengths and own curves tell of themselves."""
+    frames = in_step(frames, voxel_mm)
+    run.log.warnings += shrinking(frames, voxel_mm)
+    if run.case.traces:
+        run.log.warnings += rough(frames, voxel_mm)
+    return frames
+
+
+def _with_room(run: Context, known: Known, frames: list[Frame]) -> Known:
+    """The case with its frames, and a lumen that has room for their traces."""
+    assert known.lumen is not None
     curves = [curve for frame in frames if (curve := frame.trusted_curve) is not None]
     lumen = opened(known.lumen, curves, run.case.wire.radius_mm, given=run.case.lumen is not None)
     run.log.warnings += lumen.warnings[len(known.lumen.warnings) :]
@@ -132,7 +150,9 @@ class _Tracing:
         log.count("trace", counters_of(registration))
         frame = replace(frame, registration=registration, voxels=known_by(volume))
         seen = self.follow(run, frame, here, earlier)
-        done = _as_given(run, frame, self.given[frame.index]) if self.given else _of_scan(run, frame, seen)
+        done = _of_scan(run, frame, seen)
+        if self.given:
+            done = as_given(run, frame, self.given[frame.index], self.lumen.distance)
         before = (earlier(k) for k in range(frame.index))
         window = next((part.window for part in before if part.window), None)
         if window is None and done.trusted_curve is not None:
@@ -141,7 +161,7 @@ class _Tracing:
 
     def follow(self, run: Context, frame: Frame, here: Volume, earlier: Earlier[_Part]) -> Curve:
         """The wire that the scan of a frame shows."""
-        return run.stored(
+        seen = run.stored(
             "trace",
             trace,
             here,
@@ -155,13 +175,14 @@ class _Tracing:
             opacity=run.case.wire.opacity,
             config=run.config.trace,
         )
+        return saturated(seen, here)
 
 
 def _of_scan(run: Context, frame: Frame, curve: Curve) -> Frame:
     """The frame with the wire that its scan shows."""
     if run.case.catheter is not None and np.isnan(frame.expected_mm):
         curve = of_catheter(curve, frame.catheter_mm)
-    return _traced(frame, curve)
+    return frame.traced_by(curve)
 
 
 def _pictured(frame: Frame, shown: Volume, window: tuple[float, float]) -> Frame:
@@ -176,32 +197,6 @@ def _last_curve(number: int, earlier: Earlier[_Part]) -> Curve:
     """The last good curve before this frame, which tells which of two strands is the wire's; NOTHING without one."""
     curves = (cleared(curve) for k in reversed(range(number)) if (curve := earlier(k).frame.curve) is not None)
     return next((curve for curve in curves if curve.status is FrameStatus.OK and len(curve.points_mm)), NOTHING)
-
-
-def _traced(frame: Frame, curve: Curve) -> Frame:
-    """The frame with its curve, failed where the curve is not to be trusted."""
-    done = replace(frame, curve=curve)
-    return done if curve.status is FrameStatus.OK else done.failed("trace", curve.status, curve.note)
-
-
-def _as_given(run: Context, frame: Frame, curve: Curve) -> Frame:
-    """The frame with the user's own curve; one that does not begin at the entry says what it may be instead."""
-    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
-    odd = oddity(curve.points_mm, entry, direction)
-    if odd:
-        return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
-    if (curve.points_mm[0] - entry) @ direction < 0:  # with a part in the introducer
-        points = begun(curve.points_mm, entry, direction)
-        curve = Curve(points, np.full(len(points), np.nan), note=curve.note)
-    expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
-    return _traced(frame, of_length(curve, expected, run.config.trace))
-
-
-def _given_traces(run: Context) -> list[Curve]:
-    """The user's own curves, where the manifest names them."""
-    if run.case.traces:
-        run.log.assumptions.append("the traced curves are the manifest's own files")
-    return [read_curve(source.path) for source in run.case.traces]
 
 
 def _in_plane(frames: list[Frame], limit_deg: float) -> list[str]:

@@ -1,0 +1,131 @@
+"""The user's own traced curves: begun at the entry, and judged by what a curve alone can tell of itself.
+
+No scan has to be there for that. A curve in straight lines from voxel to voxel is too long, and so is the wire that is
+simulated beside it; one of few points cuts its own corners; one in another vessel is no wire of this lumen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays.polyline import resample
+from pipeline.load.curves import read_curve
+from pipeline.model import Array, Curve, arc_length
+from pipeline.run.stages.known import Context, Frame
+from pipeline.segment.opened import outside_mm
+from pipeline.simulate.others import begun, oddity
+from pipeline.status import FrameStatus
+from pipeline.trace import of_length
+from reports.case_files import listed
+from solver import Grid
+
+OUTSIDE_VOXELS, MOST_OUTSIDE = 2.0, 0.25
+"""Points so far outside the wall, and their share above which a curve is not in this lumen: segmented ones and traces
+differ by a voxel; where fewer lie outside, the lumen is opened there and that is said."""
+CHORD_MM, LONGER = 2.0, 0.02
+"""A curve longer by this share than arcs through its points so far apart zigzags: skeletons of voxels by 0.06 to 0.09,
+points that scatter by a tenth of their distance by 0.01."""
+CORNER_VOXELS = 0.25
+"""How far beside a smooth curve the lines between points may pass: traces of scans are off by 0.03 to 0.11 voxel."""
+LEAST_BEND_MM = 0.01
+"""By how much a curve that is not straight is longer than its chord: as 5 mm of a wire with a radius of 20 mm."""
+MOST_NAMED = 6
+
+
+def given_curves(run: Context) -> list[Curve]:
+    """The user's own curves, where the manifest names them."""
+    if run.case.traces:
+        run.log.assumptions.append("the traced curves are the manifest's own files")
+    return [read_curve(source.path) for source in run.case.traces]
+
+
+def as_given(run: Context, frame: Frame, curve: Curve, distance: Grid) -> Frame:
+    """The frame with the user's own curve, from the plane through the entry on; failed where it cannot be its wire's.
+
+    distance : the lumen's, mm.
+    """
+    entry, direction = np.array(run.case.entry_mm), np.array(run.case.entry_direction)
+    odd = oddity(curve.points_mm, entry, direction)
+    if odd:
+        return frame.failed("trace", FrameStatus.TRACE_FAILED, f"{curve.note}: {odd}")
+    points = begun(curve.points_mm, entry, direction)
+    expected = None if np.isnan(frame.expected_mm) else frame.expected_mm
+    curve = of_length(Curve(points, np.full(len(points), np.nan), note=curve.note), expected, run.config.trace)
+    frame = replace(frame, voxels=frame.voxels or known_by_tip(points))
+    return frame.traced_by(_in_lumen(_smooth(curve), distance))
+
+
+def known_by_tip(points_mm: Array) -> str:
+    """What tells a curve (n, 3) from those of other insertions, in whatever file it is: where it ends, to 0.01 mm.
+
+    Empty for a straight one, whose end tells of its depth alone.
+    """
+    if arc_length(points_mm)[-1] - np.linalg.norm(points_mm[-1] - points_mm[0]) < LEAST_BEND_MM:
+        return ""
+    return "tip " + " ".join(f"{x:.2f}" for x in np.round(points_mm[-1], 2) + 0.0)
+
+
+def _smooth(curve: Curve) -> Curve:
+    """The curve; one that zigzags has failed: its length, which is the frame's depth, is not the wire's."""
+    share = zigzag(curve.points_mm)
+    if curve.status is not FrameStatus.OK or share <= LONGER:
+        return curve
+    note = (
+        f"{curve.note}: {curve.length_mm:.2f} mm long, {100 * share:.0f} % more than arcs through its points "
+        f"{CHORD_MM:g} mm apart, allowed {100 * LONGER:g} %: it zigzags, as from voxel to voxel, or its "
+        "points scatter; its length is taken for the wire's: smooth it"
+    )
+    return replace(curve, status=FrameStatus.TRACE_FAILED, note=note)
+
+
+def _in_lumen(curve: Curve, distance: Grid) -> Curve:
+    """The curve; one of which much lies outside the lumen has left it."""
+    points = resample(curve.points_mm, 0.5 * float(distance.spacing_mm.min()))
+    share = float(np.mean(outside_mm(distance, points) > OUTSIDE_VOXELS * float(distance.spacing_mm.min())))
+    if curve.status is not FrameStatus.OK or share <= MOST_OUTSIDE:
+        return curve
+    note = (
+        f"{curve.note}: {100 * share:.0f} % of the curve lie over {OUTSIDE_VOXELS:g} voxels outside the lumen, allowed "
+        f"{100 * MOST_OUTSIDE:.0f} %; are lumen and curve in the same coordinates (LPS mm), and of the same phantom?"
+    )
+    return replace(curve, status=FrameStatus.TRACE_LEFT_LUMEN, note=note)
+
+
+def rough(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
+    """A warning of own curves that cut the wire's corners."""
+    curves = {f.index: f.curve.points_mm for f in frames if f.curve is not None and f.trusted_curve is f.curve}
+    apart = {n: corner_mm(points) for n, points in curves.items()}
+    coarse = [f"frame {n}: {mm:.2f} mm" for n, mm in apart.items() if mm > CORNER_VOXELS * voxel_mm]
+    if not coarse:
+        return []
+    return [
+        f"the manifest's own curves have few points: straight lines between them pass beside a smooth wire "
+        f"({listed(coarse, MOST_NAMED)}; {CORNER_VOXELS * voxel_mm:.2f} mm would do): give more; 3D Slicer saves "
+        "a curve's control points alone: resample it before it is saved"
+    ]
+
+
+def zigzag(points_mm: Array) -> float:
+    """The share by which a curve (n, 3) is longer than circular arcs through its points CHORD_MM apart."""
+    coarse = resample(points_mm, CHORD_MM)
+    steps = np.diff(coarse, axis=0)
+    turn = _turns(steps)
+    # an arc that turns by t is longer than its chord by t^2 / 24
+    arcs = float(np.linalg.norm(steps, axis=1).sum()) * (1.0 + float(np.mean(turn**2) if len(turn) else 0.0) / 24.0)
+    return float(arc_length(points_mm)[-1]) / arcs - 1.0
+
+
+def corner_mm(points_mm: Array) -> float:
+    """The furthest that a line between two points (n, 3) passes beside an arc with the curve's turns at these, mm."""
+    steps = np.diff(points_mm, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    bend = _turns(steps) / (0.5 * (length[1:] + length[:-1]))
+    ends = np.concatenate([bend[:1], bend, bend[-1:]]) if len(bend) else np.zeros(2)
+    return float(np.max(0.5 * (ends[1:] + ends[:-1]) * length**2 / 8.0))
+
+
+def _turns(steps: Array) -> Array:
+    """Angles (n - 1,), radians, between the steps (n, 3) of a curve."""
+    along = steps / np.linalg.norm(steps, axis=1)[:, None]
+    return np.asarray(np.arccos(np.clip(np.sum(along[1:] * along[:-1], axis=1), -1.0, 1.0)))

@@ -1,0 +1,165 @@
+"""Own curves without scans: what they tell of themselves. All of these were frames with status ok, without a word."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.interpolate import CubicSpline
+
+from pipeline.arrays.polyline import resample, to_length
+from pipeline.cli import main
+from pipeline.model import arc_length
+from pipeline.run.stages.own_curves import CORNER_VOXELS, LONGER, corner_mm, known_by_tip, zigzag
+from tests.pipeline.known_study import MANIFEST, QUICK, Array, errors_of, peers, write_csv, write_study
+
+WIRES = peers("bend")
+
+
+def ran(folder: Path, wires: list[Array]) -> tuple[pd.DataFrame, str]:
+    """The frames of the study with other traces, without their depths, and all that was warned of."""
+    manifest = write_study(folder)
+    text = manifest.read_text(encoding="utf-8")
+    manifest.write_text(text.replace("insertion_mm = [8.54, 18.41, 28.76, 38.5]\n", ""), encoding="utf-8")
+    write_csv(folder / "traces", wires)
+    main(["run", str(manifest), "-o", str(folder / "out"), "--until", "compare", *QUICK])
+    result = json.loads((folder / "out" / "cases" / "bend" / "result.json").read_text(encoding="utf-8"))
+    return errors_of(folder / "out"), " ".join(result["warnings"])
+
+
+def on_voxels(wire: Array, voxel_mm: float) -> Array:
+    """The middles of the voxels that a wire runs through, in its order."""
+    places = np.rint(resample(wire, 0.02) / voxel_mm) * voxel_mm
+    return np.concatenate([wire[:1], places[np.r_[True, np.any(np.diff(places, axis=0) != 0, axis=1)]][1:]])
+
+
+def circle(radius_mm: float, step_mm: float, length_mm: float = 20.0) -> Array:
+    turn = np.arange(0.0, length_mm / radius_mm, step_mm / radius_mm)
+    return radius_mm * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+
+
+@pytest.mark.parametrize("radius_mm", [1.5, 3.0, 10.0])
+@pytest.mark.parametrize("step_mm", [0.2, 0.5, 1.0])
+def test_smooth_curves_do_not_zigzag(radius_mm: float, step_mm: float) -> None:
+    """A coil of 1.5 mm radius turns by 1.3 between points 2 mm apart: arcs are longer than chords by 7 %."""
+    assert zigzag(circle(radius_mm, step_mm)) < 0.7 * LONGER
+
+
+@pytest.mark.parametrize("voxel_mm", [0.2, 0.3, 0.5])
+def test_a_way_from_voxel_to_voxel_zigzags(voxel_mm: float) -> None:
+    """Through faces it is longer by up to 73 %, through corners, as a skeleton, by up to 13 %."""
+    for wire in WIRES[1:]:
+        path = on_voxels(wire @ np.linalg.qr(np.arange(9.0).reshape(3, 3) + np.eye(3))[0], voxel_mm)
+        assert zigzag(path) > 1.5 * LONGER
+    assert max(zigzag(wire) for wire in WIRES) < 0.1 * LONGER
+
+
+def test_corners_are_as_far_off_as_an_arc() -> None:
+    """Sagitta c^2 / (8 R); a chord turns by less than its arc: 4 % of the sagitta at c = R."""
+    for step in (0.5, 1.0, 3.0):
+        chords = circle(5.0, step)
+        assert corner_mm(chords) == pytest.approx(5.0 * (1.0 - np.cos(0.5 * step / 5.0)), rel=0.04)
+    assert corner_mm(WIRES[-1]) < 0.03
+    assert corner_mm(WIRES[-1][[0, -1]]) == 0.0
+
+
+def test_a_curve_that_zigzags_has_failed(tmp_path: Path) -> None:
+    """Its length is the depth: a skeleton of 60 mm of wire was taken for 64 mm, the tip 4 mm off."""
+    turned = [on_voxels(wire, 0.3) for wire in WIRES]
+    errors, _ = ran(tmp_path, [turned[0], WIRES[1], turned[2], turned[3]])
+    assert list(errors["status"]) == ["trace_failed", "ok", "trace_failed", "trace_failed"]
+    failures = pd.read_csv(tmp_path / "out" / "failures.csv")
+    assert "it zigzags, as from voxel to voxel" in failures["message"].iloc[-1]
+
+
+def test_a_curve_of_few_points_is_warned_of(tmp_path: Path) -> None:
+    """As 3D Slicer saves control points, which it shows as a spline: straight lines pass 0.2 mm beside it."""
+    sparse = [resample(wire, 8.0) for wire in WIRES]
+    errors, said = ran(tmp_path / "sparse", sparse)
+    assert set(errors["status"]) == {"ok"}
+    assert "own curves have few points" in said
+    assert "frame 3: 0." in said
+    dense = [CubicSpline(arc_length(p), p)(np.linspace(0, arc_length(p)[-1], 80)) for p in sparse]
+    assert "few points" not in ran(tmp_path / "dense", dense)[1]
+    assert corner_mm(dense[-1]) < CORNER_VOXELS * 0.3
+
+
+def test_a_curve_that_begins_beyond_the_entry_is_led_back_to_it(tmp_path: Path) -> None:
+    """Depth and error held, but arc_rms_mm was 4 mm where 4 mm were missing: equal arcs were other places."""
+    whole, _ = ran(tmp_path / "whole", WIRES)
+    cut, _ = ran(tmp_path / "cut", [wire[arc_length(wire) > 3.0] for wire in WIRES])
+    for column in ("arc_rms_mm", "tip_mm", "rms_mm", "insertion_mm"):
+        # the clamp has 0.6 degrees over the first 3 mm
+        np.testing.assert_allclose(cut[column], whole[column], rtol=0.0, atol=0.05)
+
+
+def test_a_lumen_elsewhere_is_warned_of_or_fails(tmp_path: Path) -> None:
+    def moved(by_mm: float) -> list[Array]:
+        across = np.array([0.999401, -0.000155, -0.034614])
+        return [wire + by_mm * np.clip(arc_length(wire) / 8.0, 0.0, 1.0)[:, None] * across for wire in WIRES]
+
+    errors, said = ran(tmp_path / "near", moved(1.3))
+    assert set(errors["status"]) == {"ok"}
+    assert "traced wires ran up to" in said
+    assert "correct the file of the lumen" in said
+    errors, _ = ran(tmp_path / "far", moved(6.0))
+    assert "trace_left_lumen" in set(errors["status"])
+    failures = pd.read_csv(tmp_path / "far" / "out" / "failures.csv")
+    assert "same coordinates (LPS mm)" in failures["message"].iloc[-1]
+
+
+def test_lengths_out_of_step_are_noticed_without_scans(tmp_path: Path) -> None:
+    manifest = write_study(tmp_path)
+    depths = [8.54, 18.41, 28.76, 38.5]
+    text = MANIFEST.replace("insertion_mm = [8.54, 18.41, 28.76, 38.5]", f"insertion_mm = {[*depths, *depths]}")
+    manifest.write_text(text, encoding="utf-8")
+    short = to_length(WIRES[2], arc_length(WIRES[2])[-1] - 1.5)  # within the tolerance of 2 mm that every length has
+    again = [wire + 1e-4 for wire in (WIRES[0], WIRES[1], short, WIRES[3])]  # no copies, which are refused
+    write_csv(tmp_path / "traces", [*WIRES, *again])
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "trace", *QUICK])
+    failures = pd.read_csv(tmp_path / "out" / "failures.csv")
+    assert "as in the frames around it" in failures["message"].item()
+    assert failures[["frame", "status"]].to_numpy().tolist() == [[6, "length_mismatch"]]
+
+
+def test_a_curve_is_known_by_its_end_in_whatever_file() -> None:
+    wire = WIRES[-1]
+    assert known_by_tip(resample(wire, 0.3)) == known_by_tip(wire) == known_by_tip(np.round(wire, 4))
+    assert known_by_tip(WIRES[-2]) != known_by_tip(wire)
+    assert known_by_tip(np.array([[0.0, 0, 0], [0, 0, 9]])) == ""
+
+
+def test_one_insertion_in_two_files_counts_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three re-sampled copies had an interval of no width, over 3 insertions."""
+    manifest = write_study(tmp_path)
+    case = MANIFEST.partition("[[case]]")[2].replace('"bend"', '"copy"').replace("traces/", "copies/")
+    manifest.write_text(f"{MANIFEST}\n[[case]]{case}", encoding="utf-8")
+    write_csv(tmp_path / "copies", [resample(wire, 0.4) for wire in WIRES])
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare", *QUICK]) == 0
+    assert "cases bend, copy have scans or curves in common and count as one insertion" in capsys.readouterr().err
+    assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].tolist() == [1]
+
+
+def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path) -> None:
+    manifest = write_study(tmp_path)
+    case = MANIFEST.partition("[[case]]")[2].replace('"bend"', '"copy"') + 'entry = "case:bend"\n'
+    manifest.write_text(f"{MANIFEST}\n[[case]]{case}".replace("_sigma_mm = 0.0", "_sigma_mm = 0.1"), encoding="utf-8")
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "simulate", *QUICK])
+    result = json.loads((tmp_path / "out/cases/copy/result.json").read_text(encoding="utf-8"))
+    assert any("it is not blind to them" in text for text in result["warnings"])
+    assert not any("is blind" in text for text in result["assumptions"])
+
+
+def test_a_wire_straight_at_rest_has_no_rival_that_is_itself(tmp_path: Path) -> None:
+    """Without a curve, no_tip_curve is the simulated wire: skill against it was 0 whatever the wire was worth."""
+    manifest = write_study(tmp_path)
+    straight = manifest.read_text(encoding="utf-8").replace("0.12", "0.0")
+    manifest.write_text(straight, encoding="utf-8")
+    main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "compare"])
+    errors = errors_of(tmp_path / "out")
+    assert errors["rms_mm"].notna().all()
+    assert errors[["null_no_tip_curve_rms_mm", "null_roll_unknown_rms_mm"]].isna().all(axis=None)
+    assert not set(errors["strongest_null"].dropna()) & {"no_tip_curve", "roll_unknown"}
