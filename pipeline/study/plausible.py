@@ -70,6 +70,7 @@ def leads_out(case: Case, header: Header | None) -> list[str]:
     ]
 
 
+HALF_A_TURN_DEG = 180.0
 SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
 """Least depth that an insertion reaches, and most times that a vessel's way may be as long as its scan's diagonal."""
 
@@ -84,6 +85,20 @@ def odd_depths(case: Case, header: Header | None) -> list[str]:
         return []
     than = f"and the scan is {diagonal:.0f} mm across" if deepest > SHALLOWEST_MM else "no wire is seen to move by that"
     return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm?"]
+
+
+def wrapped_rolls(case: Case) -> list[str]:
+    """A sentence where the roll goes from one end of its circle to the other: with friction the way there counts."""
+    rolls = np.atleast_1d(np.asarray(case.stated_roll_deg, dtype=np.float64))
+    far = np.flatnonzero(np.abs(np.diff(rolls)) > HALF_A_TURN_DEG)
+    if not len(far):
+        return []
+    before, after = rolls[far[0]], rolls[far[0] + 1]
+    on = after - 360.0 * np.sign(after - before)
+    return [
+        f"roll_deg goes from {before:g} to {after:g} in frame {far[0] + 1}: the wire is turned by {after - before:g} "
+        f"degrees there, and with friction the way counts; a hand that went on the short way has {on:g}"
+    ]
 
 
 def _to_the_edge(case: Case, header: Header, sign: float) -> float:
@@ -101,7 +116,8 @@ def doubts(cases: Sequence[Case], config: Config) -> Iterator[str]:
     yield from implausible(cases)
     for case in cases:
         scan = first_of(case, config)
-        yield from (f"case {case.id!r}: {text}" for text in (*leads_out(case, scan), *odd_depths(case, scan)))
+        said = (*leads_out(case, scan), *odd_depths(case, scan), *wrapped_rolls(case))
+        yield from (f"case {case.id!r}: {text}" for text in said)
     yield from shared(cases)
 
 

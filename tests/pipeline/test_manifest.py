@@ -12,7 +12,7 @@ import pytest
 from pipeline.load import Header, Source
 from pipeline.load.order import natural_key
 from pipeline.study.manifest import ManifestError, read_manifest
-from pipeline.study.plausible import implausible, measured_otherwise, odd_depths
+from pipeline.study.plausible import implausible, measured_otherwise, odd_depths, wrapped_rolls
 from pipeline.study.settings import Config
 
 GOOD = """
@@ -190,3 +190,19 @@ def test_settings_that_change_what_an_error_is_are_said() -> None:
     assert measured_otherwise(plain) == []
     (said,) = measured_otherwise(replace(plain, compare=replace(plain.compare, skip_mm=0.0)))
     assert said.startswith("compare.skip_mm = 0.0 where the default is 10.0")
+
+
+@pytest.mark.parametrize(
+    ("rolls", "said"),
+    [
+        ([340.0, 350.0, 10.0], "from 350 to 10 in frame 2: the wire is turned by -340 degrees there"),
+        ([-170.0, 175.0, 180.0], "from -170 to 175 in frame 1: the wire is turned by 345 degrees there"),
+        ([0.0, 180.0, 360.0], ""),
+    ],
+)
+def test_a_roll_that_goes_round_the_long_way_is_said(tmp_path: Path, rolls: list[float], said: str) -> None:
+    """A list of 350, then 10 was turned back by 340 degrees: 0.09 mm off with friction 0.2."""
+    (case,) = read_manifest(written(tmp_path, f"{GOOD}\nroll_deg = {rolls}\n")).cases
+    found = wrapped_rolls(case)
+    assert (said in found[0]) if said else not found
+    assert not said or found[0].endswith(("has 370", "has -185"))
