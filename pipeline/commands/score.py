@@ -47,7 +47,7 @@ def main(args: argparse.Namespace) -> int:
     from pipeline.status import InputError
     from pipeline.study.check import check
     from reports.inside import misleading_links
-    from reports.verdict import OURS, remarks
+    from reports.verdict import OURS, remarks, warned
 
     plans = _plans(args)
     found = {name: check(plan.cases, plan.template.settings.config) for name, plan in plans.items()}
@@ -66,6 +66,11 @@ def main(args: argparse.Namespace) -> int:
         say(f"{name}: {last_line(*done[name])}")
         for text in remarks(done[name][0].pooled, name):
             say(f"{name}: warning: {text}")
+    # what the manifest or the scans are doubted for is the same of every simulator
+    warnings = dict.fromkeys(line for plan in plans.values() for line in warned(plan.out))
+    for line in warnings if not args.quiet else ():
+        say(line)
+    sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
     return 0 if all(totals.all_ok for totals, _ in done.values()) else 1

@@ -163,3 +163,17 @@ def test_a_wire_straight_at_rest_has_no_rival_that_is_itself(tmp_path: Path) -> 
     assert errors["rms_mm"].notna().all()
     assert errors[["null_no_tip_curve_rms_mm", "null_roll_unknown_rms_mm"]].isna().all(axis=None)
     assert not set(errors["strongest_null"].dropna()) & {"no_tip_curve", "roll_unknown"}
+
+
+def test_score_says_what_the_curves_are_doubted_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its warnings stood on the pages of the cases alone."""
+    manifest = write_study(tmp_path)
+    write_csv(tmp_path / "traces", [resample(wire, 8.0) for wire in WIRES])
+    write_csv(tmp_path / "theirs", WIRES)
+    words = ["score", str(manifest), "--curves", f"theirs={tmp_path / 'theirs'}", *QUICK]
+    assert main([*words, "-o", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out.count("own curves have few points") == 1
+    assert main([*words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    told = capsys.readouterr()
+    assert "few points" in told.err
+    assert "few points" not in told.out
