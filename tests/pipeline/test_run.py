@@ -39,6 +39,7 @@ from solver import Status
 from tests.studies.trees import differences
 
 SIZE, FRAMES = 64, 4
+UNTIL = ("--until", "compare")  # where no page is looked at: drawing them takes most of a run
 
 
 @pytest.fixture(scope="module")
@@ -152,21 +153,21 @@ def test_another_manifest_into_the_same_folder_is_refused(
 
 
 def test_fresh_removes_the_cases_of_the_manifest_before(
-    study: Path, finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One that is resumed leaves them aside, says so, and what anybody else has put into the folder stays."""
     out, other = tmp_path / "out", tmp_path / "study"
-    shutil.copytree(finished, out)
+    assert run(study, out, *UNTIL) == 0
     shutil.copytree(study, other)
     manifest = other / "manifest.toml"
     text = manifest.read_text(encoding="utf-8").replace('id = "bifurcation"', 'id = "renamed"')
     manifest.write_text(text, encoding="utf-8")
     (out / "cases" / "mine").mkdir()
-    assert run(other, out, "--resume") == 0
+    assert run(other, out, "--resume", *UNTIL) == 0
     said = capsys.readouterr()
     assert "1 case, 4 frames" in said.out
     assert "no manifest of this folder names them any more: bifurcation" in said.err
-    assert run(other, out, "--fresh") == 0
+    assert run(other, out, "--fresh", *UNTIL) == 0
     assert "any more" not in capsys.readouterr().err
     assert {path.name for path in (out / "cases").iterdir()} == {"renamed", "mine"}
 
@@ -193,7 +194,7 @@ def test_a_sweep_moves_the_result_and_traces_once(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, junit = tmp_path / "out", str(tmp_path / "junit.xml")
-    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", junit, "-q") == 0
+    assert run(study, out, "--sweep", "simulate.roll_offset_deg=-60,60", "--junit", junit, "-q", *UNTIL) == 0
     assert f"sweep: {out / 'sweep.csv'}.  report: {out / 'index.html'}" in capsys.readouterr().out
     point = tables.read(next(out.glob("sweep/*/cases/*/timings.csv")), TIMINGS).iloc[0]
     assert point["clamp_s"] > 0, "most of a point's time"
@@ -210,9 +211,9 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
 ) -> None:
     """Nor a summary on paper: both stood beside the new numbers as if they were theirs."""
     out = tmp_path / "out"
-    assert run(study, out, "--sweep", "simulate.wall_scale=2") == 0
+    assert run(study, out, "--sweep", "simulate.wall_scale=2", *UNTIL) == 0
     (out / "summary.pdf").touch()
-    assert run(study, out, "--set", "simulate.friction=0.1", "--resume") == 0
+    assert run(study, out, "--set", "simulate.friction=0.1", "--resume", *UNTIL) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert "sweep:" not in last
     assert re.search(r"skill 0\.\d+ over 3 of 4 frames against the predictor '[a-z ]+'\.", last)
@@ -225,10 +226,10 @@ def test_a_sweep_reads_the_lumen_of_a_case_once(study: Path, tmp_path: Path, mon
     both, out, read = two_cases(study, tmp_path / "study"), tmp_path / "out", []
     monkeypatch.setattr(cache, "decoded", lambda *args: read.append(args[0]) or decoded(*args))
     wall_of.cache_clear()
-    assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3") == 0
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.5,2", "--sweep", "simulate.friction=0.3", *UNTIL) == 0
     assert read.count("segment") == 1
     assert wall_of.cache_info().misses <= 2, "of the lumen as it was segmented, and as it was read"
-    assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume") == 0
+    assert run(both, out, "--sweep", "simulate.wall_scale=0.25,3", "--resume", *UNTIL) == 0
     assert read.count("segment") == 2, "another run reads it anew"
 
 
@@ -257,13 +258,13 @@ def test_an_edited_lumen_gives_new_traces(study: Path, finished: Path, tmp_path:
     labels = sitk.GetArrayFromImage(like)
     folder = with_lumen(study, tmp_path / "study", labels, like)
     out = tmp_path / "out"
-    assert run(folder, out) == 0
+    assert run(folder, out, *UNTIL) == 0
     assert reused_traces(out) == 0
-    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2") == 0
+    assert run(folder, out, "--resume", "--set", "simulate.wall_scale=2", *UNTIL) == 0
     assert reused_traces(out) == FRAMES
     labels[tuple(np.argwhere(labels)[0])] = 0
     with_lumen(study, folder, labels, like)
-    assert run(folder, out, "--resume") == 0
+    assert run(folder, out, "--resume", *UNTIL) == 0
     assert reused_traces(out) == 0
 
 
@@ -289,7 +290,7 @@ def test_every_pooled_number_is_of_the_frames_that_are_ok(
         lines.append(f"insertion_mm = {[*depths[:2], depths[2] - 8.0, *depths[3:]]}" if depths else line)
     path.write_text("\n".join(lines), encoding="utf-8")
     out = tmp_path / "out"
-    assert run(folder, out, "--set", "simulate.roll_offset_deg=60") == 1
+    assert run(folder, out, "--set", "simulate.roll_offset_deg=60", *UNTIL) == 1
     table = errors_of(out)
     assert list(table["status"]) == ["ok", "ok", "length_mismatch", "ok"]
     assert table["rms_mm"].notna().all()
@@ -409,7 +410,7 @@ def test_a_run_of_calibration_cases_says_that_nothing_is_scored(
     result |= {"role": "calibration", "summary": result["summary"] | {"role": "calibration"}}
     path.write_text(json.dumps(result), encoding="utf-8")
     ledger.write(path.parent, "key")
-    assert main(["report", str(out)]) == 0
+    assert main(["report", str(out), "--overview"]) == 0
     assert 'Nothing is scored: every case has role = "calibration"' in capsys.readouterr().out
     assert "Nothing is scored: every case has role" in (out / "index.html").read_text(encoding="utf-8")
 
@@ -457,10 +458,8 @@ def test_the_same_scans_count_once(study: Path, tmp_path: Path, capsys: pytest.C
     both = two_cases(study, tmp_path / "study")
     assert main(["check", str(both)]) == 0
     assert "warning: cases 'bifurcation' and 'second' share" in capsys.readouterr().out
-    assert run(both, tmp_path / "out", "--until", "compare") == 0
-    assert (
-        "cases bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
-    )
+    assert run(both, tmp_path / "out", *UNTIL) == 0
+    assert "bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
     manifest = both / "manifest.toml"
     text = manifest.read_text(encoding="utf-8")
@@ -515,10 +514,8 @@ def test_the_same_voxels_in_other_files_are_one_insertion(
     head, case, second = (both / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
     second = second.replace("frames/*.mha", "again/*.nrrd")
     (both / "manifest.toml").write_text("[[case]]".join((head, case, second)), encoding="utf-8")
-    assert run(both, tmp_path / "out", "--until", "compare") == 0
-    assert (
-        "cases bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
-    )
+    assert run(both, tmp_path / "out", *UNTIL) == 0
+    assert "bifurcation, second have scans or curves in common and count as one insertion" in capsys.readouterr().err
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].item() == 1
 
 
@@ -535,7 +532,7 @@ def test_own_curves_are_held_against_the_wires_that_are_seen(study: Path, finish
     for order in (curves, curves[::-1]):
         for number, curve in enumerate(order):
             np.savetxt(folder / "own" / f"{number:03d}.csv", curve, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
-        run(folder, tmp_path / "out", "--until", "compare", "--fresh")
+        run(folder, tmp_path / "out", *UNTIL, "--fresh")
         result = json.loads((tmp_path / "out" / "cases" / "bifurcation" / "result.json").read_text(encoding="utf-8"))
         said.append([text for text in result["warnings"] if "own curves are not where the scans show" in text])
     assert not said[0]
@@ -566,7 +563,7 @@ def test_results_do_not_depend_on_workers_or_shards(study: Path, finished: Path,
 def test_a_damaged_frame_costs_that_frame_alone(study: Path, tmp_path: Path) -> None:
     both = two_cases(study, tmp_path / "study", broken=True)
     out = tmp_path / "out"
-    assert run(both, out) == 1
+    assert run(both, out, *UNTIL) == 1
     statuses = list(tables.read(out / "cases" / "second" / "errors.csv", ERRORS)["status"])
     assert statuses == ["ok", "load_failed", "ok", "ok"]
     failures = pd.read_csv(out / "failures.csv")
@@ -605,7 +602,7 @@ def test_an_unexpected_error_costs_one_case(
 
     monkeypatch.setattr("pipeline.run.launch.run_case", burst)
     monkeypatch.setattr("sys.argv", ["/bin/wireval", "run", "study", "-o", "out"])
-    assert run(both, tmp_path / "out") == 1
+    assert run(both, tmp_path / "out", *UNTIL) == 1
     said = capsys.readouterr().err.splitlines()
     assert said[-1] == "next: do what the message says, then wireval run study -o out --only second --resume"
     assert said[-1].partition("then ")[2] in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
@@ -653,7 +650,7 @@ def test_a_crash_in_a_sweep_is_said_and_counted(
         run_case(job)
 
     monkeypatch.setattr("pipeline.run.launch.run_case", burst)
-    assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2") == 1
+    assert run(study, tmp_path / "out", "--sweep", "simulate.wall_scale=2", *UNTIL) == 1
     said = capsys.readouterr()
     assert "simulate.wall_scale=2: bifurcation: crashed: RuntimeError: burst pipe" in said.err
     assert "1 crashed in the sweep" in said.out
@@ -683,7 +680,7 @@ def test_a_damaged_result_hides_no_other(
     named_by_a_shard(out, "other")
     damaged = out / "cases" / "other" / "result.json"
     damaged.write_text("{", encoding="utf-8")
-    for words in (["report", str(out)], ["run", str(study / "manifest.toml"), "-o", str(out)]):
+    for words in (["report", str(out), "--overview"], ["run", str(study / "manifest.toml"), "-o", str(out)]):
         assert main(words) == 1
         said = capsys.readouterr()
         assert f"{damaged}: " in said.err
@@ -805,7 +802,7 @@ def test_a_case_without_frames_is_no_frame_that_was_planned(finished: Path, stud
     plan = "\n".join(lines).replace('id = "bifurcation"', 'id = "plan"')
     manifest = study / "planned.toml"
     manifest.write_text(f"{head}[[case]]{case}\n[[case]]{plan}", encoding="utf-8")
-    assert main(["run", str(manifest), "-o", str(tmp_path / "out")]) == 0
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), *UNTIL]) == 0
     whole = [tables.read(out / "overall.csv", SUMMARY).iloc[0] for out in (finished, tmp_path / "out")]
     assert whole[1]["frames"] == whole[0]["frames"] == FRAMES
     assert whole[1]["within_1mm"] == whole[0]["within_1mm"]
@@ -831,7 +828,7 @@ def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, stud
     second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
     manifest = study / "borrowed.toml"
     manifest.write_text(f"{head}[[case]]{case}\n[[case]]{second}", encoding="utf-8")
-    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", "--until", "compare"]) == 0
+    assert main(["run", str(manifest), "-o", str(tmp_path / "out"), "--only", "second", *UNTIL]) == 0
     own, borrowed = (
         json.loads((folder / "result.json").read_text(encoding="utf-8"))
         for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
