@@ -1,7 +1,7 @@
 """Figures of runs whose figures nobody looks at: drawn, so that what fails while it is drawn is met, but not laid out.
 
 Most of the time of a run of a small study is the drawing of its figures, and two thirds of that are matplotlib's
-constrained layout, which draws each figure several times to find room for its labels.
+constrained layout, which measures each figure again and again to find room for its labels.
 """
 
 from __future__ import annotations
@@ -16,21 +16,19 @@ from reports.figures import _drawing
 
 
 class _Unfitted(Figure):
-    """A figure whose labels may lie over each other."""
+    """A figure that is as ours are until it is drawn, and then keeps its panels where they are."""
 
-    def __init__(self, *given: Any, layout: object = None, **named: Any) -> None:
-        super().__init__(*given, **named)
+    def draw(self, renderer: Any) -> None:
+        self.set_layout_engine("none")
+        super().draw(renderer)
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def unfitted_figures() -> Iterator[None]:
-    """For a folder that imports it into its conftest.py: also for its module's fixtures, and for it alone."""
+    """For the tests of a module that imports it, or of a folder whose conftest.py does, and for their fixtures.
+
+    Processes that are started anew, as those of ``-j 2`` with two cases are, lay their figures out all the same.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_drawing, "Figure", _Unfitted)
         yield
-
-
-@pytest.fixture
-def fitted_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For a test whose figures are compared with those of a process that was started anew, where nothing is patched."""
-    monkeypatch.setattr(_drawing, "Figure", Figure)

@@ -18,10 +18,9 @@ QUICK = ("--until", "load", "-q")
 FINE = ("--set", "solver.step_mm=0.5")
 
 
-@pytest.fixture
-def study(tmp_path: Path) -> Path:
-    """Two cases of the same scans, whose frames all have the same base name."""
-    folder = tmp_path / "study"
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
     assert main(["synth", "straight", "-o", str(folder), "--size", "72", "--frames", "2"]) == 0
     for number, path in enumerate(sorted((folder / "frames").iterdir())):
         (folder / f"depth_{number}").mkdir()
@@ -31,6 +30,12 @@ def study(tmp_path: Path) -> Path:
     case = text[text.index("[[case]]") :].replace('id = "a"', 'id = "b"')
     (folder / "manifest.toml").write_text(f"{text}\n{case}", encoding="utf-8")
     return folder
+
+
+@pytest.fixture
+def study(made: Path, tmp_path: Path) -> Path:
+    """Two cases of the same scans, whose frames all have the same base name; a test may change its files."""
+    return Path(shutil.copytree(made, tmp_path / "study"))
 
 
 def run(study: Path, out: Path, *more: str) -> int:

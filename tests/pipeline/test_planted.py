@@ -34,7 +34,7 @@ def out(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     sweeps = [word for name, value in WRONG.items() for word in ("--sweep", f"{name}={value}")]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("WIREVAL_CACHE", str(tmp_path_factory.mktemp("store")))
-        assert main(["run", str(study / "manifest.toml"), "-o", str(folder), *sweeps]) == 0
+        assert main(["run", str(study / "manifest.toml"), "-o", str(folder), "--until", "compare", *sweeps]) == 0
     return folder
 
 

@@ -111,7 +111,8 @@ def test_every_format_goes_through_the_pipeline(tmp_path: Path, kind: str, capsy
         capsys.readouterr()
         assert main(asked) == 0
         assert "2 frames" in capsys.readouterr().out, "those of one HDF5 group, too, which were 1"
-    assert main(run) == 0
+    # a page is drawn from what the run has written, whatever its scans were: one of them is enough
+    assert main([*run, *(() if kind == "dicom" else ("--until", "compare"))]) == 0
 
 
 def test_friction_of_the_true_wire_is_in_its_truth_and_its_manifest(tmp_path: Path) -> None:
