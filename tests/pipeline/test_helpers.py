@@ -123,7 +123,7 @@ def test_what_kept_helpers_from_helping_stands_in_the_log(
         return trace(*given, **named)
 
     monkeypatch.setattr(tracing, "trace", elsewhere)
-    run(study, tmp_path / "two", "--no-cache", "-j", "2")
+    run(study, tmp_path / "two", "--no-cache", "-j", "2", "--until", "trace")
     assert "bifurcation: a process that helped met MemoryError('no more of it'): " in capfd.readouterr().err
     log = (tmp_path / "two" / "cases" / "bifurcation" / "log.txt").read_text(encoding="utf-8")
     assert "trace  a process that helped met MemoryError('no more of it'): " in log

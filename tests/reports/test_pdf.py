@@ -11,8 +11,6 @@ import pytest
 
 from reports import pdf, tables
 from reports._content import worst_first
-from reports.case_files import find_cases
-from reports.html import render_case, render_index
 from reports.pdf import write_pdf
 from reports.pdf_page import BOTTOM, Page
 from reports.schema import SUMMARY
@@ -22,9 +20,6 @@ from tests.reports.fake_results import FakeCase, write_run
 def test_four_pages_say_verdict_failures_and_the_worst_case(tmp_path: Path) -> None:
     cases = (FakeCase("fine", frames=3), FakeCase("poor", frames=3, failed=(1,), error_mm=0.6))
     out = write_run(tmp_path / "out", cases)
-    for folder in find_cases(out):
-        render_case(folder)
-    render_index(out)
     first = write_pdf(out).read_bytes()
     assert len(re.findall(rb"/Type /Page\b", first)) == 4
     assert write_pdf(out).read_bytes() == first
