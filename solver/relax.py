@@ -28,8 +28,9 @@ from solver.doors import (
     vector,
     whole,
 )
+from solver.entry import outside_grid_mm, refused_at
 from solver.errors import refuse
-from solver.solution import Solution
+from solver.solution import Solution, Status
 from solver.wall import VesselWall
 from solver.wire import GuideWire
 from solver.workspace import QUADRATURES, Workspace
@@ -136,7 +137,16 @@ def relax(
     work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
-    return _judged(work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg))
+    found = work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)
+    return _judged(found if wall is None else _allowed(found, wall, entry, wire.radius_mm))
+
+
+def _allowed(solution: Solution, wall: VesselWall, entry: Array, radius_mm: float) -> Solution:
+    """The solution; one that is at rest where no insertion may begin or lead is not converged."""
+    status = refused_at(wall, entry)
+    if status is None and outside_grid_mm(wall.distance, solution.joints_mm) > radius_mm:
+        status = Status.LEFT_GRID
+    return replace(solution, status=status) if solution.converged and status is not None else solution
 
 
 def _judged(solution: Solution) -> Solution:
