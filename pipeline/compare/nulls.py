@@ -20,7 +20,7 @@ from pipeline.compare.metrics import Way, point_to_curve, rms, scored
 from pipeline.compare.pinned import pinned
 from pipeline.model import Array, Clamp, Lumen
 from reports.schema import ERRORS, predictor
-from solver import Grid, GuideWire, VesselWall, relax
+from solver import Grid, GuideWire, Status, VesselWall, relax
 
 CENTRE_POWER = 3
 """Cost = (clearance + voxel)^-3: high enough to hold the path on the medial line in bends (at 2 it cuts corners)."""
@@ -129,7 +129,9 @@ def min_bending(clues: Clues, depth_mm: float, _seen: Seen = Seen()) -> Array | 
         entry_direction=clues.clamp.direction,
         start_mm=start,
     )
-    return np.asarray(solution.joints_mm) if solution.converged else None
+    # beyond the room it is a poor guess, but one
+    at_rest = solution.converged or solution.status is Status.LEFT_GRID
+    return np.asarray(solution.joints_mm) if at_rest else None
 
 
 def to_this_tip(clues: Clues, depth_mm: float, seen: Seen) -> Array | None:
