@@ -1,5 +1,6 @@
 """A wire in memory: the arrays that the kernels work on, grown as the wire goes in, and the way into the kernels."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from solver.wire import GuideWire
 QUADRATURES = ("tip", "joints", "segments")
 TIP_PANELS = 5
 """Panels of the last segment, each half as long as the one before: the last is 1/16 of it."""
+SAME_ROLL = 1e-12  # rad
 TIP_ZONE = 4
 """Segments before the last with two Gauss points each: they cover the tip's contact run where segments are short."""
 
@@ -239,10 +241,22 @@ class Workspace:
         outcome, iterations, self.k = advance(self.handle, depth_mm, roll_deg, laid)
         return Status[data.OUTCOMES[outcome]], iterations
 
+    def _rolled(self, frames: Array) -> Array:
+        """A copy of the frames (n, 3, 3); where a roll moved nothing, and so was not carried out, turned by it."""
+        if self.introducer is None or not self.introducer.idle_roll:
+            return frames.copy()
+        angle = math.radians(float(self.place["roll"][0]))
+        one, two, _ = self.introducer.frame.T
+        first = math.cos(angle) * one + math.sin(angle) * two
+        c, d = float(frames[0, :, 0] @ first), float(frames[0, :, 1] @ first)
+        if abs(d) < SAME_ROLL and c > 0.0:
+            return frames.copy()
+        return np.asarray(frames @ np.array([[c, -d, 0.0], [d, c, 0.0], [0.0, 0.0, 1.0]]))
+
     def solution(self, status: Status, iterations: int, depth_mm: float, roll_deg: float) -> Solution:
         """The wire as it lies now."""
         n, state = self.k + 1, self.problem.state
-        arrays = [a.copy() for a in (state.x[CURRENT, :n], state.r[CURRENT, :n], self.force[:n])]
+        arrays = [state.x[CURRENT, :n].copy(), self._rolled(state.r[CURRENT, :n]), self.force[:n].copy()]
         notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
         ended = status, iterations, depth_mm, roll_deg, self.wire.radius_mm
         solution = Solution.assembled(arrays, notes, self.snaps, ended)

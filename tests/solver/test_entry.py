@@ -80,3 +80,14 @@ def test_a_wire_pressed_at_its_entry_has_the_push_that_is_said(segment_mm: float
     insertion = Insertion(GuideWire(segment_mm, 0.18, 5.0), wall, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     push = [s.push_force_N for s in insertion.to_depths(np.arange(25.0, 35.0, 0.1).tolist())]
     assert np.mean(push) == pytest.approx(-stiffness * deep**2 / 4, abs=4e-3)  # the rest is of first order in a segment
+
+
+def test_frames_follow_a_roll_that_moves_nothing() -> None:
+    """Of a straight wire without friction that is only rolled, they kept the roll before."""
+    insertion = Insertion(GuideWire(1.0, 0.2, 5.0), None, [0, 0, 0], [0, 0, 1.0], material_axis=[1.0, 0, 0])
+    for solution in insertion.to_depths([20.0, 20.0, 20.0, 25.0], [0.0, 90.0, 200.0, 200.0]):
+        angle = np.radians(solution.roll_deg)
+        axes = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        np.testing.assert_allclose(
+            solution.frames, np.broadcast_to(axes.T, solution.frames.shape), rtol=0.0, atol=1e-12
+        )
