@@ -39,7 +39,8 @@ class Frame:
     view, in_view_mm : the X-ray projection of a frame without a scan; the wire that was seen (n, 2) and the simulated
     one (k, 2) on the plane through the isocentre.
     projections, straightened : of the scan: its maxima along the array axes, and planes across the traced wire.
-    voxels : by which its scan is known again, whatever file holds it; empty where it could not be read.
+    voxels : by which its scan, or without one its own curve, is known again, whatever file holds it; empty where it
+    could not be read.
     """
 
     index: int

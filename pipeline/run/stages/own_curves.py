@@ -107,7 +107,9 @@ def rough(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
 
 
 def zigzag(points_mm: Array) -> float:
-    """The share by which a curve (n, 3) is longer than circular arcs through its points CHORD_MM apart."""
+    """The share by which a curve (n, 3) is longer than arcs through its points CHORD_MM apart; 0 for one point."""
+    if len(points_mm) < 2:
+        return 0.0
     coarse = resample(points_mm, CHORD_MM)
     steps = np.diff(coarse, axis=0)
     turn = _turns(steps)
