@@ -137,16 +137,17 @@ def relax(
     work.clamp(entry, base_frame(direction, material_axis, roll_deg), weight=weight_of("relax", wire, down))
     chain, state = work.problem.chain, work.problem.state
     follow(curve, len(curve), chain, state.u[CURRENT], state.x[CURRENT], state.r[CURRENT], (0, work.k))
-    found = work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg)
-    return _judged(found if wall is None else _allowed(found, wall, entry, wire.radius_mm))
+    return _judged(_allowed(work.solution(*work.advance(depth_mm, 0.0, work.k), depth_mm, roll_deg), wall, entry))
 
 
-def _allowed(solution: Solution, wall: VesselWall, entry: Array, radius_mm: float) -> Solution:
+def _allowed(solution: Solution, wall: VesselWall | None, entry: Array) -> Solution:
     """The solution; one that is at rest where no insertion may begin or lead is not converged."""
+    if wall is None or not solution.converged:
+        return solution
     status = refused_at(wall, entry)
-    if status is None and outside_grid_mm(wall.distance, solution.joints_mm) > radius_mm:
+    if status is None and outside_grid_mm(wall.distance, solution.joints_mm) > solution.radius_mm:
         status = Status.LEFT_GRID
-    return replace(solution, status=status) if solution.converged and status is not None else solution
+    return solution if status is None else replace(solution, status=status)
 
 
 def _judged(solution: Solution) -> Solution:

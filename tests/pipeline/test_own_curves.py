@@ -144,14 +144,18 @@ def test_one_insertion_in_two_files_counts_once(tmp_path: Path, capsys: pytest.C
     assert pd.read_csv(tmp_path / "out" / "overall.csv")["insertions"].tolist() == [1]
 
 
-def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path) -> None:
+@pytest.mark.parametrize("shorter_mm", [0.0, 0.4])
+def test_a_clamp_of_the_same_curves_is_not_called_blind(tmp_path: Path, shorter_mm: float) -> None:
     manifest = write_study(tmp_path)
-    case = MANIFEST.partition("[[case]]")[2].replace('"bend"', '"copy"') + 'entry = "case:bend"\n'
-    manifest.write_text(f"{MANIFEST}\n[[case]]{case}".replace("_sigma_mm = 0.0", "_sigma_mm = 0.1"), encoding="utf-8")
+    write_csv(tmp_path / "copies", [to_length(wire, arc_length(wire)[-1] - shorter_mm) for wire in WIRES])
+    case = MANIFEST.partition("[[case]]")[2].replace('"bend"', '"copy"').replace("traces/", "copies/")
+    text = f'{MANIFEST}\n[[case]]{case}entry = "case:bend"\n'.replace("_sigma_mm = 0.0", "_sigma_mm = 0.1")
+    manifest.write_text(text, encoding="utf-8")
     main(["run", str(manifest), "-o", str(tmp_path / "out"), "--until", "simulate", *QUICK])
     result = json.loads((tmp_path / "out/cases/copy/result.json").read_text(encoding="utf-8"))
-    assert any("it is not blind to them" in text for text in result["warnings"])
-    assert not any("is blind" in text for text in result["assumptions"])
+    same = shorter_mm == 0.0
+    assert any("it is not blind to them" in text for text in result["warnings"]) == same
+    assert any("is blind to this case's scans" in text for text in result["assumptions"]) != same
 
 
 def test_a_wire_straight_at_rest_has_no_rival_that_is_itself(tmp_path: Path) -> None:

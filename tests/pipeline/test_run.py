@@ -822,8 +822,8 @@ def test_version_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
 
 
-def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, study: Path, tmp_path: Path) -> None:
-    """The same scans twice, the second with the clamp of the first: it is the first's to the last bit."""
+def test_a_borrowed_clamp_is_that_of_the_other_case(finished: Path, study: Path, tmp_path: Path) -> None:
+    """The same scans twice: it is the first case's to the last bit, and not called blind."""
     head, case = (study / "manifest.toml").read_text(encoding="utf-8").split("[[case]]")
     second = case.replace('id = "bifurcation"', 'id = "second"\nentry = "case:bifurcation"')
     manifest = study / "borrowed.toml"
@@ -833,7 +833,7 @@ def test_a_borrowed_clamp_knows_nothing_of_the_scored_scans(finished: Path, stud
         json.loads((folder / "result.json").read_text(encoding="utf-8"))
         for folder in (finished / "cases" / "bifurcation", tmp_path / "out" / "cases" / "second")
     )
-    assert any("blind to this case's scans" in line for line in borrowed["assumptions"])
+    assert any("it is not blind to them" in line for line in borrowed["warnings"])
     np.testing.assert_array_equal(own["entry"]["used_mm"], borrowed["entry"]["used_mm"])
 
 
