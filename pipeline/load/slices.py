@@ -88,6 +88,8 @@ def dataset(path: Path) -> Any:
     if DEFLATED in start:
         raise unusable(path, "a deflated DICOM file; allowed: any other transfer syntax; export it again")
     pydicom.config.settings.reading_validation_mode = pydicom.config.IGNORE
+    # numbers of half a length are bytes, which are no number here; else an error of pydicom's own, where they are used
+    pydicom.config.convert_wrong_length_to_UN = True
     with told(path), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what matters of a file is judged below, in sentences of this package
         return pydicom.dcmread(path, defer_size=DEFER, force=path.suffix.lower() in SUFFIXES)

@@ -68,3 +68,14 @@ def test_a_damaged_file_is_said(tmp_path: Path) -> None:
     path.write_bytes(enhanced(numbered(), SPACING, straight_stack())[:-100])
     with pytest.raises(LoadError, match=r"scan\.dcm: cannot read it: the file is cut short.*is complete"):
         read_header(path)
+
+
+def test_a_number_of_half_a_length_is_a_sentence(tmp_path: Path) -> None:
+    """Bits allocated in three bytes: a traceback of pydicom's own kind of error."""
+    path = tmp_path / "scan.dcm"
+    whole = enhanced(numbered(), SPACING, straight_stack())
+    head = b"\x28\x00\x00\x01US\x02\x00"
+    assert head in whole
+    path.write_bytes(whole.replace(head, b"\x28\x00\x00\x01US\x03\x00\x00"))
+    with pytest.raises(LoadError, match="contradicts its format"):
+        read_header(path)
