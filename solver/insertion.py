@@ -39,8 +39,8 @@ class Insertion:
     entry_mm : (3,) LPS mm.     entry_direction, material_axis : (3,) LPS, any length; at roll 0 material axis 1
     points along material_axis (default: the world axis least aligned with entry_direction, made orthogonal).
     method : "newton" or "closed_form".     initial : "slide" (material moves along the wire's own curve) or
-    "translate" (the paper's section 4.1).     step_mm, roll_step_deg : longest step; with friction on the wall a roll
-    is at most RUBBING_TURN_DEG.
+    "translate" (the paper's section 4.1).     step_mm, roll_step_deg : longest step; with friction on the wall no
+    roll is longer than 1 degree.
     finest_mm : a step whose change of energy does not match the hand's work is repeated in shorter ones, down to this
     length; step_mm or more: never.
     tolerance, max_iterations, quadrature : see ``solver.relax.Settings``.     max_joints : longest wire accepted.
