@@ -1,11 +1,10 @@
-"""Where a wire may be: entries that it may begin at, and how far it may leave the distances that are known."""
+"""Where a wire may begin."""
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from solver import _tolerances as tol
 from solver.doors import Array
-from solver.grid import Grid
 from solver.solution import Status
 from solver.wall import VesselWall
 
@@ -36,10 +35,3 @@ def _in_septum(wall: VesselWall, entry: Array, outside: float, reach: float) -> 
     between = ends[:, None] + share * (ends - ends[:, None])
     highest = wall.look_up(between.reshape(-1, 3))[0].reshape(SEPTUM_SAMPLES, len(ends), len(ends)).max(axis=0)
     return connected_components(highest <= 0.5 * outside)[0] > 1
-
-
-def outside_grid_mm(grid: Grid, points_mm: Array) -> float:
-    """How far points (n, 3) are outside the grid's voxels, half a voxel beyond their centres, at most, mm."""
-    index = grid.to_index(points_mm)
-    beyond = np.maximum(np.maximum(-0.5 - index, index - (np.array(grid.shape) - 0.5)), 0.0)
-    return float(np.max(np.linalg.norm(beyond * grid.spacing_mm, axis=1), initial=0.0))

@@ -82,6 +82,12 @@ class Grid:
         at = numbers("grid", "index", index, (..., 3), Range(-1e12, 1e12, "voxels from the first one"))
         return np.asarray(at * self.spacing_mm @ self.direction.T + self.origin_mm)
 
+    def beyond_mm(self, points_mm: ArrayLike) -> Array:
+        """How far, (n,) mm, LPS points (n, 3) are outside the voxels, which end half a voxel beyond their centres."""
+        index = self.to_index(points_mm)
+        beyond = np.maximum(np.maximum(-index, index - (np.array(self.shape) - 1.0)) - 0.5, 0.0)
+        return np.asarray(np.linalg.norm(beyond * self.spacing_mm, axis=-1))
+
     def with_values(self, values: NDArray[Any]) -> "Grid":
         """The same geometry holding other values."""
         return Grid(values, self.spacing_mm, self.origin_mm, self.direction)

@@ -220,15 +220,12 @@ class Insertion:
         """Step until the depth is reached or no step succeeds."""
         work = self._work
         work.counts.fill(0)
-        if not self._reaches(depth):
+        refused = Status.TOO_LONG if depth >= self._too_long else self._refused
+        if refused is not None:
             # nothing moves: what the last depth took is not this one's, too
             work.place["rubbed"] = work.place["dissipated"] = work.place["snaps"] = 0
-        if depth >= self._too_long:
-            status, iterations = Status.TOO_LONG, 0
-        elif self._refused is not None:
-            status, iterations = self._refused, 0
-        else:
-            status, iterations = work.advance(depth, roll) if self._near[0] else self._advance_far(depth, roll)
+            return work.solution(refused, 0, self.depth_mm, self.roll_deg)
+        status, iterations = work.advance(depth, roll) if self._near[0] else self._advance_far(depth, roll)
         return work.solution(status, iterations, self.depth_mm, self.roll_deg)
 
     def _advance_far(self, depth: float, roll: float) -> tuple[Status, int]:

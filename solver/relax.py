@@ -28,7 +28,7 @@ from solver.doors import (
     vector,
     whole,
 )
-from solver.entry import outside_grid_mm, refused_at
+from solver.entry import refused_at
 from solver.errors import refuse
 from solver.solution import Solution, Status
 from solver.wall import VesselWall
@@ -145,7 +145,7 @@ def _allowed(solution: Solution, wall: VesselWall | None, entry: Array) -> Solut
     if wall is None or not solution.converged:
         return solution
     status = refused_at(wall, entry)
-    if status is None and outside_grid_mm(wall.distance, solution.joints_mm) > solution.radius_mm:
+    if status is None and np.max(wall.distance.beyond_mm(solution.joints_mm)) > solution.radius_mm:
         status = Status.LEFT_GRID
     return solution if status is None else replace(solution, status=status)
 

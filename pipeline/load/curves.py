@@ -72,12 +72,10 @@ def read_csv_points(path: Path) -> NDArray[np.float64]:
         shown = ", ".join(c if c.isprintable() else ascii(c) for c in head[:8]) + " ..." * (len(head) > 8)
         needed = "x_mm, y_mm, z_mm (or x, y, z), separated by commas"
         raise unusable(path, f"has columns {shown}; expected {needed}; write them so")
+    if columns is None and len(head) != 3:
+        raise unusable(path, f"has {len(head)} columns without names; expected x, y, z; name them above the table")
     try:
         if columns is None:
-            if len(rows[0]) != 3:
-                raise unusable(
-                    path, f"has {len(rows[0])} columns without names; expected x, y, z; name them above the table"
-                )
             return np.array([[float(r[c]) for c in range(3)] for r in rows]).reshape(-1, 3)
         return np.array([[float(r[c]) for c in columns] for r in rows[1:]]).reshape(-1, 3)
     except (ValueError, IndexError) as error:

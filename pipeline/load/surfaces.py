@@ -118,13 +118,22 @@ def _cells(file: _Vtp, piece: ET.Element, kind: str, count: int) -> list[NDArray
     if node is None:
         return []
     arrays = {str(a.get("Name")): file.array(a).astype(np.int64) for a in node.findall("DataArray")}
-    ends = arrays.get("offsets", np.zeros(0, np.int64))
+    corners, ends = (arrays.get(name, np.zeros(0, np.int64)) for name in ("connectivity", "offsets"))
+    return split_cells(file.path, kind, corners, ends, count)
+
+
+def split_cells(
+    path: Path, kind: str, corners: NDArray[np.int64], ends: NDArray[np.int64], count: int
+) -> list[NDArray[np.int64]]:
+    """The points of each cell by number, of all cells' corners and where each cell ends; LoadError for others.
+
+    kind : what they are, for the message.     count : of points.
+    """
     if len(ends) == 0:
         return []
-    corners = arrays["connectivity"]
     if np.any(np.diff(ends, prepend=0) < 0) or ends[-1] != len(corners) or np.any((corners < 0) | (corners >= count)):
         got = f"{kind} whose corners are not among its {count} points"
-        raise refused(file.path, got, "whole cells", "write it again")
+        raise refused(path, got, "whole cells", "write it again")
     return [c for c in np.split(corners, ends[:-1]) if len(c)]
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.load.chain import one_chain
 from pipeline.load.geometry import refused
-from pipeline.load.surfaces import to_lps
+from pipeline.load.surfaces import split_cells, to_lps
 from pipeline.model import Array
 
 _TYPES = {"float": ">f4", "double": ">f8", "int": ">i4", "long": ">i8", "vtktypeint64": ">i8", "vtkIdType": ">i8"}
@@ -46,29 +46,26 @@ def read_vtk_points(path: Path) -> Array:
     head, start = file.after("POINTS ")
     try:
         points = file.array(start, 3 * int(head[0]), head[1]).reshape(-1, 3)
-        cells = _lines(file)
-        if cells and not 0 <= min(map(np.min, cells)) <= max(map(np.max, cells)) < len(points):
-            raise refused(
-                path, f"LINES of points that are not among its {len(points)}", "whole lines", "write it again"
-            )
+        cells = _lines(file, len(points))
     except (IndexError, KeyError, ValueError) as error:
         raise refused(path, f"{error!r} in POINTS or LINES", "a polyline", "export the wire as .csv or .vtp") from None
     return to_lps(file.raw, one_chain(path, points, cells) if cells else points)
 
 
-def _lines(file: _Legacy) -> list[NDArray[np.int64]]:
-    """The points of every line by their numbers."""
+def _lines(file: _Legacy, count: int) -> list[NDArray[np.int64]]:
+    """The points of every line by their numbers. count : of points."""
     head, start = file.after("LINES ")
     if not head:
         return []
     kind, place = file.after("OFFSETS ")
     if kind:  # since version 5.1: where each line begins, and all their points
-        ends = file.array(place, int(head[0]), kind[0]).astype(np.int64)
+        ends = file.array(place, int(head[0]), kind[0]).astype(np.int64)[1:]
         kind, place = file.after("CONNECTIVITY ")
-        corners = file.array(place, int(ends[-1]), kind[0]).astype(np.int64)
-        return [cell for cell in np.split(corners, ends[1:-1]) if len(cell)]
+        corners = file.array(place, int(head[1]), kind[0]).astype(np.int64)
+        return split_cells(file.path, "LINES", corners, ends, count)
     rest, cells = file.array(start, int(head[1]), "int").astype(np.int64), []
     for _ in range(int(head[0])):
         cells.append(rest[1 : rest[0] + 1])
         rest = rest[rest[0] + 1 :]
-    return [cell for cell in cells if len(cell)]
+    corners = np.concatenate([np.zeros(0, np.int64), *cells])
+    return split_cells(file.path, "LINES", corners, np.cumsum([*map(len, cells)]), count)

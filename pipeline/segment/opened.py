@@ -60,7 +60,6 @@ def outside_mm(grid: Grid, points_mm: Array) -> Array:
     A scan ends half a voxel beyond the middle of its last slice, and a wire enters through that end: there the vessel
     goes on, as far as anybody sees.
     """
-    index, last = grid.to_index(points_mm), np.array(grid.values.shape) - 1.0
-    beyond = np.maximum(np.maximum(-index, index - last) - 0.5, 0.0)
+    index = grid.to_index(points_mm)
     inside = map_coordinates(grid.values, index.T, order=1, mode="nearest")
-    return np.asarray(inside + np.linalg.norm(beyond * grid.spacing_mm, axis=1))
+    return np.asarray(inside + grid.beyond_mm(points_mm))

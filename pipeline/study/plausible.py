@@ -70,7 +70,6 @@ def leads_out(case: Case, header: Header | None) -> list[str]:
     ]
 
 
-HALF_A_TURN_DEG = 180.0
 SHALLOWEST_MM, LONGEST_WAY = 1.0, 5.0
 """Least depth that an insertion reaches, and most times that a vessel's way may be as long as its scan's diagonal."""
 
@@ -85,6 +84,9 @@ def odd_depths(case: Case, header: Header | None) -> list[str]:
         return []
     than = f"and the scan is {diagonal:.0f} mm across" if deepest > SHALLOWEST_MM else "no wire is seen to move by that"
     return [f"insertion_mm goes to {deepest:g} mm, {than}: is it in another unit than mm?"]
+
+
+HALF_A_TURN_DEG = 180.0
 
 
 def wrapped_rolls(case: Case) -> list[str]:

@@ -237,6 +237,10 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
         lambda **a: Grid(TUBE).to_index(**a),
         {"points_mm": ["x", None, 1.0, [1.0, 2.0], [0, 0, np.nan], *FAR]},
     ),
+    "beyond_mm": (
+        lambda **a: Grid(TUBE).beyond_mm(**a),
+        {"points_mm": ["x", None, 1.0, [1.0, 2.0], [0, 0, np.nan], *FAR]},
+    ),
     "to_mm": (lambda **a: Grid(TUBE).to_mm(**a), {"index": ["x", None, 1.0, [1.0, 2.0], [0, 0, np.nan], [True] * 3]}),
     "with_values": (lambda **a: Grid(TUBE).with_values(**a), {"values": ["x", None, 1.0, np.zeros((2, 2))]}),
     "crop": (

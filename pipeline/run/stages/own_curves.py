@@ -94,8 +94,7 @@ def _in_lumen(curve: Curve, distance: Grid) -> Curve:
 
 def rough(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
     """A warning of own curves that cut the wire's corners."""
-    curves = {f.index: f.curve.points_mm for f in frames if f.curve is not None and f.trusted_curve is f.curve}
-    apart = {n: corner_mm(points) for n, points in curves.items()}
+    apart = {f.index: corner_mm(curve.points_mm) for f in frames if (curve := f.trusted_curve) is not None}
     coarse = [f"frame {n}: {mm:.2f} mm" for n, mm in apart.items() if mm > CORNER_VOXELS * voxel_mm]
     if not coarse:
         return []
