@@ -35,7 +35,7 @@ from solver._kernels.flags import cached, inlined, kernel, merged
 from solver._kernels.forces import largest_moment
 from solver._kernels.newton import costate, sweep
 from solver._kernels.rollout import copy_base
-from solver._kernels.rotation import bend_towards, jacobian, turn
+from solver._kernels.rotation import bend_to, bent, jacobian, with_rest
 
 
 @inlined
@@ -63,7 +63,8 @@ def gradients(problem: Problem, slot: int, k: int) -> None:
         f = add3(f, df)
         u = load3(controls, i)
         bend, length = chain.bend[i], chain.length[i]
-        jac = jacobian(u)
+        turn = with_rest(chain.rest[i], u)
+        jac = jacobian(turn)
         rho = bend * math.cos(math.sqrt(u[0] * u[0] + u[1] * u[1])) - length * f[2]
         if i < k - 1:
             w = load3(controls, i + 1)
@@ -78,7 +79,7 @@ def gradients(problem: Problem, slot: int, k: int) -> None:
             slope += -length * f[1] if a == 0 else length * f[0]
             slope += after(problem, slot, k, i + 1, a) + roll * twist
             gain[i, a, 0] = -slope
-        e = turn(chain.rest[i], u)
+        e = bent(turn)
         v0, v1, twist = keep_direction(jac, (e[6], e[7], e[8]))
         roll = bend * (u[0] * v0 + u[1] * v1) + gain[i, 0, 1] * twist
         f = apply(e, f)
@@ -90,9 +91,10 @@ def after(problem: Problem, slot: int, k: int, j: int, axis: int) -> float:
     if j >= k:
         return 0.0
     u = load3(problem.state.u[slot], j)
-    e = turn(problem.chain.rest[j], u)
+    turn = with_rest(problem.chain.rest[j], u)
+    e = bent(turn)
     incoming = apply_transposed(e, (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0))
-    v0, v1, left = keep_direction(jacobian(u), incoming)
+    v0, v1, left = keep_direction(jacobian(turn), incoming)
     return float(problem.chain.bend[j] * (u[0] * v0 + u[1] * v1) + problem.scratch.gain[j, 0, 1] * left)
 
 
@@ -118,9 +120,9 @@ def propose(problem: Problem, slot: int, k: int, share: float) -> None:
         size = math.sqrt(1.0 + d0 * d0 + d1 * d1)
         # directions, never differences of joints: far from the origin their last place would bend the wire
         t = apply_transposed(frame, apply(old, (d1 / size, -d0 / size, 1.0 / size)))
-        u0, u1 = bend_towards(chain.rest[i], t)
-        store3(u, i, (u0, u1, 0.0))
-        frame = times(frame, turn(chain.rest[i], (u0, u1, 0.0)))
+        turn0, turn1 = bend_to(t)
+        store3(u, i, (turn0, turn1 - chain.rest[i], 0.0))
+        frame = times(frame, bent((turn0, turn1, 0.0)))
         store9(r, i + 1, frame)
         for a in range(3):
             x[i + 1, a] = x[i, a] + chain.length[i] * r[i + 1, a, 2]

@@ -5,12 +5,11 @@ from typing import Any
 
 from solver import _tolerances as tol
 from solver._kernels import wall_law
-from solver._kernels.algebra import dot, load3, load9, store3, store9
+from solver._kernels.algebra import load3, load9, store3, store9
 from solver._kernels.chain import profile_at
 from solver._kernels.data import CURRENT, Chain, Field, Problem, WireTable
 from solver._kernels.flags import cached, kernel, merged
 from solver._kernels.friction import friction_force
-from solver._kernels.rotation import turn
 
 
 @cached
@@ -74,12 +73,11 @@ def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: 
         compliance, bend = 0.5 * flexible, 0.5 * rest
         if j == 0:
             compliance, bend = flexible_in - compliance, rest_in - bend
-        moment = chain.bend[j] ** 2 * (u[j, 0] ** 2 + u[j, 1] ** 2)
-        force -= 0.5 * moment * compliance
+        square = chain.bend[j] ** 2 * (u[j, 0] ** 2 + u[j, 1] ** 2)
+        # at the minimum the moment about axis 2 is what turning that joint more would take
+        force -= 0.5 * square * compliance + bend * chain.bend[j] * u[j, 1]
         if problem.twisting:
             force -= 0.25 * (chain.twist[j] * u[j, 2]) ** 2 / table.profile.twist
-        e = turn(0.0, load3(u, j))
-        force += bend * dot(load3(report.turned, j), e[3:6])
     return float(force + wall_gained(problem, table))
 
 
@@ -151,7 +149,7 @@ def copy_state(problem: Problem, source: int, target: int, k: int) -> None:
 def forget_forces(report: Any) -> None:
     """Set the report's gradient to 0: that of a wire without a force or a bend."""
     for a in range(3):
-        report.force[a] = report.torque[a] = report.turned[0, a] = report.turned[1, a] = 0.0
+        report.force[a] = report.torque[a] = 0.0
 
 
 @kernel

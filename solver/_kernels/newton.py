@@ -1,7 +1,7 @@
 """Newton's step for the whole chain in O(k): a backward Riccati recursion and a forward rollout.
 
 The chain is a discrete optimal-control problem: state (x_j, R_j), control u_j, dynamics
-    R_{j+1} = R_j B_j exp(û_j),    x_{j+1} = x_j + l_j R_{j+1} e3.
+    R_{j+1} = R_j exp(ω̂_j),  ω_j = u_j + w_j e2,    x_{j+1} = x_j + l_j R_{j+1} e3.
 The value function is expanded to second order in (δp, δr), both in the frame of the node, R -> R exp(δr̂): V_pp (p),
 V_pr (c), V_rr (h), V_p (f) and V_r (g). Crossing a segment in its own frame, δp' = δp + A δr with
 A = l [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], so that
@@ -32,7 +32,6 @@ from solver._kernels.algebra import (
     gram,
     load3,
     load9,
-    store3,
     times,
     times_transposed,
     transpose,
@@ -52,7 +51,7 @@ from solver._kernels.blocks import (
 from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.newton_straight import sweep_straight
-from solver._kernels.rotation import jacobian, turn
+from solver._kernels.rotation import bent, jacobian, with_rest
 
 Value = tuple[Six, Nine, Six, Three, Three]
 """The value function at a node: p, c, h, f, g."""
@@ -130,10 +129,11 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         value = cross_segment(length[j], add_node(value, (df, dg), (dp, dc, dh), held))
         _, c, h, _, g = value
         u = load3(state.u[slot], j)
-        jac = jacobian(u)
+        turn = with_rest(rest[j], u)
+        jac = jacobian(turn)
         if not twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
-        q_uu = joint_hessian(chain, j, u, jac, (h, g), twisting, 0.01 * damping)
+        q_uu = joint_hessian(chain, j, turn, jac, (h, g), twisting, 0.01 * damping)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
         lowest = min(lowest, least / bend[j])
         if not least > -floor:
@@ -150,7 +150,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         feed, gain_p, gain_r = apply(inverse, q_u), times(inverse, q_up), times(inverse, q_ur)
         store_gains(gain, j, (feed, gain_p, gain_r))
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
-        value = cross_joint(turn(rest[j], u), value, q_up, q_ur, (feed, gain_p, gain_r))
+        value = cross_joint(bent(turn), value, q_up, q_ur, (feed, gain_p, gain_r))
     report.decrement = decrement
     note_pivot(lowest, first_free, damping, report)
     return math.isfinite(decrement)
@@ -160,7 +160,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
 def costate(problem: Problem, slot: int, k: int, report: Any) -> None:
     """Exact gradient of the total energy: the first-order part of ``sweep``, without elimination.
 
-    Fills moment, force, torque and turned of the report.
+    Fills moment, force and torque of the report.
     """
     chain, controls, frames = problem.chain, problem.state.u[slot], problem.state.r[slot]
     f, g = ZERO3, ZERO3
@@ -172,13 +172,12 @@ def costate(problem: Problem, slot: int, k: int, report: Any) -> None:
         length = chain.length[j]
         g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
         u = load3(controls, j)
-        moment = apply_transposed(jacobian(u), g)
+        turn = with_rest(chain.rest[j], u)
+        moment = apply_transposed(jacobian(turn), g)
         largest = max(largest, abs(moment[0] + chain.bend[j] * u[0]), abs(moment[1] + chain.bend[j] * u[1]))
         if problem.twisting:
             largest = max(largest, abs(moment[2] + chain.twist[j] * u[2]))
-        if j < 2:
-            store3(report.turned, j, g)
-        e = turn(chain.rest[j], u)
+        e = bent(turn)
         f, g = apply(e, f), apply(e, g)
     report.moment = largest
     report.force[0], report.force[1], report.force[2] = apply(load9(frames, 0), f)

@@ -41,7 +41,6 @@ REPORT = record(
     ("push", float),
     ("force", float, 3),
     ("torque", float, 3),
-    ("turned", float, (2, 3)),
     ("moment", float),
     ("decrement", float),
     ("joint", np.int64),
@@ -54,9 +53,9 @@ REPORT = record(
 
 start : energy at the beginning, N mm.     penetration : deepest of all points, mm.     push : the hand's force, N.
 force, torque : gradient of the energy with respect to the entry point, N, and to turning the base frame, N mm.
-turned : the same to turning segments 0 and 1, in their own frames.     moment : largest moment left at a joint, N mm.
-decrement : fall of the energy that Newton's step predicts, N mm.     joint : the first whose block of the Hessian is
-not positive.     bend, twist, curvature : its direction of negative curvature, and that curvature, N mm.
+moment : largest moment left at a joint, N mm.     decrement : fall of the energy that Newton's step predicts, N mm.
+joint : the first whose block of the Hessian is not positive.     bend, twist, curvature : its direction of negative
+curvature, and that curvature, N mm.
 pivot : least over the joints of the stiffness with all beyond free to follow, over its own; 0 where the wire snaps.
 """
 DESCENT = record(

@@ -21,7 +21,7 @@ from solver._kernels.algebra import (
 from solver._kernels.data import Chain, Problem, State
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.lanes.vectors import anywhere, select
-from solver._kernels.rotation import turn
+from solver._kernels.rotation import bent, with_rest
 
 
 @kernel
@@ -30,7 +30,7 @@ def place(chain: Chain, state: State, slot: int, k: int) -> None:
     u, x, r = state.u[slot], state.x[slot], state.r[slot]
     frame = load9(r, 0)
     for j in range(k):
-        frame = times(frame, turn(chain.rest[j], load3(u, j)))
+        frame = times(frame, bent(with_rest(chain.rest[j], load3(u, j))))
         store9(r, j + 1, frame)
         for a in range(3):
             x[j + 1, a] = x[j, a] + chain.length[j] * r[j + 1, a, 2]
@@ -65,7 +65,7 @@ def rollout(problem: Problem, slot: int, first_free: int, k: int, fraction: floa
         turned = apply_transposed(ahead, relative(load9(old_r, j), frame))
         v = limited(load3(old_u, j), answer(gain, j, fraction, moved, turned))
         store3(u, j, v)
-        frame = times(frame, turn(chain.rest[j], v))
+        frame = times(frame, bent(with_rest(chain.rest[j], v)))
         store9(r, j + 1, frame)
         length = chain.length[j]
         at = (at[0] + length * frame[2], at[1] + length * frame[5], at[2] + length * frame[8])

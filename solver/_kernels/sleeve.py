@@ -4,12 +4,10 @@ Its tip is counted from the entry, the material from the wire's tip: pushing eit
 the wire. Where a cell has the jump inside, its compliance is the sum of both parts', as for springs in series.
 """
 
-from solver._kernels.algebra import ZERO3, Three, add3, apply, dot, load3, load9
-from solver._kernels.blocks import node_gradient
+from solver._kernels.algebra import load3
 from solver._kernels.chain import cell, integral, profile_at
 from solver._kernels.data import CURRENT, Chain, Problem, WireTable
 from solver._kernels.flags import kernel
-from solver._kernels.rotation import turn
 
 
 @kernel
@@ -73,24 +71,7 @@ def tip_force(problem: Problem, table: WireTable, k: int) -> float:
             less = 1.0 / profile_at(own.stiffness_at, own.stiffness, edge)
             less -= 1.0 / profile_at(pair.stiffness_at, pair.stiffness, edge)
             straighter = profile_at(own.rest_at, own.rest, edge) - profile_at(pair.rest_at, pair.rest, edge)
-            moment, e = chain.bend[j], turn(0.0, u)
-            force += 0.5 * moment * moment * (u[0] * u[0] + u[1] * u[1]) * less
-            force -= straighter * dot(turning(problem, k, j), e[3:6])
+            bend = chain.bend[j]
+            force += 0.5 * bend * bend * (u[0] * u[0] + u[1] * u[1]) * less + straighter * bend * u[1]
             break
     return float(force)
-
-
-@kernel
-def turning(problem: Problem, k: int, joint: int) -> Three:
-    """Gradient of the energy by turning all beyond a joint, N mm, in the frame of the segment after it."""
-    chain, controls, frames = problem.chain, problem.state.u[CURRENT], problem.state.r[CURRENT]
-    f, g = ZERO3, ZERO3
-    for n in range(k, joint, -1):
-        df, dg = node_gradient(problem, CURRENT, n, load9(frames, n))
-        f, g = add3(f, df), add3(g, dg)
-        length = chain.length[n - 1]
-        g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
-        if n - 1 > joint:
-            e = turn(chain.rest[n - 1], load3(controls, n - 1))
-            f, g = apply(e, f), apply(e, g)
-    return g

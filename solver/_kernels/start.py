@@ -16,7 +16,7 @@ from solver._kernels.energy import total_energy
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.friction import anchor_friction
 from solver._kernels.rollout import copy_base, place
-from solver._kernels.rotation import bend_to, bent_to, from_rest, sine_and_cosine, turn, unrested, with_twist
+from solver._kernels.rotation import bend_to, bent, bent_to, with_twist
 from solver._kernels.sleeve import put_over
 
 
@@ -81,24 +81,20 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
     """Bend joint j towards x[j + 1], keeping the twist it has; then put that joint at its exact distance."""
     d = minus(x[j + 1], x[j])
     size = math.sqrt(dot(d, d))
-    frame, length, rest = load9(r, j), chain.length[j], chain.rest[j]
+    frame, length = load9(r, j), chain.length[j]
     # a joint on top of the one before has no direction: it keeps the one before
     way = scaled(1.0 / size, d) if size > 0.0 else (frame[2], frame[5], frame[8])
-    p = unrested(rest, apply_transposed(frame, way))
+    p = apply_transposed(frame, way)
     # of length 1 to the last digit: what a frame's columns lack would double from joint to joint
     p = scaled(1.5 - 0.5 * dot(p, p), p)
-    u0, u1 = bend_to(p)
-    v = with_twist(u0, u1, u[j, 2])
-    store3(u, j, v)
-    if v[2] == 0.0 and p[2] > 0.0:
+    turn0, turn1 = bend_to(p)
+    turn = with_twist(turn0, turn1, u[j, 2])
+    store3(u, j, (turn[0], turn[1] - chain.rest[j], turn[2]))
+    if turn[2] == 0.0 and p[2] > 0.0:
         # the turn and the joint straight from the direction: the next joint need not wait for the control
-        e = bent_to(p)
-        if rest != 0.0:
-            sine, cosine = sine_and_cosine(rest)
-            e = from_rest(cosine, sine, e)
-        frame = times(frame, e)
+        frame = times(frame, bent_to(p))
     else:
-        frame = times(frame, turn(rest, v))
+        frame = times(frame, bent(turn))
         way = (frame[2], frame[5], frame[8])
     store9(r, j + 1, frame)
     for a in range(3):

@@ -21,10 +21,10 @@ def hooke(d: Array) -> Array:
 
 
 def joints_of(controls: Array, rest: Array, length: Array, base: Array, entry: ArrayLike) -> Array:
-    """Joints (k + 1, 3): at each joint first the rest bend about axis 2, then the control as a rotation vector."""
+    """Joints (k + 1, 3): each joint turns by a rotation vector, control plus rest bend about axis 2."""
     frame, x = Rotation.from_matrix(base), [np.asarray(entry, dtype=float)]
     for u, beta, step in zip(controls, rest, length, strict=True):
-        frame = frame * Rotation.from_rotvec([0, beta, 0]) * Rotation.from_rotvec(u)
+        frame = frame * Rotation.from_rotvec([u[0], u[1] + beta, u[2]])
         x.append(x[-1] + step * frame.apply([0, 0, 1]))
     return np.array(x)
 

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 class StaticChain:
     """A wire of k joints at one depth, with its wall and a dead load (k + 1, 3) on its nodes, N.
 
-    length (k,) of the segments; bend and twist (k,): stiffness of the joints; rest (k,): their rest bend, rad, and
-    at_rest the same as turns.     kinds : how many of a joint's angles are free: bend, bend and, where torsion is not
+    length (k,) of the segments; bend and twist (k,): stiffness of the joints; rest (k,): their rest bend, rad, about
+    material axis 2.     kinds : how many of a joint's angles are free: bend, bend and, where torsion is not
     rigid, twist.
     States are nodes (k + 1, 3) mm and frames (k + 1, 3, 3), as a solution publishes them.
     """
@@ -34,21 +34,25 @@ class StaticChain:
     bend: Array
     twist: Array
     rest: Array
-    at_rest: Rotation
     load: Array
     kinds: int
 
     def angles(self, frames: Array) -> Array:
-        """Joint angles (k, 3) beyond the rest bend, rad, in the material frame: log of Bᵀ Rᵀ R'."""
-        turn = np.einsum("nji,njk->nik", frames[:-1], frames[1:])
-        return np.asarray((self.at_rest.inv() * Rotation.from_matrix(turn)).as_rotvec())
+        """Joint angles (k, 3) beyond the rest bend, rad, in the material frame: log of Rᵀ R', less that bend."""
+        turn = Rotation.from_matrix(np.einsum("nji,njk->nik", frames[:-1], frames[1:]))
+        return np.asarray(turn.as_rotvec() - self.at_rest)
+
+    @property
+    def at_rest(self) -> Array:
+        """Joint angles (k, 3) of the wire at rest, rad."""
+        return np.outer(self.rest, [0.0, 1.0, 0.0])
 
     def roll_out(self, angles: Array, base: Array, frame: Array) -> tuple[Array, Array]:
         """Nodes and frames of the chain with these joint angles (k, 3), clamped at ``base`` in ``frame``."""
         k = len(self.length)
         nodes, frames = np.empty((k + 1, 3)), np.empty((k + 1, 3, 3))
         nodes[0], frames[0] = base, frame
-        turn = (self.at_rest * Rotation.from_rotvec(angles)).as_matrix()
+        turn = Rotation.from_rotvec(self.at_rest + angles).as_matrix()
         for j in range(k):
             frames[j + 1] = frames[j] @ turn[j]
             nodes[j + 1] = nodes[j] + self.length[j] * frames[j + 1, :, 2]
@@ -99,7 +103,7 @@ class StaticChain:
         body = np.einsum("nji,nj->ni", frames[1:], about)
         u = self.angles(frames)
         elastic = np.column_stack([self.bend, self.bend, self.twist]) * u
-        gradient = elastic - np.einsum("nji,nj->ni", _right_jacobian(u), body)
+        gradient = elastic - np.einsum("nji,nj->ni", _right_jacobian(self.at_rest + u), body)
         gradient[:, self.kinds :] = 0.0
         return gradient, elastic
 
@@ -127,9 +131,8 @@ def assemble(
     twist = wire.torsional_stiffness_N_mm2 / (outer - inner) if wire.twists else np.zeros(k)
     load = np.zeros((k + 1, 3))
     load[k] = tip_load_N
-    at_rest = Rotation.from_rotvec(np.column_stack([np.zeros(k), rest, np.zeros(k)]))
     kinds = 3 if wire.twists else 2
-    return StaticChain(wire, wall, length, 1.0 / compliance, twist, rest, at_rest, load, kinds)
+    return StaticChain(wire, wall, length, 1.0 / compliance, twist, rest, load, kinds)
 
 
 def _integral(at: Array, value: Array, low: Array, high: Array, mean: Callable[[Array, Array], Array]) -> Array:

@@ -13,7 +13,6 @@ from solver._kernels.algebra import load3, load9, store3, store9
 from solver._kernels.data import CURRENT, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.records import record
-from solver._kernels.rotation import sine_and_cosine
 
 NUMBERS = (
     *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted", "room"),
@@ -48,19 +47,18 @@ ALONG, WEIGHT, ANCHOR = 0, 1, 2
 class Block(NamedTuple):
     """Arrays of numbers (..., WIDTH); the same memory again as arrays (...) of lanes.
 
-    length, bend, cosine, sine, hold : (size,) of the joints: mm, N mm/rad, of the rest bend, bend over length².
+    length, bend, rest, hold : (size,) of the joints: mm, N mm/rad, rest bend in rad, bend over length².
     u, x, r : as in ``data.State``, of the current state and the trial, without twist.     gain : (size, 2, 7).
     site : (p, 6), where on the wire a look-up point is, mm, the mm that it stands for, 0 where there is none, and its
     row of ``data.Scratch.anchor``.     touch : (2, p, 11), penetration, mm, and jet, of both states.
-    load : (3,) on the tip, N.     force, torque, turned : as in ``records.REPORT``.     asked : (3, n) int64, lists of
+    load : (3,) on the tip, N.     force, torque : as in ``records.REPORT``.     asked : (3, n) int64, lists of
     points to be looked up, each WIDTH times the point, plus its lane: row 0 those that will touch, 1 those that may, 2
     the eight that are looked up now.     found : (11,), see ``field.look_up``.     number : see ``NUMBERS``.
     """
 
     length: Any
     bend: Any
-    cosine: Any
-    sine: Any
+    rest: Any
     hold: Any
     u: Any
     x: Any
@@ -71,15 +69,14 @@ class Block(NamedTuple):
     load: Any
     force: Any
     torque: Any
-    turned: Any
     asked: Any
     found: Any
     number: Any
 
 
 SHAPES = (
-    *("k", "k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
-    *("3", "3", "3", "2 3", "", "11", str(len(NUMBERS))),
+    *("k", "k", "k", "k", "2 k 2", "2 n 3", "2 n 3 3", "k 2 7", "p 6", "2 p 11"),
+    *("3", "3", "3", "", "11", str(len(NUMBERS))),
 )
 """Shapes of a block's arrays, without the lanes: k joints, n nodes, p points; ``asked`` is not an array of lanes."""
 LANE = record(
@@ -109,10 +106,9 @@ def put_in(b: Block, first: Any, lane: int, problem: Problem, k: int) -> None:
     """Put the current state of a wire of k segments into a lane."""
     chain, state, shift = problem.chain, problem.state, b.length.shape[0] - k
     for j in range(k):
-        to, rest, length = shift + j, chain.rest[j], chain.length[j]
-        b.length[to, lane], b.bend[to, lane] = length, chain.bend[j]
+        to, length = shift + j, chain.length[j]
+        b.length[to, lane], b.bend[to, lane], b.rest[to, lane] = length, chain.bend[j], chain.rest[j]
         b.hold[to, lane] = chain.bend[j] / (length * length)
-        b.sine[to, lane], b.cosine[to, lane] = sine_and_cosine(rest) if rest != 0.0 else (0.0, 1.0)
         b.u[CURRENT, to, 0, lane], b.u[CURRENT, to, 1, lane] = state.u[CURRENT, j, 0], state.u[CURRENT, j, 1]
     for n in range(k + 1):
         put_node(b, lane, shift + n, load3(state.x[CURRENT], n), load9(state.r[CURRENT], n))
@@ -143,8 +139,8 @@ def fill_up(b: Block, first: Any, lane: int, start: int, stop: int) -> None:
     """Put joints of length 0 before a wire that begins at joint ``stop``, from joint ``start`` on."""
     x = (b.x[CURRENT, stop, 0, lane], b.x[CURRENT, stop, 1, lane], b.x[CURRENT, stop, 2, lane])
     for j in range(start, stop):
-        b.length[j, lane] = b.hold[j, lane] = b.sine[j, lane] = 0.0
-        b.bend[j, lane] = b.cosine[j, lane] = 1.0
+        b.length[j, lane] = b.hold[j, lane] = b.rest[j, lane] = 0.0
+        b.bend[j, lane] = 1.0
         b.u[CURRENT, j, 0, lane] = b.u[CURRENT, j, 1, lane] = 0.0
         for a in range(3):
             b.x[CURRENT, j, a, lane] = x[a]

@@ -53,9 +53,9 @@ class Plan(NamedTuple):
 def advance_together(wires: Any, plan: Plan, records: Any, raw: Block, first: Any) -> None:
     """Lead each wire that is NEW through all its depths."""
     block = Block(
-        in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.cosine), in_lanes(raw.sine), in_lanes(raw.hold),
-        in_lanes(raw.u), in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site),
-        in_lanes(raw.touch), in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque), in_lanes(raw.turned),
+        in_lanes(raw.length), in_lanes(raw.bend), in_lanes(raw.rest), in_lanes(raw.hold), in_lanes(raw.u),
+        in_lanes(raw.x), in_lanes(raw.r), in_lanes(raw.gain), in_lanes(raw.site), in_lanes(raw.touch),
+        in_lanes(raw.load), in_lanes(raw.force), in_lanes(raw.torque),
         raw.asked, in_lanes(raw.found), in_lanes(raw.number),
     )  # fmt: skip
     plan, raw, (lanes, nows, counts, seats) = bare(plan), bare(raw), bare(records)

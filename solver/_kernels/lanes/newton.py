@@ -28,7 +28,6 @@ from solver._kernels.algebra import (
     mix,
     outer,
     scaled,
-    store3,
 )
 from solver._kernels.blocks import least_bending, lever, without_negative
 from solver._kernels.data import CURRENT
@@ -48,19 +47,12 @@ from solver._kernels.lanes.block import (
 )
 from solver._kernels.lanes.vectors import anywhere, greater, select, select3, size, spread
 from solver._kernels.newton import Value
-from solver._kernels.rotation import bent, from_rest, jacobian, jacobian_curvature
+from solver._kernels.rotation import jacobian, jacobian_curvature, with_rest
 
 Rows = tuple[Three, Three]
 """One row for each control of a joint."""
 Gains = tuple[Pair, Rows, Rows]
 """Of a joint: its step, and its answers to δp and δr."""
-
-
-@inlined
-def turn_of(b: Block, j: int, u: Three) -> Nine:
-    """``rotation.turn`` of a joint."""
-    e, sine = bent(u), b.sine[j]
-    return from_rest(b.cosine[j], sine, e) if anywhere(sine != 0.0) else e
 
 
 @inlined
@@ -141,10 +133,10 @@ def cross_segment(a: Three, value: Value) -> Value:
 
 
 @inlined
-def joint_rows(bend: Any, u: Three, frame: Nine, value: Value) -> tuple[Six, Rows, Rows, tuple[Any, Any]]:
-    """A joint's Q_uu, rows of Q_up and Q_ur, and its two moments Q_u."""
+def joint_rows(bend: Any, turn: Three, frame: Nine, value: Value) -> tuple[Six, Rows, Rows, tuple[Any, Any]]:
+    """Of a joint turned by ``turn``: Q_uu, rows of Q_up and Q_ur, and the two moments Q_u of what is beyond it."""
     _, c, h, _, g = value
-    jac, more = jacobian(u), jacobian_curvature(apply_transposed(frame, g), u)
+    jac, more = jacobian(turn), jacobian_curvature(apply_transposed(frame, g), turn)
     one, two = apply(frame, (jac[0], jac[3], jac[6])), apply(frame, (jac[1], jac[4], jac[7]))
     h_one, h_two = apply(full(h), one), apply(full(h), two)
     xx, yy, xy = dot(one, h_one) + more[0] + bend, dot(two, h_two) + more[1] + bend, dot(one, h_two) + more[3]
@@ -201,7 +193,7 @@ def sweep(b: Block, first: Any, base: int) -> None:
         held = damping * b.hold[j]
         vp = (vp[0] + held, vp[1] + held, vp[2] + held, vp[3], vp[4], vp[5])
         value = cross_segment(scaled(b.length[j], direction(frame)), (vp, vc, vh, vf, vg))
-        q_uu, q_up, q_ur, moment = joint_rows(bend * (1.0 + 0.01 * damping), v, frame, value)
+        q_uu, q_up, q_ur, moment = joint_rows(bend * (1.0 + 0.01 * damping), with_rest(b.rest[j], v), frame, value)
         floor, least, free = tol.CURVATURE_FLOOR * bend, least_bending(q_uu), start <= float(j)
         definite = definite & ((least > -floor) | ~free)
         lowest = select(free & (least < lowest * bend), least / bend, lowest)
@@ -221,7 +213,7 @@ def costate(b: Block, first: Any, base: int) -> None:
     """``newton.costate`` of every lane: the exact gradient, and the largest moment in the wire."""
     k, u, r, zero = b.length.shape[0], b.u[CURRENT], b.r[CURRENT], spread(0.0)
     _, _, _, f, g = at_tip(b)
-    left, largest, one, two, touch = zero, zero, g, g, b.touch
+    left, largest, touch = zero, zero, b.touch
     for n in range(k, base, -1):
         j = n - 1
         frame, v, bend = load9(r, n), (u[j, 0], u[j, 1], zero), b.bend[j]
@@ -231,17 +223,13 @@ def costate(b: Block, first: Any, base: int) -> None:
                 f, g = add3(f, force), plus_cross(g, scaled(b.site[p, ALONG], direction(frame)), force)
         length = b.length[j]
         g = plus_cross(g, scaled(length, direction(frame)), f)
-        here_g = apply_transposed(frame, g)
-        moment = apply_transposed(jacobian(v), here_g)
+        moment = apply_transposed(jacobian(with_rest(b.rest[j], v)), apply_transposed(frame, g))
         # a joint of length 0 carries the moment of the wire beyond it and has none of its own
         real = length > 0.0
         here = greater(size(moment[0] + bend * v[0]), size(moment[1] + bend * v[1]))
         left = select(real, greater(left, here), left)
         angle = greater(greater(size(v[0]), size(v[1])), tol.ENERGY_FLOOR_ANGLE)
         largest = select(real, greater(largest, bend * angle), largest)
-        one, two = select3(real, here_g, one), select3(real, one, two)
     b.number[MOMENT], b.number[LARGEST] = left, largest
     b.force[0], b.force[1], b.force[2] = f
     b.torque[0], b.torque[1], b.torque[2] = apply_transposed(load9(r, base), g)
-    store3(b.turned, 0, one)
-    store3(b.turned, 1, two)

@@ -202,7 +202,6 @@ def hand_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     report.moment, report.pivot = number[MOMENT, lane], me.pivot
     for a in range(3):
         report.force[a], report.torque[a] = raw.force[a, lane], raw.torque[a, lane]
-        report.turned[0, a], report.turned[1, a] = raw.turned[0, a, lane], raw.turned[1, a, lane]
     counted.wall_look_ups += int(number[FULL, lane])
     counted.wall_look_ups_proven_unnecessary += int(number[CLEAR, lane])
 

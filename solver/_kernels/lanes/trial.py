@@ -28,9 +28,9 @@ from solver._kernels.lanes.block import (
     Block,
 )
 from solver._kernels.lanes.field import look_first, look_up
-from solver._kernels.lanes.newton import turn_of
 from solver._kernels.lanes.vectors import WIDTH, anywhere, bits, greater, select, select3, size, spread
 from solver._kernels.rollout import limited, relative
+from solver._kernels.rotation import bent, with_rest
 
 
 @kernel
@@ -52,7 +52,7 @@ def rollout(b: Block, base: int, spacing: float) -> None:
         length, held = b.length[j], start > float(j)
         if anywhere(held):
             v = select3(held, before, v)
-        frame = times(frame, turn_of(b, j, v))
+        frame = times(frame, bent(with_rest(b.rest[j], v)))
         at = (at[0] + length * frame[2], at[1] + length * frame[5], at[2] + length * frame[8])
         if anywhere(held):
             frame, at = select9(held, ahead, frame), select3(held, there, at)
