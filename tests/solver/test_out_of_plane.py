@@ -11,7 +11,6 @@ import sys
 
 import numpy as np
 import pytest
-
 from scipy.spatial.transform import Rotation
 
 from solver import GuideWire, relax
