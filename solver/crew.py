@@ -77,7 +77,7 @@ class Crew:
             notes = (*self.notes, self.seats)
             advance_together(tuple(self.wires), self.plan, notes, self.block, self.first)
             for w, job in enumerate(jobs):
-                job.found.extend(_solutions(self.plan, w, job.insertion.wire.radius_mm))
+                job.found.extend(_solutions(self.plan, w, job.insertion._work))
 
     def _start(self, w: int, job: Job) -> None:
         """Put a wire into the pool."""
@@ -111,7 +111,7 @@ def _plan(wires: int, most: int, rows: int) -> Plan:
     return Plan(goal, count, row, x, r, force, ended, place, report, energies, counters, snaps, blank)
 
 
-def _solutions(plan: Plan, w: int, radius_mm: float) -> list[Solution]:
+def _solutions(plan: Plan, w: int, work: Workspace) -> list[Solution]:
     """What a wire found at its depths."""
     names = "place", "report", "energies", "counters", "ended", "row"
     noted = zip(*(getattr(plan, name)[w, : plan.count[w]].tolist() for name in names), strict=True)
@@ -120,6 +120,8 @@ def _solutions(plan: Plan, w: int, radius_mm: float) -> list[Solution]:
         # copies: the next wire's results overwrite these
         arrays = [a[w, row : row + k + 1].copy() for a in (plan.x, plan.r, plan.force)]
         depth, roll, *_ = notes[0]
-        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, radius_mm
+        ended = Status[data.OUTCOMES[outcome]], iterations, depth, roll, work.wire.radius_mm
         found.append(Solution.assembled(arrays, tuple(notes), plan.snaps[w, n], ended))
+        if work.at_entry is not None:
+            work.at_entry.add(found[-1])
     return found

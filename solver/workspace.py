@@ -17,6 +17,7 @@ from solver._kernels.handle import Contents, handle_of
 from solver._kernels.insertion import advance
 from solver._kernels.minimise import CLOSED_FORM
 from solver._kernels.shaft import shaft_forces
+from solver.at_entry import EntryContact
 from solver.catheter import Catheter, sleeve_of
 from solver.doors import FORCE_N, Array, numbers
 from solver.errors import refuse
@@ -66,6 +67,7 @@ class Workspace:
 
     problem: Problem
     introducer: Introducer | None = None
+    at_entry: EntryContact | None = None
 
     def __init__(
         self,
@@ -113,6 +115,7 @@ class Workspace:
         self.problem = Problem(
             field=self.field,
             stiffness=float(self.wall.stiffness_N_mm2) if self.wall is not None else 0.0,
+            pressed=self.at_entry.energy if self.at_entry is not None else 0.0,
             friction=friction,
             shaft=self.shaft,
             chain=chain,
@@ -155,8 +158,8 @@ class Workspace:
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
         load, first = np.zeros((k + 1, 3)), np.zeros(k + 2, dtype=np.int64)
-        offset, weight = np.zeros((points, 3)), np.zeros(points)
-        return data.Chain(length, bend, twist, rest, load, first, offset, weight, self.rule.reach)
+        offset, weight, held = np.zeros((points, 3)), np.zeros(points), np.zeros(1)
+        return data.Chain(length, bend, twist, rest, load, first, offset, weight, held, self.rule.reach)
 
     def clamp(
         self,
@@ -186,6 +189,9 @@ class Workspace:
             finest=min(finest / step, 1.0),
         )
         self.problem.state.x[:, 0], self.problem.state.r[:, 0] = entry, frame
+        if self.wall is not None:
+            self.at_entry = EntryContact(self.wall, self.rule, self.wire.radius_mm, entry, frame)
+            self.problem = self.problem._replace(pressed=self.at_entry.energy)
         self._bind()
 
     def load(self, load_N: ArrayLike) -> None:
@@ -260,6 +266,8 @@ class Workspace:
         notes = self.place.item(0), self.report.item(0), state.energies.item(CURRENT), self.counters.item(0)
         ended = status, iterations, depth_mm, roll_deg, self.wire.radius_mm
         solution = Solution.assembled(arrays, notes, self.snaps, ended)
+        if self.at_entry is not None:
+            self.at_entry.add(solution)
         if self.shaft.drag:
             sliding, turning = shaft_forces(self.shaft)
             push, torque = solution.push_force_N + sliding, solution.reaction_torque_N_mm + turning

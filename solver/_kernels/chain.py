@@ -124,6 +124,7 @@ def place_points(chain: Chain, rule: Rule, k: int) -> None:
     """
     inner = rule.tip_at.size > 1
     p = 0
+    chain.held[0] = 0.5 * chain.length[0] if k - 1 > rule.zone or not inner else 0.0
     chain.first[0] = chain.first[1] = 0
     for n in range(1, k + 1):
         behind = k - n if inner else rule.zone + 1

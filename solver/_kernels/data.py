@@ -98,7 +98,7 @@ class Chain(NamedTuple):
     length, bend, twist, rest : (k,) segment mm, joint stiffness N mm/rad, rest bend rad.
     load : (k + 1, 3) dead force on each node, N.     first : (k + 2,) first look-up point of each node.
     offset : (p, 3) mm in the frame of the segment that ends at the node.     weight : (p,) mm of wire.
-    reach : see ``Rule``.
+    held : (1,) mm of wire that the node at the entry stands for.     reach : see ``Rule``.
     """
 
     length: Any
@@ -109,6 +109,7 @@ class Chain(NamedTuple):
     first: Any
     offset: Any
     weight: Any
+    held: Any
     reach: float
 
 
@@ -192,12 +193,14 @@ class Shaft(NamedTuple):
 class Problem(NamedTuple):
     """A wire in a wall.
 
-    stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     twisting : the torsional stiffness is finite.
+    stiffness : of the wall, N/mm per mm of wire, 0 is no wall.     pressed : energy of the wall at the entry, whose
+    node cannot move, N mm per mm of wire.     twisting : the torsional stiffness is finite.
     straight : no rest bend, one bending stiffness, a round hull, no twist, no friction: the roll of frames is left out.
     """
 
     field: Field
     stiffness: float
+    pressed: float
     friction: Friction
     shaft: Shaft
     chain: Chain

@@ -25,12 +25,20 @@ def total_energy(problem: Problem, slot: int, first_free: int, k: int) -> float:
     """
     state, parts = problem.state, problem.state.energies[slot]
     parts.bending = bending_energy(problem.chain, state.u[slot], k)
-    parts.wall = wall_energy(problem, slot, first_free, k) if problem.stiffness > 0.0 else 0.0
+    parts.wall = at_entry(problem)
+    if problem.stiffness > 0.0:
+        parts.wall += wall_energy(problem, slot, first_free, k)
     parts.load = load_energy(problem.chain, state.x[slot], k)
     parts.friction = friction_energy(problem, slot, k) if problem.friction.coefficient > 0.0 else 0.0
     if problem.shaft.drag > 0.0:
         parts.friction += shaft_energy(problem, slot)
     return energy_of(problem, slot)
+
+
+@inlined
+def at_entry(problem: Problem) -> float:
+    """Energy of the wall at the entry, N mm: the same in every state of a wire that is laid out."""
+    return float(problem.pressed * problem.chain.held[0])
 
 
 @inlined

@@ -84,7 +84,8 @@ def push_force(problem: Problem, table: WireTable, weight: Any, k: int, report: 
 @kernel
 def wall_gained(problem: Problem, table: WireTable) -> float:
     """What the wall under the first segment adds to the push force, N: more wire lies there, and moves less."""
-    chain, state, force = problem.chain, problem.state, 0.0
+    chain, state = problem.chain, problem.state
+    force = 0.5 * problem.pressed if chain.held[0] > 0.0 else 0.0
     for p in range(chain.first[1], chain.first[2]):
         d, back = state.penetration[CURRENT, p], -chain.offset[p, 2] / chain.length[0]
         if d == 0.0:

@@ -86,7 +86,17 @@ def bound(problem: Any, table: Any, introducer: Any, limits: Any, place: Any, re
     """The handle of the contents; it does not keep them alive, which the caller must."""
     p = bare(problem)
     inner = ProblemHandle(  # type: ignore[no-untyped-call]
-        p.field, p.stiffness, p.friction, p.shaft, p.chain, p.state, p.scratch, p.skips, p.twisting, p.straight
+        p.field,
+        p.stiffness,
+        p.pressed,
+        p.friction,
+        p.shaft,
+        p.chain,
+        p.state,
+        p.scratch,
+        p.skips,
+        p.twisting,
+        p.straight,
     )
     return Handle(  # type: ignore[no-untyped-call]
         inner, bare(table), bare(introducer), limits, bare(place), bare(report), bare(force)

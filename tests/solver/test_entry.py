@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver import Grid, GuideWire, Insertion, Status, VesselWall, relax
+from solver import Grid, GuideWire, Insertion, Insertions, Solution, Status, VesselWall, relax
 
 WIRE = GuideWire(0.5, 0.18, 1.0)
 
@@ -70,16 +70,53 @@ def test_a_roll_with_friction_hangs_on_no_step() -> None:
         assert np.abs(usual - fine).max() < 0.01  # 0.003 in steps of a degree
 
 
-@pytest.mark.parametrize("segment_mm", [1.0, 0.25])
-def test_a_wire_pressed_at_its_entry_has_the_push_that_is_said(segment_mm: float) -> None:
-    """The first part of a segment has no wall: k d^2 / 4 is missing, where a beam on springs takes no push at all."""
+def pressed_flat(deep: float, hull: str = "offset", stiffness: float = 20.0) -> VesselWall:
+    """A flat wall across y that a wire of 0.18 mm radius on the z axis lies ``deep`` mm in."""
     axes = (np.arange(-3, 3.1, 0.5), np.arange(-3, 3.1, 0.5), np.arange(-3, 45, 0.5))
     _, y, _ = np.meshgrid(*axes, indexing="ij")
-    stiffness, deep = 20.0, 0.05
-    wall = VesselWall(Grid(y - (0.18 - deep), [0.5] * 3, [-3, -3, -3]), stiffness)
-    insertion = Insertion(GuideWire(segment_mm, 0.18, 5.0), wall, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-    push = [s.push_force_N for s in insertion.to_depths(np.arange(25.0, 35.0, 0.1).tolist())]
-    assert np.mean(push) == pytest.approx(-stiffness * deep**2 / 4, abs=4e-3)  # the rest is of first order in a segment
+    return VesselWall(Grid(y - (0.18 - deep), [0.5] * 3, [-3, -3, -3]), stiffness, hull=hull)
+
+
+@pytest.mark.parametrize("quadrature", ["tip", "joints"])
+@pytest.mark.parametrize(("segment_mm", "left_N"), [(0.25, 2.5e-3), (0.0625, 2.5e-4)])
+def test_a_wire_pressed_at_its_entry_takes_no_push(segment_mm: float, left_N: float, quadrature: str) -> None:
+    """A beam on springs takes none. Without the half segment at the entry the push was off by -k d^2/4 = -0.0125 N.
+
+    What is left is of second order: the wire leaves the wall within (4 EI/k)^1/4 = 1 mm.
+    """
+    wire = GuideWire(segment_mm, 0.18, 5.0)
+    insertion = Insertion(wire, pressed_flat(0.05), [0.0, 0.0, 0.0], [0.0, 0.0, 1.0], quadrature=quadrature)
+    found = list(insertion.to_depths(np.arange(25.0, 26.0, 0.01).tolist()))
+    assert np.mean([s.push_force_N for s in found]) == pytest.approx(0.0, abs=left_N)
+    assert sum(s.dissipated_N_mm for s in found[1:]) == pytest.approx(0.0, abs=left_N)
+    assert all(s.max_penetration_mm >= 0.05 for s in found)
+
+
+@pytest.mark.parametrize("hull", ["offset", "samples:8"])
+def test_forces_at_a_pressed_entry_are_derivatives_of_the_energy(hull: str) -> None:
+    """Push by the depth, reaction by the balance of all forces, torque by the roll: what Hooke's law there adds."""
+    wall, wire, load = pressed_flat(0.05, hull), GuideWire(1.0, 0.18, 5.0, 0.02), [0.001, -0.002, 0.0]
+
+    def at(depth: float, roll: float) -> Solution:
+        axis, tight = [1.0, 0.0, 0.0], 1e-14
+        return relax(wire, wall, depth_mm=depth, roll_deg=roll, material_axis=axis, load_N=load, tolerance=tight)
+
+    here = at(20.2, 10.0)
+    balance = here.contact_force_N.sum(axis=0) + load + here.reaction_force_N
+    np.testing.assert_allclose(balance, 0.0, rtol=0.0, atol=1e-9)
+    assert abs(here.contact_force_N[0, 1]) > 0.05
+    push = (at(20.201, 10.0).energy_N_mm - at(20.199, 10.0).energy_N_mm) / 0.002
+    assert here.push_force_N == pytest.approx(push, abs=1e-6)
+    torque = (at(20.2, 10.1).energy_N_mm - at(20.2, 9.9).energy_N_mm) / np.radians(0.2)
+    assert here.reaction_torque_N_mm == pytest.approx(torque, abs=1e-6)
+
+
+def test_wires_in_lanes_have_the_wall_at_their_entry_as_well() -> None:
+    wall, wire = pressed_flat(0.05), GuideWire(1.0, 0.18, 5.0)
+    many = [Insertion(wire, wall, [0.0, 0.0, z], [0.0, 0.0, 1.0]) for z in (0.0, 1.0)]
+    (together, *_), (alone,) = Insertions(many).to_depths([20.0]), many[0].clone().to_depths([20.0])
+    assert together[0].contact_force_N[0, 1] == pytest.approx(alone.contact_force_N[0, 1], rel=1e-6)
+    assert together[0].push_force_N == pytest.approx(alone.push_force_N, abs=1e-6)
 
 
 def test_frames_follow_a_roll_that_moves_nothing() -> None:

@@ -15,7 +15,7 @@ from solver._kernels.flags import inlined, kernel
 from solver._kernels.records import record
 
 NUMBERS = (
-    *("stiffness", "reach", "damping", "fraction", "start", "active", "accepted", "room"),
+    *("stiffness", "reach", "at_entry", "damping", "fraction", "start", "active", "accepted", "room"),
     *(
         "decrement",
         "definite",
@@ -31,14 +31,15 @@ NUMBERS = (
         "clear",
     ),
 )
-"""Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; Levenberg's term; the share of
-Newton's step; the first free joint; whether a trial is wanted, and whether it is accepted (1 or 0); the energy that it
-must not exceed, and then what the wall may still take of it. Answered: the fall foretold; whether all blocks were
-positive; the least pivot; energies of the trial; whether a joint of it went so far that a wall may lie between; largest
-moment left, and in the wire; first joint that the accepted step turned; counts of look-ups."""
+"""Rows of ``Block.number``. Asked: the wall's stiffness; what is added to a distance; the wall's energy at the entry;
+Levenberg's term; the share of Newton's step; the first free joint; whether a trial is wanted, and whether it is
+accepted (1 or 0); the energy that it must not exceed, and then what the wall may still take of it. Answered: the fall
+foretold; whether all blocks were positive; the least pivot; energies of the trial; whether a joint of it went so far
+that a wall may lie between; largest moment left, and in the wire; first joint that the accepted step turned; counts of
+look-ups."""
 (
-    STIFFNESS, REACH, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING, WALL, LOAD,
-    JUMP, MOMENT, LARGEST, STILL, FULL, CLEAR,
+    STIFFNESS, REACH, AT_ENTRY, DAMPING, FRACTION, START, ACTIVE, ACCEPTED, ROOM, DECREMENT, DEFINITE, PIVOT, BENDING,
+    WALL, LOAD, JUMP, MOMENT, LARGEST, STILL, FULL, CLEAR,
 ) = range(len(NUMBERS))  # fmt: skip
 ALONG, WEIGHT, ANCHOR = 0, 1, 2
 """Columns of ``Block.site``: the last of four."""

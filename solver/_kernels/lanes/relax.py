@@ -11,11 +11,13 @@ from typing import Any, NamedTuple
 from solver._kernels import newton_method
 from solver._kernels.crossing import free_fraction
 from solver._kernels.data import CURRENT, MAX_ITERATIONS, TRIAL, UNFINISHED, Field, Problem
+from solver._kernels.energy import at_entry
 from solver._kernels.flags import kernel, merged
 from solver._kernels.forces import copy_state
 from solver._kernels.lanes.block import (
     ACCEPTED,
     ACTIVE,
+    AT_ENTRY,
     CLEAR,
     DAMPING,
     FRACTION,
@@ -217,6 +219,7 @@ def take_over(team: Team, raw: Block, lane: int, problem: Problem, report: Any) 
     me.bending, me.wall, me.load, me.pivot = parts.bending, parts.wall, parts.load, report.pivot
     number[STIFFNESS, lane], number[REACH, lane] = problem.stiffness, problem.chain.reach
     number[FULL, lane] = number[CLEAR, lane] = 0.0
+    number[AT_ENTRY, lane] = at_entry(problem)
 
 
 @kernel

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from solver._kernels import wall_law
 from solver._kernels.algebra import dot, load3, minus, store3
 from solver._kernels.data import Problem
-from solver._kernels.energy import bending_energy, energy_of, load_energy, placed
+from solver._kernels.energy import at_entry, bending_energy, energy_of, load_energy, placed
 from solver._kernels.flags import kernel
 from solver._kernels.lanes.field import look_first, look_up
 from solver._kernels.lanes.vectors import WIDTH
@@ -32,7 +32,7 @@ def chosen_start(problem: Problem, desk: Desk, at: Any, k: int, share: float) ->
 @kernel
 def total_energy(problem: Problem, desk: Desk, slot: int, k: int) -> float:
     """``energy.total_energy`` without friction."""
-    state, reach, touching, total = problem.state, problem.chain.reach, 0, 0.0
+    state, reach, touching, total = problem.state, problem.chain.reach, 0, at_entry(problem)
     asking = ask(problem, desk.asked, slot, k)
     for start in range(0, asking, WIDTH):
         some = gather(problem, desk, 1, start, asking)

@@ -12,6 +12,7 @@ from solver._kernels.lanes.block import (
     ACTIVE,
     ALONG,
     ANCHOR,
+    AT_ENTRY,
     BENDING,
     CLEAR,
     FRACTION,
@@ -92,7 +93,7 @@ def wall_energy(b: Block, raw: Block, field: Field, first: Any, base: int) -> No
     Points that touched are looked up first: mostly a trial fails by them, and needs no others.     raw : the numbers
     of b.
     """
-    number, site, touch, total = b.number, b.site, b.touch[TRIAL], spread(0.0)
+    number, site, touch, total = b.number, b.site, b.touch[TRIAL], b.number[AT_ENTRY]
     # ample room for rounding: the order of summation must not decide on which side of the limit a sum is
     number[ROOM] = number[ROOM] - (number[BENDING] + number[LOAD]) + 1e-9 * number[BENDING]
     sure, unsure = ask(b, field.slope, first, base)
