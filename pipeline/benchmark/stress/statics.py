@@ -2,7 +2,7 @@
 
 Nothing here shares code with the minimiser: joint angles are read back from the frames by a logarithm, forces are
 summed from the tip to the clamp, and only the interpolated distance itself is the wall's own.
-The wall is looked up at the joints (trapezium rule, half a weight at the tip); friction is no part of it.
+The wall is looked up at the joints (trapezium rule, half a weight at either end); friction is no part of it.
 """
 
 from collections.abc import Callable
@@ -61,7 +61,7 @@ class StaticChain:
     def contact(self, nodes: Array, frames: Array) -> tuple[Array, Array, float]:
         """Force and moment about the origin on each node, (k + 1, 3), N and N mm, and energy: ½ k w d² at the joints.
 
-        The wall is looked up afresh; w is half of either segment.
+        The wall is looked up afresh; w is half of either segment, at the clamp of the first one.
         """
         wall, reach, k = self.wall, self.wire.radius_mm, len(self.length)
         force, moment, points, count = np.zeros_like(nodes), np.zeros_like(nodes), nodes[1:], 1
@@ -79,7 +79,18 @@ class StaticChain:
         each, node = -(stiffness * depth)[:, None] * gradient, np.repeat(np.arange(1, k + 1), count)
         np.add.at(force, node, each)
         np.add.at(moment, node, np.cross(points, each))
-        return force, moment, float(0.5 * np.sum(stiffness * depth**2))
+        force[0], held = self._at_clamp(nodes[0], frames[0])
+        return force, moment, held + float(0.5 * np.sum(stiffness * depth**2))
+
+    def _at_clamp(self, node: Array, frame: Array) -> tuple[Array, float]:
+        """Force and energy of the wall on the half segment that is held; a sampled hull is a whole circle there."""
+        assert self.wall is not None
+        angle = np.linspace(0.0, 2 * np.pi, 720, endpoint=False)[:, None]
+        ring = np.cos(angle) * frame[:, 0] + np.sin(angle) * frame[:, 1]
+        points, reach = (node + self.wire.radius_mm * ring, 0.0) if self.wall.samples else (node, self.wire.radius_mm)
+        phi, gradient, _ = self.wall.look_up(points)
+        depth, weight = np.maximum(phi + reach, 0.0), 0.5 * self.length[0] * self.wall.stiffness_N_mm2
+        return -weight * np.mean(depth[:, None] * gradient, axis=0), float(0.5 * weight * np.mean(depth**2))
 
     def moments(
         self, nodes: Array, frames: Array, contact_N: Array | None = None, held_mm: Array | None = None
