@@ -98,7 +98,7 @@ class Workspace:
         self.counts = self.counters.view(np.int64)
         self.place["shrink"], self.place["calm"] = 1.0, np.inf
         self.place["seen_depth"] = np.nan
-        self.snaps = np.zeros(SNAPS_KEPT, records.SNAP)
+        self.snaps, self.held_load = np.zeros(SNAPS_KEPT, records.SNAP), np.zeros(3)
         self.report = np.zeros(3, records.REPORT)
         self._grow(16)
 
@@ -158,8 +158,8 @@ class Workspace:
     def _empty_chain(self, k: int, points: int) -> data.Chain:
         length, bend, twist, rest = np.zeros((4, k))
         load, first = np.zeros((k + 1, 3)), np.zeros(k + 2, dtype=np.int64)
-        offset, weight, held = np.zeros((points, 3)), np.zeros(points), np.zeros(1)
-        return data.Chain(length, bend, twist, rest, load, first, offset, weight, held, self.rule.reach)
+        offset, weight, (held, early) = np.zeros((points, 3)), np.zeros(points), np.zeros((2, 1))
+        return data.Chain(length, bend, twist, rest, load, first, offset, weight, held, early, self.rule.reach)
 
     def clamp(
         self,
@@ -203,6 +203,7 @@ class Workspace:
             refuse("relax", "load_N", load.shape, allowed, "see GuideWire.segments_at")
         loads[:] = 0.0
         loads[k if load.ndim == 1 else slice(0, k + 1)] = load
+        self.held_load = loads[0].copy()
 
     def _bind(self) -> None:
         """Take a handle of the arrays, wherever in memory they are now."""
@@ -272,9 +273,10 @@ class Workspace:
             sliding, turning = shaft_forces(self.shaft)
             push, torque = solution.push_force_N + sliding, solution.reaction_torque_N_mm + turning
             vars(solution).update(push_force_N=push, reaction_torque_N_mm=torque)
-        if self.k and self.wire.weight_N_per_mm > 0.0 and self.introducer is not None:
-            # half of the first segment's weight hangs at the entry, where no joint can move
-            force = solution.reaction_force_N - 0.5 * self.problem.chain.length[0] * self.introducer.weight
+        if self.k and self.introducer is not None and (self.wire.weight_N_per_mm > 0.0 or self.held_load.any()):
+            # half of the first segment's weight hangs at the entry, where no joint can move, and what loads that joint
+            held = 0.5 * self.problem.chain.length[0] * self.introducer.weight + self.held_load
+            force = solution.reaction_force_N - held
             force.setflags(write=False)
             vars(solution).update(reaction_force_N=force)
         return solution

@@ -20,7 +20,7 @@ from pipeline.cli import main
 from pipeline.load.views import read_views
 from pipeline.study.manifest import ManifestTables
 from tests.studies import reference_pages
-from tests.unfitted import unfitted_figures as unfitted_figures
+from tests.unseen import unseen_figures as unseen_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

@@ -36,8 +36,8 @@ from solver._kernels.algebra import (
 from solver._kernels.data import Chain, Problem
 from solver._kernels.flags import inlined, kernel
 from solver._kernels.friction import friction_derivatives, lever_of
+from solver._kernels.joint import curvature_of
 from solver._kernels.lanes.vectors import anywhere, select, select3
-from solver._kernels.rotation import jacobian_curvature
 
 
 @inlined
@@ -161,11 +161,11 @@ Gains = tuple[Three, Nine, Nine]
 
 @inlined
 def joint_hessian(
-    chain: Chain, j: int, turn: Three, jac: Nine, hg: tuple[Six, Three], twisting: bool, damping: float
+    chain: Chain, j: int, u: Three, jac: Nine, hg: tuple[Six, Three], twisting: bool, damping: float
 ) -> Six:
-    """Q_uu of a joint turned by ``turn``, from V_rr and V_r beyond it; damping adds that share of its own stiffness."""
+    """Q_uu of a joint, from V_rr and V_r beyond it; damping adds that share of the joint's own stiffness."""
     h, g = hg
-    q = add6(conjugate(transpose(jac), h), jacobian_curvature(g, turn))
+    q = add6(conjugate(transpose(jac), h), curvature_of(chain, j, u, g))
     bend = chain.bend[j] * (1.0 + damping)
     twist = chain.twist[j] * (1.0 + damping) if twisting else 0.0
     return q[0] + bend, q[1] + bend, q[2] + twist, q[3], q[4], q[5]

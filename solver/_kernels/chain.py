@@ -95,7 +95,10 @@ def lay_out(chain: Chain, table: WireTable, k: int, first_mm: float) -> None:
         else:
             compliance, chain.rest[j] = cells[k - j, 0], cells[k - j, 1]
         chain.bend[j] = 1.0 / compliance
-        chain.twist[j] = profile.twist / (outer - inner + (table.shaft if j == 0 else 0.0))
+        shaft = table.shaft if j == 0 else 0.0
+        chain.twist[j] = profile.twist / (outer - inner + shaft)
+        if j == 0:
+            chain.early[0] = shaft / (outer - inner + shaft)
     place_points(chain, table.rule, k)
 
 

@@ -98,7 +98,8 @@ class Chain(NamedTuple):
     length, bend, twist, rest : (k,) segment mm, joint stiffness N mm/rad, rest bend rad.
     load : (k + 1, 3) dead force on each node, N.     first : (k + 2,) first look-up point of each node.
     offset : (p, 3) mm in the frame of the segment that ends at the node.     weight : (p,) mm of wire.
-    held : (1,) mm of wire that the node at the entry stands for.     reach : see ``Rule``.
+    held : (1,) mm of wire that the node at the entry stands for.     early : (1,) share of the first joint's twist that
+    lies before it, in the shaft.     reach : see ``Rule``.
     """
 
     length: Any
@@ -110,6 +111,7 @@ class Chain(NamedTuple):
     offset: Any
     weight: Any
     held: Any
+    early: Any
     reach: float
 
 

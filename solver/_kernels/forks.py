@@ -16,7 +16,7 @@ from solver._kernels.forces import copy_state
 from solver._kernels.friction import take_loads
 from solver._kernels.minimise import relax_with_friction
 from solver._kernels.newton import sweep
-from solver._kernels.rollout import copy_base, limited, place, rollout
+from solver._kernels.rollout import copy_base, place, rollout, stepped
 from solver._kernels.saddle import hold_all_but, turn_joint
 from solver._kernels.septum import through_wall
 
@@ -87,7 +87,7 @@ def mirrored(problem: Problem, k: int, report: Any) -> bool:
     for i in range(k):
         now = load3(u, i)
         change = scaled(back, minus(load3(aside, i), now)) if bent else scaled(2.0, minus(load3(start, i), now))
-        store3(u, i, limited(now, change))
+        store3(u, i, stepped(problem.chain, i, now, change))
     place(problem.chain, state, CURRENT, k)
     return True
 

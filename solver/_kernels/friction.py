@@ -168,10 +168,14 @@ def anchor_friction(problem: Problem, was: int, k: int, ahead: float, shaft_mm: 
 
 
 @kernel
-def friction_loss(problem: Problem, k: int) -> float:
-    """Work that was lost by slipping in the step that is ending, N mm."""
+def friction_loss(problem: Problem, k: int, ahead: float) -> float:
+    """Work that was lost by slipping in the step that is ending, by ``ahead`` mm, N mm."""
     friction, chain = problem.friction, problem.chain
     end, work = chain.first[k + 1] - 1, 0.0
+    # points that slid back into the introducer: of the step's two ends they are loaded at the first alone, and where
+    # they went on straight behind the entry, as those that come in came
+    for back in range(end + 1, friction.pressed.size):
+        work += 0.5 * friction.coefficient * friction.pressed[back] * max(-ahead - tol.SLIP_MM, 0.0)
     for n in range(1, k + 1):
         for p in range(chain.first[n], chain.first[n + 1]):
             load, before = friction.load[p], friction.pressed[end - p]

@@ -177,7 +177,7 @@ def settle(
         at.inserted, at.roll, at.energy = depth, roll, energy
         at.catheter, at.stored = at.next, stored
         if problem.friction.coefficient > 0.0:
-            at.rubbed += friction_loss(problem, k)
+            at.rubbed += friction_loss(problem, k, at.last_step)
             settle_friction(problem, k)
         if problem.shaft.drag > 0.0:
             # what turned the wire at the entry took is in the work of the hand's torque already

@@ -1,7 +1,7 @@
 """Newton's step for the whole chain in O(k): a backward Riccati recursion and a forward rollout.
 
 The chain is a discrete optimal-control problem: state (x_j, R_j), control u_j, dynamics
-    R_{j+1} = R_j exp(ω̂_j),  ω_j = u_j + w_j e2,    x_{j+1} = x_j + l_j R_{j+1} e3.
+    R_{j+1} = R_j exp(ω̂_j),  ω_j = u_j + w_j e2 (``joint``),    x_{j+1} = x_j + l_j R_{j+1} e3.
 The value function is expanded to second order in (δp, δr), both in the frame of the node, R -> R exp(δr̂): V_pp (p),
 V_pr (c), V_rr (h), V_p (f) and V_r (g). Crossing a segment in its own frame, δp' = δp + A δr with
 A = l [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], so that
@@ -50,8 +50,8 @@ from solver._kernels.blocks import (
 )
 from solver._kernels.data import Problem
 from solver._kernels.flags import inlined, kernel
+from solver._kernels.joint import jacobian_of, turn_of
 from solver._kernels.newton_straight import sweep_straight
-from solver._kernels.rotation import bent, jacobian, with_rest
 
 Value = tuple[Six, Nine, Six, Three, Three]
 """The value function at a node: p, c, h, f, g."""
@@ -117,7 +117,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         problem.scratch.counters[0].sweeps_without_roll += 1
         return sweep_straight(problem, slot, first_free, k, damping, report)
     chain, state, gain = problem.chain, problem.state, problem.scratch.gain
-    bend, length, rest, twisting = chain.bend, chain.length, chain.rest, problem.twisting
+    bend, length, twisting = chain.bend, chain.length, problem.twisting
     value = (ZERO6, ZERO9, ZERO6, ZERO3, ZERO3)
     decrement, lowest = 0.0, math.inf
     for n in range(k, first_free, -1):
@@ -129,11 +129,10 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         value = cross_segment(length[j], add_node(value, (df, dg), (dp, dc, dh), held))
         _, c, h, _, g = value
         u = load3(state.u[slot], j)
-        turn = with_rest(rest[j], u)
-        jac = jacobian(turn)
+        jac = jacobian_of(chain, j, u)
         if not twisting:
             jac = (jac[0], jac[1], 0.0, jac[3], jac[4], 0.0, jac[6], jac[7], 0.0)
-        q_uu = joint_hessian(chain, j, turn, jac, (h, g), twisting, 0.01 * damping)
+        q_uu = joint_hessian(chain, j, u, jac, (h, g), twisting, 0.01 * damping)
         floor, least = tol.CURVATURE_FLOOR * bend[j], least_curvature(q_uu, twisting)
         lowest = min(lowest, least / bend[j])
         if not least > -floor:
@@ -150,7 +149,7 @@ def sweep(problem: Problem, slot: int, first_free: int, k: int, damping: float, 
         feed, gain_p, gain_r = apply(inverse, q_u), times(inverse, q_up), times(inverse, q_ur)
         store_gains(gain, j, (feed, gain_p, gain_r))
         decrement -= 0.5 * (q_u[0] * feed[0] + q_u[1] * feed[1] + q_u[2] * feed[2])
-        value = cross_joint(bent(turn), value, q_up, q_ur, (feed, gain_p, gain_r))
+        value = cross_joint(turn_of(chain, j, u), value, q_up, q_ur, (feed, gain_p, gain_r))
     report.decrement = decrement
     note_pivot(lowest, first_free, damping, report)
     return math.isfinite(decrement)
@@ -172,12 +171,11 @@ def costate(problem: Problem, slot: int, k: int, report: Any) -> None:
         length = chain.length[j]
         g = (g[0] - length * f[1], g[1] + length * f[0], g[2])
         u = load3(controls, j)
-        turn = with_rest(chain.rest[j], u)
-        moment = apply_transposed(jacobian(turn), g)
+        moment = apply_transposed(jacobian_of(chain, j, u), g)
         largest = max(largest, abs(moment[0] + chain.bend[j] * u[0]), abs(moment[1] + chain.bend[j] * u[1]))
         if problem.twisting:
             largest = max(largest, abs(moment[2] + chain.twist[j] * u[2]))
-        e = bent(turn)
+        e = turn_of(chain, j, u)
         f, g = apply(e, f), apply(e, g)
     report.moment = largest
     report.force[0], report.force[1], report.force[2] = apply(load9(frames, 0), f)

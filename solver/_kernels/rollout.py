@@ -20,8 +20,8 @@ from solver._kernels.algebra import (
 )
 from solver._kernels.data import Chain, Problem, State
 from solver._kernels.flags import inlined, kernel
+from solver._kernels.joint import turn_of
 from solver._kernels.lanes.vectors import anywhere, select
-from solver._kernels.rotation import bent, with_rest
 
 
 @kernel
@@ -30,7 +30,7 @@ def place(chain: Chain, state: State, slot: int, k: int) -> None:
     u, x, r = state.u[slot], state.x[slot], state.r[slot]
     frame = load9(r, 0)
     for j in range(k):
-        frame = times(frame, bent(with_rest(chain.rest[j], load3(u, j))))
+        frame = times(frame, turn_of(chain, j, load3(u, j)))
         store9(r, j + 1, frame)
         for a in range(3):
             x[j + 1, a] = x[j, a] + chain.length[j] * r[j + 1, a, 2]
@@ -63,9 +63,9 @@ def rollout(problem: Problem, slot: int, first_free: int, k: int, fraction: floa
         ahead = load9(old_r, j + 1)
         moved = apply_transposed(ahead, minus(at, load3(old_x, j)))
         turned = apply_transposed(ahead, relative(load9(old_r, j), frame))
-        v = limited(load3(old_u, j), answer(gain, j, fraction, moved, turned))
+        v = stepped(chain, j, load3(old_u, j), answer(gain, j, fraction, moved, turned))
         store3(u, j, v)
-        frame = times(frame, bent(with_rest(chain.rest[j], v)))
+        frame = times(frame, turn_of(chain, j, v))
         store9(r, j + 1, frame)
         length = chain.length[j]
         at = (at[0] + length * frame[2], at[1] + length * frame[5], at[2] + length * frame[8])
@@ -95,6 +95,16 @@ def relative(old: Nine, new: Nine) -> Three:
     b = cross((old[1], old[4], old[7]), (new[1], new[4], new[7]))
     c = cross((old[2], old[5], old[8]), (new[2], new[5], new[8]))
     return scaled(0.5, add3(add3(a, b), c))
+
+
+@inlined
+def stepped(chain: Chain, j: int, u: Three, s: Three) -> Three:
+    """``limited`` of joint j; the twist of a shaft has no limit."""
+    if j > 0 or chain.early[0] == 0.0:
+        return limited(u, s)
+    s = shortened(s, tol.STEP_ANGLE)
+    v = shortened((u[0] + s[0], u[1] + s[1], 0.0), tol.CONTROL_ANGLE)
+    return v[0], v[1], u[2] + s[2]
 
 
 @inlined

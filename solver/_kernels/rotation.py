@@ -92,11 +92,7 @@ def jacobian_curvature(g: Three, u: Three) -> Six:
 
 @inlined
 def with_rest(rest: float, u: Three) -> Three:
-    """Return the rotation vector ω = u + w e2 of a joint: its control u and its rest bend w about material axis 2.
-
-    Bend and rest bend are one rotation. One after the other, B exp(û), hands half of every rest bend on as twist to a
-    wire that may not twist: 9 % too soft across the plane of a tip of 0.15 per mm in segments of 1 mm.
-    """
+    """Return the rotation vector ω = u + w e2 of a joint: its control u and its rest bend w about material axis 2."""
     return u[0], u[1] + rest, u[2]
 
 

@@ -103,7 +103,7 @@ def balance(handle: Any, k: int, reached: tuple[float, float, float]) -> Books:
         push -= pull
     lost = 0.5 * ((push + at.push) * ahead + (torque + at.torque) * turn + (pull + at.pull) * onwards)
     lost -= reached[2] - at.energy
-    rubbed = friction_loss(problem, k) if problem.friction.coefficient > 0.0 else 0.0
+    rubbed = friction_loss(problem, k, ahead) if problem.friction.coefficient > 0.0 else 0.0
     if problem.shaft.drag > 0.0:
         rubbed += loss_by_turning(problem, k)
     work = max(abs(push), abs(at.push)) * abs(ahead) + max(abs(torque), abs(at.torque)) * abs(turn)

@@ -15,6 +15,7 @@ from solver._kernels.data import CURRENT, LAST_GOOD, TRIAL, Chain, Introducer, P
 from solver._kernels.energy import total_energy
 from solver._kernels.flags import cached, entry_point, inlined, kernel, merged
 from solver._kernels.friction import anchor_friction
+from solver._kernels.joint import spin
 from solver._kernels.rollout import copy_base, place
 from solver._kernels.rotation import bend_to, bent, bent_to, with_twist
 from solver._kernels.sleeve import put_over
@@ -84,12 +85,15 @@ def aim(chain: Chain, u: Any, x: Any, r: Any, j: int) -> None:
     frame, length = load9(r, j), chain.length[j]
     # a joint on top of the one before has no direction: it keeps the one before
     way = scaled(1.0 / size, d) if size > 0.0 else (frame[2], frame[5], frame[8])
+    twist, early = u[j, 2], chain.early[0] if j == 0 else 0.0
+    if early > 0.0:
+        frame = times(frame, spin(early * twist))
     p = apply_transposed(frame, way)
     # of length 1 to the last digit: what a frame's columns lack would double from joint to joint
     p = scaled(1.5 - 0.5 * dot(p, p), p)
     turn0, turn1 = bend_to(p)
-    turn = with_twist(turn0, turn1, u[j, 2])
-    store3(u, j, (turn[0], turn[1] - chain.rest[j], turn[2]))
+    turn = with_twist(turn0, turn1, (1.0 - early) * twist)
+    store3(u, j, (turn[0], turn[1] - chain.rest[j], twist if early > 0.0 else turn[2]))
     if turn[2] == 0.0 and p[2] > 0.0:
         # the turn and the joint straight from the direction: the next joint need not wait for the control
         frame = times(frame, bent_to(p))

@@ -6,7 +6,7 @@ import pytest
 
 from tests.numbers.kept import different
 from tests.numbers.parts import PARTS
-from tests.unfitted import unfitted_figures as unfitted_figures  # looked at before they are drawn
+from tests.unseen import unseen_figures as unseen_figures  # looked at before they are drawn
 
 SCENES, RELATIVE = PARTS["runs"]
 

@@ -1,3 +1,3 @@
 """No test of this folder looks at a figure."""
 
-from tests.unfitted import unfitted_figures as unfitted_figures
+from tests.unseen import unseen_figures as unseen_figures

@@ -128,3 +128,10 @@ def test_frames_follow_a_roll_that_moves_nothing() -> None:
         np.testing.assert_allclose(
             solution.frames, np.broadcast_to(axes.T, solution.frames.shape), rtol=0.0, atol=1e-12
         )
+
+
+def test_a_load_on_the_joint_at_the_entry_is_held_there() -> None:
+    """It was in the energy, and not in the reaction."""
+    load = np.zeros((6, 3))
+    load[0] = [0.5, 0.2, 0.1]
+    assert relax(GuideWire(1.0, 0.2, 5.0), None, depth_mm=5.0, load_N=load).reaction_force_N == pytest.approx(-load[0])

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp
+from scipy.spatial.transform import Rotation
 
-from solver import GuideWire, Insertion, Insertions, Solution, VesselWall
+from solver import Grid, GuideWire, Insertion, Insertions, Solution, VesselWall
 from tests.solver.scenes import last, tube_grid
 
 RADIUS, DRAG, SHAFT, TORSION = 0.18, 0.02, 1000.0, 5.0
@@ -136,3 +138,68 @@ def test_a_shaft_alone_dissipates_all_that_the_hand_does() -> None:
 def test_a_shaft_that_cannot_be_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"insertion: {name}: got"):
         Insertion(GuideWire(1.0, RADIUS, 10.0), None, [0, 0, 0], [0, 0, 1], **{name: value})
+
+
+def rod_behind_a_shaft(depth: float, rest: float, load: tuple[float, float, float], shaft: float) -> Any:
+    """Joints at arcs s, and the torque in the shaft, of a continuous rod (EI = GJ = 1) whose clamp turns with it."""
+    frame = slice(0, 9)
+
+    def slopes(_: Any, y: Any, share: float) -> Any:
+        r, m = y[frame].reshape(3, 3, -1), y[12:15]
+        bend = np.stack([m[0], m[1] + rest, m[2]])
+        zero = np.zeros_like(m[0])
+        turn = np.array([[zero, -bend[2], bend[1]], [bend[2], zero, -bend[0]], [-bend[1], bend[0], zero]])
+        force = share * np.einsum("jin,j->in", r, np.array(load))
+        rise = -np.cross(bend, m, axis=0) - np.stack([-force[1], force[0], zero])
+        return np.concatenate([np.einsum("ijn,jkn->ikn", r, turn).reshape(9, -1), r[:, 2], rise])
+
+    def ends(a: Any, b: Any, share: float) -> Any:
+        base = Rotation.from_rotvec([0, 0, a[14] * shaft * share]).as_matrix()
+        return np.concatenate([a[frame] - base.ravel(), a[9:12], b[12:15]])
+
+    s = np.linspace(0.0, depth, 201)
+    y = np.zeros((15, s.size))
+    y[frame] = Rotation.from_rotvec(np.outer(rest * s, [0, 1, 0])).as_matrix().reshape(-1, 9).T
+    y[9:12] = np.cumsum(y[[2, 5, 8]], axis=1) * depth / 200
+    for share in np.linspace(0.1, 1.0, 10):
+        found = solve_bvp(
+            lambda x, y, c=share: slopes(x, y, c), lambda a, b, c=share: ends(a, b, c), s, y, tol=1e-7, max_nodes=5000
+        )
+        assert found.status == 0
+        s, y = found.x, found.y
+    return lambda at: found.sol(at)[9:12].T, float(found.sol(0.0)[14])
+
+
+@pytest.mark.parametrize(("rest", "shaft"), [(0.15, 0.0), (0.15, 30.0), (0.3, 50.0)])
+def test_a_shaft_twists_before_the_wire_bends(rest: float, shaft: float) -> None:
+    """In one rotation vector with the bend a lag of 62 degrees made it of first order, 0.18 mm at 1 mm."""
+    load = (-0.01, 0.02, 0.0)
+    joints, torque = rod_behind_a_shaft(10.0, rest, load, shaft)
+    off = []
+    for segment in (0.5, 0.25):
+        wire = GuideWire(segment, 0.18, 1.0, rest, 1.0)
+        insertion = Insertion(
+            wire, None, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0], tip_load_N=load, shaft_mm=shaft, tolerance=1e-12
+        )
+        (found,) = insertion.to_depths([10.0])
+        assert found.converged
+        assert abs(found.reaction_torque_N_mm) == pytest.approx(abs(torque), rel=2e-3)
+        off.append(np.abs(found.joints_mm - joints(wire.arcs_at(10.0))).max())
+    assert off[0] < 0.01
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_long_shaft_lags_by_more_than_half_a_turn() -> None:
+    """A meter of wire pressed into a flat wall sticks until the torque is mu N r, after 285 degrees; it stalled."""
+    x, _, _ = np.meshgrid(np.arange(-2, 2.1, 0.5), np.arange(-2, 2.1, 0.5), np.arange(-3, 26, 0.5), indexing="ij")
+    wall = VesselWall(Grid(x - 0.08, [0.5] * 3, [-2, -2, -3]), 1.0, friction=0.3)
+    wire = GuideWire(1.0, 0.18, 1e5, 0.0, 20.0)
+    insertion = Insertion(wire, wall, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0], shaft_mm=1000.0)
+    hands = [0.0, 90.0, 240.0, 330.0, 360.0]
+    _, *found = insertion.to_depths([20.0] * 5, hands)
+    assert all(s.converged for s in found)
+    for solution in found[:2]:
+        stuck = 20.0 / 1010.0 * np.radians(solution.roll_deg)
+        assert solution.reaction_torque_N_mm == pytest.approx(stuck, rel=0.03)
+    slips = 0.3 / np.hypot(1.0, 0.3) * 0.18 * np.linalg.norm(found[-1].contact_force_N.sum(axis=0))
+    assert [s.reaction_torque_N_mm for s in found[2:]] == pytest.approx([slips] * 2, rel=0.1)
