@@ -8,6 +8,7 @@ from pipeline.commands import complain, say
 
 HELP = "lumens, traces and the like that are kept, so that no run computes them again"
 UNITS = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
+"""A size has one: `--limit 5`, meant as 5 GB, would remove all but 5 bytes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,18 +36,19 @@ def main(args: argparse.Namespace) -> int:
     if args.limit is not None:
         limit = _bytes(args.limit)
         if limit is None:
-            return complain([f"--limit {args.limit!r}: expected a size as in 20G or 500M"], "the command line")
+            expected = "expected a size with its unit, as in 20G or 500M; nothing was removed"
+            return complain([f"--limit {args.limit!r}: {expected}"], "the command line")
         store.set_limit(limit)
     if args.prune or args.limit is not None:
         count, size = store.trim(0 if args.prune else None)
         say(f"removed {count} kept results, {size / 2**20:.1f} MiB, from {store.root}")
     entries = store.entries()
     taken = sum(size for _, size, _ in entries) / 2**20
-    say(f"{store.root}: {len(entries)} kept results, {taken:.1f} MiB of at most {store.limit / 2**30:g} GiB")
+    say(f"{store.root}: {len(entries)} kept results, {taken:.1f} MiB of at most {store.limit / 2**20:.1f} MiB")
     return 0
 
 
 def _bytes(text: str) -> int | None:
-    """A size in bytes; None for what is no size."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)(?:i?B)?", text.strip(), re.IGNORECASE)
-    return int(float(found[1]) * UNITS.get(found[2].upper(), 1)) if found else None
+    """A size in bytes; None for what is no size, or has no unit."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT])(?:i?B)?", text.strip(), re.IGNORECASE)
+    return int(float(found[1]) * UNITS[found[2].upper()]) if found else None

@@ -138,7 +138,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
-    write_sweep(out, found_heads(out))  # points of other shards so far included
+    if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
+        sys.stderr.write(f"{removed}\n")
     (out / "summary.pdf").unlink(missing_ok=True)  # of an earlier result
     info |= {"provenance": code_state(), "assumptions": plan.assumptions}
     Store(plan.template.cache).trim()

@@ -94,21 +94,24 @@ def lost_points(out: Path, heads: Sequence[Head]) -> list[tuple[Path, Result]]:
     return [(_folder(h), case.result) for h in heads for case in _at(out, h) if case.result.status in LOST]
 
 
-def write_sweep(out: Path, heads: Sequence[Head]) -> None:
+def write_sweep(out: Path, heads: Sequence[Head]) -> str:
     """Write sweep.csv: the plain result first, then every point, each of them case by case and over all of them.
 
     It is removed where cases were run with different settings, or where the runs name no points: an older table belongs
-    to an older result.
+    to an older result. Returns a sentence where one was removed.
     """
     if not heads or mixed_settings(out):
+        there = (out / SWEEP.file).exists()
         (out / SWEEP.file).unlink(missing_ok=True)
-        return
+        again = "its points are kept, and the command with --sweep writes it again"
+        return f"{out / SWEEP.file}: removed, it belongs to an earlier run: {again}" * there
     before = with_another(out, found_cases(out))
     null = str(overall(before).get("strongest_null") or "")
     rows = list(_rows({"parameter": PLAIN, "value": ""}, before, before, null))
     for head in heads:
         rows += _rows(head, before, _at(out, head), null)
     tables.write(out / SWEEP.file, SWEEP, rows)
+    return ""
 
 
 def unchanged(plain: Resolved, cases: Sequence[Case], parameter: str) -> str:

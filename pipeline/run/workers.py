@@ -44,9 +44,13 @@ class Limits(NamedTuple):
     def broken(self, seconds: float, peak_mib: float) -> str:
         """A sentence on the limit that is exceeded; empty where none is."""
         if seconds > self.seconds:
-            return f"took longer than the {self.seconds:g} s of --case-timeout (peak memory {peak_mib:.0f} MiB)"
+            return (
+                f"took longer than the {self.seconds:g} s of --case-timeout (peak memory {peak_mib:.0f} MiB); raise it"
+            )
         if peak_mib > self.memory_mib:
-            return f"took {peak_mib:.0f} MiB of memory, more than the {self.memory_mib:g} MiB of --case-memory"
+            return (
+                f"took {peak_mib:.0f} MiB of memory, more than the {self.memory_mib:g} MiB of --case-memory; raise it"
+            )
         return ""
 
 

@@ -1,5 +1,6 @@
 """What a run left in its folder, as pandas frames."""
 
+import warnings
 from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -97,6 +98,9 @@ def _results(out: Path, cases: dict[str, CaseFiles]) -> Results:
     def table(kind: Table, name: str = "") -> pd.DataFrame:
         return tables.read_if_there(out / (name or kind.file), kind)
 
+    if cases and not (out / SUMMARY.file).exists():
+        again = f"run its command again, or `wireval report {out}`"
+        warnings.warn(f"{out}: the run into it has not ended, tables over all cases are empty; {again}", stacklevel=3)
     whole = table(SUMMARY, OVERALL_FILE)
     errors = _of_all({name: case.errors for name, case in cases.items()}, ERRORS)
     return Results(out, table(SUMMARY), whole, errors, table(FAILURES), table(SWEEP), Cases(cases))

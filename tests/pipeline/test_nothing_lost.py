@@ -264,7 +264,9 @@ def test_the_cache_has_a_limit_and_a_check(
         os.utime(mine.entries()[-1][0], (1e9 - age, 1e9 - age))  # d is the oldest
     assert mine.get("trace", "d" * 64) is not None  # and now the youngest
     one = mine.entries()[0][1]
-    assert main(["cache", "--limit", str(2 * one)]) == 0
+    assert main(["cache", "--limit", "5"]) == 2, "meant as 5 GB, it removed all"
+    assert len(mine.entries()) == 4
+    assert main(["cache", "--limit", f"{2 * one / 1024}K"]) == 0
     assert [path.stem[0] for path, _, _ in mine.entries()] == ["a", "d"]
     assert mine.limit == 2 * one
     assert main(["cache", "--check"]) == 0

@@ -214,7 +214,9 @@ def test_a_sweep_of_other_settings_is_not_shown_beside_a_new_result(
     assert run(study, out, "--sweep", "simulate.wall_scale=2", *UNTIL) == 0
     (out / "summary.pdf").touch()
     assert run(study, out, "--set", "simulate.friction=0.1", "--resume", *UNTIL) == 0
-    last = capsys.readouterr().out.splitlines()[-1]
+    said = capsys.readouterr()
+    last = said.out.splitlines()[-1]
+    assert f"{out / 'sweep.csv'}: removed, it belongs to an earlier run" in said.err
     assert "sweep:" not in last
     assert re.search(r"skill 0\.\d+ over 3 of 4 frames against the predictor '[a-z ]+'\.", last)
     assert not (out / "sweep.csv").exists()
