@@ -13,6 +13,8 @@ from reports.case_files import WORST, counted, listed, read_json, results_in, sa
 from reports.schema import SUMMARY
 
 _MANY = 5
+_NOT_AGAIN = "--only", "--case-timeout", "--case-memory"
+"""Options that the next command leaves out: other cases are meant, and a limit that stopped one stops it again."""
 
 
 def verdict(statistics: Mapping[str, Any], simulator: str = "") -> str:
@@ -247,8 +249,10 @@ def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
     head = list(typed) if list(typed[:2]) == ["wireval", "run"] else ["wireval", "run", "MANIFEST", "-o", "OUT"]
     kept, words = [], iter(head)
     for word in words:
-        if word == "--only":
-            next(words, None)
-        elif word not in ("--fresh", "--resume") and not word.startswith("--only="):
+        name, equals, _ = word.partition("=")
+        if name in _NOT_AGAIN:
+            if not equals:
+                next(words, None)
+        elif word not in ("--fresh", "--resume"):
             kept.append(word)
     return shlex.join([*kept, *only, "--resume"])

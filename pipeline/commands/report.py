@@ -128,7 +128,7 @@ def _drawn(out: Path, embed: bool, result: "Result") -> str:
     except WriteError:
         raise
     except (OSError, EOFError, ValueError, KeyError) as error:
-        return f"its page cannot be drawn: {error}; run the case again with --fresh"
+        return f"its page cannot be drawn: {error}; run the case again"
     return str(result.failures[0]["message"]) if result.status == "damaged" else ""
 
 

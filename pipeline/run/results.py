@@ -31,7 +31,7 @@ LOST = {
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
     "removed": "the case's result was removed while the run went on; give the same command again",
-    "damaged": "a result file cannot be read; run the case again with --fresh",
+    "damaged": "a result file cannot be read; run the case again",
 }
 """Statuses of a case that has no result of its own, each with its sentence."""
 

@@ -164,7 +164,21 @@ def test_worst_frames_leave_out_what_failed() -> None:
 
 
 def test_the_next_command_names_the_cases_and_forgets_what_would_widen_or_redo() -> None:
-    typed = ["wireval", "run", "m.toml", "-o", "out", "--only", "x", "--fresh", "-j", "2"]
+    typed = [
+        "wireval",
+        "run",
+        "m.toml",
+        "-o",
+        "out",
+        "--only",
+        "x",
+        "--case-timeout",
+        "3",
+        "--case-memory=9",
+        "--fresh",
+        "-j",
+        "2",
+    ]
     assert next_command(["a b", "c", "c"], typed) == "wireval run m.toml -o out -j 2 --only 'a b' --only c --resume"
     assert next_command(["c"], ["python", "my_script.py"]) == "wireval run MANIFEST -o OUT --only c --resume"
     assert next_command("abcde").count("--only") == 5
