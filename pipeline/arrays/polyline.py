@@ -8,6 +8,9 @@ from scipy.interpolate import make_splprep
 
 from pipeline.model import Array, arc_length
 
+SAME_MM = 1e-6
+"""Arc lengths closer than this are one."""
+
 
 def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:
     """Points (n, 3) of a polyline (m, 3) at arc lengths (n,) in mm from its start; beyond its end, straight on."""
@@ -23,7 +26,7 @@ def samples(length_mm: float, step_mm: float) -> Array:
     """Arc lengths 0, step, 2 step, ... and the end itself, mm."""
     count = max(int(np.floor(length_mm / step_mm + 1e-9)), 0)
     arc = np.asarray(np.arange(count + 1) * step_mm, dtype=np.float64)
-    return arc if length_mm - arc[-1] < 1e-6 else np.concatenate([arc, [length_mm]])
+    return arc if length_mm - arc[-1] < SAME_MM else np.concatenate([arc, [length_mm]])
 
 
 def resample(curve_mm: ArrayLike, step_mm: float) -> Array:
@@ -41,7 +44,8 @@ def tip_tangent(curve_mm: ArrayLike, over_mm: float = 1.0) -> Array:
     """Unit vector (3,) along which the curve ends, taken over its last ``over_mm``; zero for a single point."""
     curve = np.asarray(curve_mm, dtype=np.float64)
     arc = arc_length(curve)
-    start = int(np.searchsorted(arc, arc[-1] - over_mm, side="right")) - 1
+    # of points at equal steps one may lie just there: rounding chose between it and the one before, 0.8 degrees apart
+    start = int(np.searchsorted(arc, arc[-1] - over_mm + SAME_MM, side="right")) - 1
     chord = curve[-1] - curve[max(start, 0)]
     norm = np.linalg.norm(chord)
     return np.asarray(chord / norm) if norm > 0 else np.zeros(3)

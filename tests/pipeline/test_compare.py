@@ -81,6 +81,13 @@ def test_a_curve_is_cut_or_continued_straight() -> None:
     assert arc_length(resample(curve, 0.1))[-1] == pytest.approx(7.0)
 
 
+@pytest.mark.parametrize("rounding", [-1e-12, 1e-12])
+def test_rounding_does_not_turn_the_end_of_a_curve(rounding: float) -> None:
+    """One of its points lay 1 mm before the end but for the last digit: the tip's angle was 4.7 or 5.5 degrees."""
+    curve = np.array([[0.0, 0, 0], [0.5, 0.2, 0], [1.0 + rounding, 0, 0], [1.5, 0, 0], [2.0, 0, 0]])
+    np.testing.assert_allclose(tip_tangent(curve), [1, 0, 0], rtol=0.0, atol=1e-9)
+
+
 def open_space() -> Lumen:
     grid = Grid(np.full((40, 40, 40), -5.0, np.float32), np.ones(3), np.full(3, -10.0))
     return Lumen(grid)
