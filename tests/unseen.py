@@ -1,6 +1,7 @@
 """Runs whose figures nobody looks at: they are made, with all that they show, but no pixel of them is drawn.
 
-Half of the time of a run of a small study is matplotlib's drawing. Figures are drawn, and looked at, in tests/reports.
+A third of the time of a scored study is matplotlib's drawing (cProfile of tests/pipeline/test_score.py). Figures are
+drawn, and looked at, in tests/reports.
 """
 
 from __future__ import annotations
