@@ -184,9 +184,9 @@ def _main(argv: Sequence[str] | None) -> int:
         with _ended_by_signal():
             return carried_out(args)
     except (InputError, StageError) as error:
-        problems, place = (error.problems, error.place) if isinstance(error, InputError) else ([str(error)], "")
-        then = {"then": ""} if getattr(args, "command", "") == "check" else {}  # check never runs anything
-        return complain(problems, place or str(getattr(args, "manifest", COMMAND_LINE)), **then)
+        told = error if isinstance(error, InputError) else InputError([str(error)])
+        then = "" if getattr(args, "command", "") == "check" else f"; {told.then}"  # check never runs anything
+        return complain(told.problems, told.place or str(getattr(args, "manifest", COMMAND_LINE)), then)
     except KeyboardInterrupt as why:
         number = signal.SIGTERM if isinstance(why, Terminated) else signal.SIGINT
         print("\ninterrupted" + _kept(args), file=sys.stderr)

@@ -70,9 +70,11 @@ class InputError(Exception):
     """What a user wrote cannot be used; ``problems`` lists everything that is wrong with it.
 
     place : where it was written, as the line that counts the problems calls it; empty for the manifest.
+    then : what became of the command, in that line.
     """
 
     place = ""
+    then = "nothing was run"
 
     def __init__(self, problems: Sequence[str]) -> None:
         super().__init__("\n".join(problems))

@@ -43,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
     add("--executor", default="", metavar="ADDRESS", help="tcp://host:port of a dask scheduler")
+    add("--skip-bad", action="store_true", help="leave out and name cases that check finds fault with; exit 1")
     add("--resume", action="store_true", help="go on in an OUT made from another manifest or with other settings")
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
@@ -69,11 +70,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     from pipeline.run.last_words import last_line
     from pipeline.run.launch import intention, launch
     from pipeline.run.results import found_results
-    from pipeline.status import InputError
-    from pipeline.study.check import check
-    from pipeline.study.coarse import too_coarse
     from pipeline.study.plausible import doubts
-    from reports.inside import misleading_links
 
     plan = _plan(args)
     if not plan.cases:
@@ -81,10 +78,7 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
             write_tests(args.junit, (), {})  # a build server expects the file
         say(_nothing(args.shard, plan))
         return 0
-    problems = misleading_links(plan.out) + check(plan.cases, plan.template.settings.config, whole=False)
-    problems += [p for point in plan.points for p in too_coarse(plan.cases, point.cheap.config)]
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+    plan = _sound(plan, args.skip_bad)
     if args.dry_run:
         doubtful = doubts(plan.cases, plan.template.settings.config)
         for line in [*(f"warning: {text}" for text in doubtful), *intention(plan)]:
@@ -99,6 +93,31 @@ def _run(args: argparse.Namespace, gates: "Sequence[Gate]") -> int:
     _tell(plan, totals, closed)
     say(last_line(totals, index))
     return 0 if totals.all_ok and not closed else 1
+
+
+def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
+    """The plan, less its bad cases where these are to be left out; raises InputError with every problem."""
+    from pipeline.run.launch import without
+    from pipeline.status import InputError
+    from pipeline.study.check import check
+    from pipeline.study.coarse import too_coarse
+    from reports.case_files import counted
+    from reports.inside import misleading_links
+
+    config, problems = plan.template.settings.config, misleading_links(plan.out)
+    faults = {case.id: found for case in plan.cases if (found := check([case], config, whole=False))}
+    some_sound = len(faults) < len(plan.cases)
+    if skip_bad and some_sound:
+        plan = without(plan, faults)
+    else:
+        problems += [text for found in faults.values() for text in found]
+    problems += [text for point in plan.points for text in too_coarse(plan.cases, point.cheap.config)]
+    if problems:
+        error = InputError(list(dict.fromkeys(problems)))
+        if faults and some_sound and not skip_bad:
+            error.then += f"; --skip-bad runs the {counted(len(plan.cases) - len(faults), 'other case')}"
+        raise error
+    return plan
 
 
 def _tell(plan: "Plan", totals: "Totals", closed: "Sequence[str]") -> None:

@@ -67,7 +67,7 @@ def last_line(totals: Totals, index: Path) -> str:
     fitted = f" (and {totals.frames_fitted} used for the roll)" * bool(totals.frames_fitted)
     parts = [f"{counted(totals.cases, 'case')}, {counted(totals.frames, 'frame')}{fitted}: {totals.frames_ok} ok"]
     if totals.frames_ok < totals.frames:
-        parts.append(f"{totals.frames - totals.frames_ok} not ok (failures.csv)")
+        parts.append(f"{counted(totals.frames - totals.frames_ok, 'frame')} not ok (failures.csv)")
     elif totals.cases_ok < totals.cases:  # one that is damaged has no frames to be counted
         parts.append(f"{totals.cases - totals.cases_ok} of the cases not ok (failures.csv)")
     if totals.sweep_lost:

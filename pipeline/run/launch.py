@@ -46,6 +46,7 @@ class Plan:
     shard : I/N where only a part of the cases is run, else empty.     assumptions : what was inferred.
     left_out : ids of the manifest's cases that --only does not name.
     inferred_from : the folder of scans that the manifest was inferred from; None where there is a manifest.
+    refused : cases that are not computed, with what is wrong with each.
     """
 
     manifest: Manifest
@@ -59,6 +60,7 @@ class Plan:
     assumptions: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     inferred_from: Path | None = None
+    refused: tuple[tuple[Case, str], ...] = ()
 
     @property
     def out(self) -> Path:
@@ -83,6 +85,13 @@ class Plan:
             for job in self.jobs
             for point in self.points
         ]
+
+
+def without(plan: Plan, faults: Mapping[str, Sequence[str]]) -> Plan:
+    """The plan with the cases of these ids refused. faults : what is wrong with each, lines that name the case."""
+    why = {name: "; ".join(line.removeprefix(f"case {name!r}: ") for line in lines) for name, lines in faults.items()}
+    refused = tuple((case, why[case.id]) for case in plan.cases if case.id in faults)
+    return replace(plan, cases=tuple(case for case in plan.cases if case.id not in faults), refused=refused)
 
 
 def chosen(cases: Sequence[Case], only: Sequence[str], shard: str) -> tuple[Case, ...]:
@@ -137,6 +146,8 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     remove_leftovers(out)
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
+    for case, why in plan.refused:
+        _write_lost(Outcome(replace(plan.template, case=case), None, why, why, "refused"))
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
         sys.stderr.write(f"{removed}\n")
@@ -226,6 +237,7 @@ def intention(plan: Plan) -> list[str]:
         known = "kept, nothing changed" if finished(job, job.key) else f"to run until {job.until}"
         frames = counted(frames_of(job.case, job.settings.config), "frame")
         lines.append(f"{job.case.id}: {frames}, {known} -> {job.folder}")
+    lines += [f"{case.id}: left out: {why}" for case, why in plan.refused]
     lines += [
         f"sweep {point.parameter} = {point.value}: {counted(len(plan.cases), 'case')} -> {plan.out / point.folder}"
         for point in plan.points

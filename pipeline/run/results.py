@@ -30,6 +30,7 @@ LOST = {
     "crashed": "the case ended in an unexpected error; its log has the traceback",
     "worker_lost": "the worker process was killed, twice; its log tells where it was",
     "over_limit": "the case took more time or memory than it may; raise --case-timeout or --case-memory",
+    "refused": "the case was left out, as its files cannot be used; mend what the message names, then run it",
     "removed": "the case's result was removed while the run went on; give the same command again",
     "damaged": "a result file cannot be read; run the case again",
 }

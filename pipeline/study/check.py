@@ -1,8 +1,9 @@
 """Every problem of a study at once, from the manifest and the scans' headers alone."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from itertools import product
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from pipeline.load import (
     Header,
     LoadError,
     Scans,
+    Source,
     each_volume,
     read_header,
     require_one,
@@ -31,6 +33,7 @@ from pipeline.study.same_scans import repeated
 from pipeline.study.settings import Config
 from pipeline.study.sources import files_of
 
+T = TypeVar("T")
 NEAR_MM = 20.0
 """An entry further than this from the box of the own lumen was not meant for it."""
 
@@ -46,44 +49,53 @@ def check(cases: Sequence[Case], config: Config, *, whole: bool = True) -> list[
 
 def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
     """What would stop or spoil this case; empty when nothing is found."""
-    problems: list[str] = []
-
-    def found(read: Callable[[], None]) -> None:
-        try:
-            read()
-        except LoadError as error:
-            problems.append(str(error))
-
-    for path in dict.fromkeys(files_of(case).values()):
-        found(lambda path=path: _require_there(path))  # type: ignore[misc]
-    if problems:
-        return problems
-    again = repeated(case)
-    headers: list[Header] = []
-    for source in ((case.reference,) if case.reference else ()) + case.frames:
-        found(lambda source=source: headers.append(read_header(source, config.load, case.spacing_mm)))  # type: ignore[misc]
-    for header in headers:
-        if whole or (header.source == case.reference):
-            found(lambda header=header: require_whole(header, config.load))  # type: ignore[misc]
-    if not problems:
-        found(lambda: None if case.reference is None else require_one(headers[0]))
-    if not problems:
-        empty = headers.pop(0) if case.reference else None
-        scans = Scans(empty, tuple(volume for header in headers for volume in each_volume(header)))
-        for header in scans.frames:
-            found(lambda header=header: require_same_geometry(scans.all[0], header))  # type: ignore[misc]
-        count = len(scans.frames) or case.frame_count
-        problems += entry_problems(case, scans)
-        problems += not_one_per_frame(case.lists, count)
-        problems += _told_problems(case, count)
+    absent = dict(_absent(case))
+    found = _Findings([*repeated(case), *absent.values()])
+    count = _look_at_scans(case, config, absent, whole, found)
+    if count is not None:
+        found += not_one_per_frame(case.lists, count)
+        found += _told_problems(case, count, absent)
     for source in case.traces:
-        found(lambda source=source: _read(read_curve(source.path)))  # type: ignore[misc]
-    if case.parameters:
+        if source.path not in absent:
+            found.tried(read_curve, source.path)
+    if case.parameters and case.parameters not in absent:
         try:
             read_parameters(case.parameters)
         except ParametersError as error:
-            problems += error.problems
-    return again + problems + list(_lumen_problems(case, config))
+            found += error.problems
+    return [*found, *_lumen_problems(case, config, absent)]
+
+
+class _Findings(list[str]):
+    """Problems so far: what cannot be read adds its sentence, and hides nothing else."""
+
+    def tried(self, read: Callable[..., T], *args: Any) -> T | None:
+        """What is read, or None."""
+        try:
+            return read(*args)
+        except LoadError as error:
+            self.append(str(error))
+            return None
+
+
+def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: bool, found: _Findings) -> int | None:
+    """How many frames the case has, as far as headers tell; None where the one file that may hold many has none."""
+
+    def header_of(source: Source | None) -> Header | None:
+        if source is None or source.path in absent:
+            return None
+        return found.tried(read_header, source, config.load, case.spacing_mm)
+
+    empty, frames = header_of(case.reference), [header_of(source) for source in case.frames]
+    for header in filter(None, [empty, *frames] if whole else [empty]):
+        found.tried(require_whole, header, config.load)
+    if empty is not None:
+        found.tried(require_one, empty)
+    scans = Scans(empty, tuple(volume for header in frames if header for volume in each_volume(header)))
+    for header in scans.frames:
+        found.tried(require_same_geometry, scans.all[0], header)
+    found += entry_problems(case, scans)
+    return None if frames == [None] else len(scans.frames) + frames.count(None) or case.frame_count
 
 
 def frames_of(case: Case, config: Config) -> int:
@@ -92,18 +104,19 @@ def frames_of(case: Case, config: Config) -> int:
     return sum(held) or case.frame_count
 
 
-def _read(_content: object) -> None:
-    """What was read is not needed: that it can be is."""
+def _absent(case: Case) -> Iterator[tuple[Path, str]]:
+    """The files that a case names and that are not there, or cannot even be asked for, with a sentence each."""
+    for path in dict.fromkeys(files_of(case).values()):
+        try:
+            if status_of(path) is None:
+                yield path, f"{path}: no such file or folder"
+        except LoadError as error:
+            yield path, str(error)
 
 
-def _require_there(path: Path) -> None:
-    if status_of(path) is None:
-        raise LoadError(f"{path}: no such file or folder")
-
-
-def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
+def _lumen_problems(case: Case, config: Config, absent: Container[Path]) -> Iterator[str]:
     """What is wrong with the user's own lumen; of a label map its header alone is read."""
-    if case.lumen is None:
+    if case.lumen is None or case.lumen.path in absent:
         return
     try:
         if case.lumen.path.name.lower().endswith((".swc", ".mrk.json", ".stl", ".vtp")):
@@ -127,7 +140,7 @@ def _lumen_problems(case: Case, config: Config) -> Iterator[str]:
         )
 
 
-def _told_problems(case: Case, count: int) -> list[str]:
+def _told_problems(case: Case, count: int, absent: Container[Path]) -> list[str]:
     """What is wrong with the roll, the truth, the projections and another simulator's wires."""
     problems = []
     seen = count if case.frames or case.traces else 0
@@ -136,7 +149,8 @@ def _told_problems(case: Case, count: int) -> list[str]:
         problems.append(f'roll_deg = "fit" with frames: {seen}; {said}')
     for told, read in ((case.truth, read_truth), (case.projections, read_views)):
         try:
-            _read(None if told is None else read(told, count))
+            if told is not None and told not in absent:
+                read(told, count)
         except LoadError as error:
             problems.append(str(error))
     return problems + _others_problems(case, count)

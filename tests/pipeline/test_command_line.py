@@ -13,6 +13,7 @@ import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import SimpleITK as sitk
 
@@ -399,6 +400,66 @@ def test_check_tells_a_copied_frame_and_one_that_is_cut_short_at_once(
     said = capsys.readouterr().err
     assert "has the content of the reference" in said
     assert "cut short" in said
+
+
+def _twice(study: Path, place: Path) -> Path:
+    """A study of two cases with the same scans, the second one's files in a folder of its own."""
+    folder = shutil.copytree(study, place)
+    shutil.copytree(study, folder / "other", ignore=shutil.ignore_patterns("manifest.toml"))
+    text = (folder / "manifest.toml").read_text("utf-8")
+    case = text[text.index("[[case]]") :].replace('id = "straight"', 'id = "other"')
+    for name in ("frames/", "reference.mha", "truth/"):
+        case = case.replace(f'"{name}', f'"other/{name}')
+    (folder / "manifest.toml").write_text(f"{text}\n{case}", encoding="utf-8")
+    return folder
+
+
+def test_what_cannot_be_read_hides_nothing_else_of_its_case(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A missing reference hid a frame that is cut short, and that an entry outside the scan."""
+    folder = shutil.copytree(study, tmp_path / "study")
+    (folder / "reference.mha").unlink()
+    (folder / "frames" / "frame_000.mha").write_text("no scan", encoding="utf-8")
+    with (folder / "frames" / "frame_001.mha").open("r+b") as file:
+        file.truncate(1000)
+    text = (folder / "manifest.toml").read_text("utf-8").splitlines()
+    moved = [line if not line.startswith("entry_mm") else "entry_mm = [500, 0, 0]" for line in text]
+    (folder / "manifest.toml").write_text("\n".join(moved), encoding="utf-8")
+    assert main(["check", str(folder)]) == 2
+    said = capsys.readouterr().err
+    for problem in ("reference.mha: no such file", "frame_000.mha: cannot read it", "cut short", "outside the scan"):
+        assert problem in said
+
+
+def test_bad_cases_are_left_out_and_named_where_that_is_asked_for(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One junk frame stopped all cases of a study."""
+    folder, out = _twice(study, tmp_path / "study"), tmp_path / "out"
+    junk = folder / "other" / "frames" / "frame_000.mha"
+    whole = junk.read_bytes()
+    junk.write_text("no scan", encoding="utf-8")
+    command = ["run", str(folder), "-o", str(out), "--until", "load"]
+    assert main(command) == 2
+    assert capsys.readouterr().err.splitlines()[-1].endswith("nothing was run; --skip-bad runs the 1 other case")
+    assert not out.exists()
+    assert main([*command, "--skip-bad"]) == 1
+    said = capsys.readouterr().err
+    assert "other: refused: " in said
+    assert f"{junk}: cannot read it" in said
+    status = pd.read_csv(out / "summary.csv").set_index("case")["status"]
+    assert status.to_dict() == {"straight": "ok", "other": "refused"}
+    junk.write_bytes(whole)
+    assert main(command) == 0
+    assert set(pd.read_csv(out / "summary.csv")["status"]) == {"ok"}
+
+
+def test_where_every_case_is_bad_none_is_left_out(study: Path, tmp_path: Path) -> None:
+    folder, out = shutil.copytree(study, tmp_path / "study"), tmp_path / "out"
+    (folder / "reference.mha").unlink()
+    assert main(["run", str(folder), "-o", str(out), "--skip-bad"]) == 2
+    assert not out.exists()
 
 
 def test_check_names_missing_scans_beside_a_wrong_key(
