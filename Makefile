@@ -151,6 +151,8 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	# where Python is told not to write bytecode (in containers) every start would read our sources anew: a second
+	$(BIN)/python -m compileall -q pipeline solver reports data_synthetic
 	$(BIN)/python -m pipeline.warm_up
 	touch $@
 

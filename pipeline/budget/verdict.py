@@ -8,14 +8,13 @@ within 2u.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as fisher
+from scipy.special import chdtri, fdtri
 
 from pipeline.arrays.polyline import at_arc
 from pipeline.model import Array
 
 COVERED = 0.95
-ROUND = 0.5 * float(np.sqrt(chi2.ppf(COVERED, 2)))
+ROUND = 0.5 * float(np.sqrt(chdtri(2, 1.0 - COVERED)))
 """u of an error whose two components have a standard deviation of 1."""
 TANGENT_MM = 0.25
 
@@ -41,7 +40,7 @@ def widening(count: int) -> float:
     """Squared radius of the 95 % ellipse in standard deviations, of a covariance from ``count`` members (Hotelling)."""
     if count < 4:
         return float("nan")
-    return float(2.0 * (count + 1) / (count - 1) * fisher.ppf(COVERED, 2, count - 1))
+    return float(2.0 * (count + 1) / (count - 1) * fdtri(2, count - 1, COVERED))
 
 
 def reach_mm(covariance_mm2: Array, axes: Array, count: int) -> Array:

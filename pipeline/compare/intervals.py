@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from pipeline.model import Array
 
@@ -84,7 +84,7 @@ def of_log_ratio(over: Array, under: Array, points: Array) -> Interval:
     centre = float(a.mean() - b.mean() + 0.5 * (aa - bb))
     # of two normal samples: variance of the difference of their means, and of half that of their variances
     cox = np.sqrt(max(aa + bb - 2 * ab, 0.0) / count + max(aa**2 + bb**2 - 2 * ab**2, 0.0) / (2 * (count - 1)))
-    t = float(student.ppf(0.975, count - 1))
+    t = float(stdtrit(count - 1, 0.975))
     low, high = min(whole - t * jackknife, centre - t * cox), max(whole + t * jackknife, centre + t * cox)
     return _bounded(holding(plain, low, high))
 
@@ -106,7 +106,7 @@ def of_medians(values: Sequence[Array]) -> Interval:
     if len(values) < FEWEST:
         return WITHHELD
     logs = np.log([max(float(np.median(own)), SMALLEST_MM) for own in values])
-    reach = float(student.ppf(0.975, len(logs) - 1) * logs.std(ddof=1) / np.sqrt(len(logs)))
+    reach = float(stdtrit(len(logs) - 1, 0.975) * logs.std(ddof=1) / np.sqrt(len(logs)))
     low, high = _bounded(Interval(2.0 * (logs.mean() - reach), 2.0 * (logs.mean() + reach)))
     return Interval(float(np.exp(0.5 * low)), float(np.exp(0.5 * high)))
 

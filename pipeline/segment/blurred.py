@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 THINNEST = 1.2
 """Radius over blur below which a blurred cylinder no longer reaches half its contrast (1.177), with a margin."""
@@ -18,7 +18,7 @@ THINNEST = 1.2
 
 def _half_radius(radius: float) -> float:
     """Radius at which a cylinder of ``radius``, blurred by sigma 1, falls to half its contrast."""
-    return float(brentq(lambda r: ncx2.cdf(radius**2, 2, r**2) - 0.5, 1e-9, radius))
+    return float(brentq(lambda r: chndtr(radius**2, 2, r**2) - 0.5, 1e-9, radius))
 
 
 @lru_cache(maxsize=1)
@@ -29,7 +29,7 @@ def _table() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float
     radii = np.concatenate([np.geomspace(60.0, 2.0, 30), np.linspace(1.95, THINNEST, 30)])
     half = np.array([_half_radius(float(r)) for r in radii])
     d = 1e-4
-    fall = ncx2.cdf(radii**2, 2, (half - d) ** 2) - ncx2.cdf(radii**2, 2, (half + d) ** 2)
+    fall = chndtr(radii**2, 2, (half - d) ** 2) - chndtr(radii**2, 2, (half + d) ** 2)
     slope = np.sqrt(2 * np.pi) * fall / (2 * d)
     bulge, offset, slope = (np.concatenate([[a], b]) for a, b in ((0.0, 1.0 / half), (0.0, radii - half), (1.0, slope)))
     return bulge, offset, slope

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 from pipeline.arrays.grids import spread, unflattened
 from pipeline.model import Counters
@@ -163,7 +163,7 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     core = core[:: max(1, len(core) // 500)]
     radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
     off_axis = np.maximum(radius - off_wall[core], 0.0)
-    share = ncx2.cdf((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
+    share = chndtr((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
     peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
     return replace(levels, inside=levels.outside + peak)
 

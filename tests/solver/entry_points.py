@@ -1,17 +1,16 @@
-"""Ways from Python into kernels that have none of their own; compiled anew in every session, so never stale."""
+"""Ways from Python into kernels that have none of their own; kept on disk until a source behind them changes."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numba
-
+from solver._compile import on_disk
 from solver._kernels import blocks, closed_form, energy, forces, forks, newton, rollout, rotation, start
 from solver._kernels.flags import FAST
 from solver._kernels.lanes import field as lane_field
 from solver._kernels.lanes.vectors import in_lanes
 
-entry_point = numba.njit(**FAST)
+entry_point = on_disk(**FAST)
 
 
 @entry_point

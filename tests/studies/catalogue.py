@@ -9,6 +9,7 @@ import io
 import json
 import sys
 import tempfile
+from collections.abc import Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,9 +86,9 @@ def run_scene(name: str, root: Path) -> Outcome:
     return Outcome(name, study.expected, folder, made, process_time() - clock)
 
 
-def run_all(root: Path) -> list[Outcome]:
-    """All scenes, one after the other in this process, so that kernels are compiled once."""
-    return [run_scene(name, root) for name in catalogue.names()]
+def run_all(root: Path, names: Iterable[str]) -> list[Outcome]:
+    """These scenes, one after the other in this process, so that kernels are compiled once."""
+    return [run_scene(name, root) for name in names]
 
 
 def coverage(outcomes: list[Outcome]) -> str:
@@ -136,7 +137,7 @@ def write_golden(outcomes: list[Outcome], folder: Path) -> None:
 def main(names: list[str]) -> None:
     """Run the named scenes (all of them without a name) and write their golden tables."""
     with tempfile.TemporaryDirectory() as scratch:
-        found = [run_scene(name, Path(scratch)) for name in names or catalogue.names()]
+        found = run_all(Path(scratch), names or catalogue.names())
         bad = [line for o in found for line in o.unexpected()]
         sys.stdout.write("\n".join([coverage(found), times(found), *bad, ""]))
         write_golden(found, GOLDEN)
