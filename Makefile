@@ -1,6 +1,6 @@
 # make validate   set up, build a study of real files, run the whole pipeline on it, say where the report lies
 # make test       set up, then lint, types, import rules and tests
-.PHONY: setup validate planted calibrated test browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants numbers shuffled cluster clean formats fuzz audit
+.PHONY: setup validate planted calibrated test pytest browser lint package docs pages study bars budget baseline anatomies bench stress peers aneurism liver conebeam seeing truth interrupt scale coverage mutants numbers shuffled cluster clean formats fuzz audit
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -30,7 +30,11 @@ calibrated: setup
 	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED)
 	$(BIN)/python -m tests.studies.calibration $(OUT)/calibrated --seed $(CALIBRATED) --forces --no-blind
 
-test: setup lint
+# types are checked on one core while tests run on what is left
+test: setup
+	$(MAKE) --no-print-directory -j 2 lint pytest
+
+pytest: setup
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # the pages in a browser (needs a Chromium on the path, and the network once)

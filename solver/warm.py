@@ -19,6 +19,8 @@ from solver._kernels.septum import through_wall
 from solver._kernels.start import extrapolate_start, lay_along
 from solver.doors import instance
 from solver.grid import Grid
+from solver.insertion import Insertion
+from solver.insertions import Insertions
 from solver.relax import Settings, relax
 from solver.wall import VesselWall
 from solver.wire import GuideWire
@@ -41,29 +43,30 @@ def no_collection() -> Iterator[None]:
 
 
 def warm_up(*, beside: bool = False) -> None:
-    """Compile every kernel (about half a minute, once per installation; later calls read the cache).
+    """Compile every kernel (minutes, once per installation; later calls read the cache).
 
-    beside : a second process compiles everything but Newton's method and ``advance`` at the same time.
+    beside : a second process compiles what ``Insertions`` needs, more than half of it, at the same time.
     """
     instance("solver", "beside", beside, bool)
     with no_collection():
         if not beside or untyped.config.DISABLE_JIT:
             relax(WIRE, _wall(), depth_mm=1.0)
+            compile_lanes()
             return
-        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_beside()"]):
-            # while the other process makes what ``advance`` needs besides
-            _compile(newton_method.iterate)
-            # without a wall the kernels' arguments have the same types as with one
-            relax(WIRE, None, depth_mm=1.0)
+        with subprocess.Popen([sys.executable, "-c", "from solver import warm; warm.compile_lanes()"]):
+            # each begins with half of what both need: what is not on disk when it is asked for is compiled twice
+            _compile(through_wall, push_force, settle, contact_forces, sum_up)
+            _compile(newton_method.iterate, closed_form.iterate)
+            relax(WIRE, _wall(), depth_mm=1.0)
 
 
-def compile_beside() -> None:
-    """Compile the kernels that ``advance`` can take from disk, then those that only a wall needs."""
+def compile_lanes() -> None:
+    """Compile the kernels of insertions that go in lock-step."""
     with no_collection():
-        # the long ones first: what is not there in time is compiled twice
-        _compile(through_wall, push_force, settle, closed_form.iterate, lay_along, set_out)
-        _compile(next_place, contact_forces, sum_up, extrapolate_start, newton_method.rest_shape, look_again)
-        _wall()
+        _compile(next_place, lay_along, set_out, extrapolate_start, newton_method.rest_shape, look_again)
+        wall = _wall()
+        wires = [Insertion(WIRE, wall, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]) for _ in range(2)]
+        Insertions(wires, threads=1).to_depths([1.0])
 
 
 def _compile(*kernels: Any) -> None:

@@ -236,5 +236,5 @@ def _compiled() -> bool:
 def load_kernels(progress: CaseProgress) -> None:
     """Compile or load the solver's kernels before anything is timed; compiling is announced even with -q or a bar."""
     if not _compiled():
-        progress.warn("compiling the solver, once per installation: half a minute to two")
+        progress.warn("compiling the solver, once per installation: one to four minutes")
     progress.write(f"compiled code ready in {_kernels_loaded():.2f} s")

@@ -163,7 +163,8 @@ def plateau(scan: Grid, distance: Grid, levels: GreyLevels, blur_mm: float) -> G
     core = core[:: max(1, len(core) // 500)]
     radius = depth + 0.15 * blur_mm * float(np.exp(-depth / blur_mm))
     off_axis = np.maximum(radius - off_wall[core], 0.0)
-    share = chndtr((radius / blur_mm) ** 2, 2, (off_axis / blur_mm) ** 2 + 1e-9)
+    aside = ((off_axis / blur_mm) ** 2 + 1e-9).astype(np.float64)
+    share = chndtr((radius / blur_mm) ** 2, 2, aside)
     peak = _median((grey[core] - levels.outside) / np.maximum(share, 0.4), levels.contrast)
     return replace(levels, inside=levels.outside + peak)
 
