@@ -25,7 +25,7 @@ class FrameStatus(Enum):
         "frame shows none or too faintly; check both, then list a frame of a smaller depth before it, or scan with "
         "more dose"
     )
-    TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip is not in this frame"
+    TRACE_LEFT_SCAN = "the wire runs out of the scan: its tip, or a part before it, is not in this frame"
     TRACE_WRONG_WAY = (
         "more of the wire lies behind the entry than beyond it; check that entry_direction points the way the wire is "
         "pushed, or state insertion_mm where it is not stated"

@@ -51,7 +51,8 @@ def main(args: argparse.Namespace) -> int:
     if links:
         return complain(links, str(args.out), "; nothing was drawn")
     heads = found_heads(args.out)
-    write_sweep(args.out, heads)
+    if removed := write_sweep(args.out, heads):
+        sys.stderr.write(f"{removed}\n")
     totals = replace(aggregate(args.out), sweep_lost=len(lost_points(args.out, heads)))
     drawn = args.overview or _all_drawn(args, found)
     page = render_index(args.out, embed=args.embed)

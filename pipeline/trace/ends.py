@@ -14,9 +14,10 @@ from pipeline.trace.section import fills_vessel
 from pipeline.trace.subtraction import Subtraction
 from pipeline.trace.tube import Tube
 
-EDGE_VOXELS = 2.0
+EDGE_VOXELS, OUTSIDE_VOXELS = 2.0, -1.0
 """Distance from the scan's end within which a curve's end is no tip: traces of wires that leave the scan end 1.0 inside
-it at most (100 traces at 5 to 90 degrees, CNR 4 to 30; nearly all outside); tips in the scan are right to 0.4."""
+it at most (100 traces at 5 to 90 degrees, CNR 4 to 30; nearly all outside); tips in the scan are right to 0.4. And how
+far outside a curve may lead: what lies there is bridged, not seen."""
 PADDED = 0.03
 """Share of flat voxels around a curve's end (4 of 123) from which it ends at the padding around the reconstruction."""
 _AROUND = np.array([p for p in np.ndindex(7, 7, 7) if np.linalg.norm(np.subtract(p, 3)) <= 3.0], float) - 3.0
@@ -69,10 +70,10 @@ def _named(image: Subtraction, point: Array) -> str:
 
 
 def _at_edge(image: Subtraction, points: Array) -> bool:
-    """Whether a curve (n, 3) ends within EDGE_VOXELS of the end of the scan, or of what was reconstructed of it."""
+    """Whether a curve (n, 3) leads out of the scan, or ends within EDGE_VOXELS of its end or of what it shows."""
     index = points / image.spacing + image.region.corner
-    shape = np.array(image.scan.shape)
-    if np.any((index[-1] < EDGE_VOXELS) | (index[-1] > shape - 1 - EDGE_VOXELS)):
+    inside = np.minimum(index, np.array(image.scan.shape) - 1 - index).min(axis=1)
+    if inside[-1] < EDGE_VOXELS or inside.min() < OUTSIDE_VOXELS:
         return True
     # a scan without any noise is flat beside the rest of the wire, too
     return _flat_near(image, index[-1]) > PADDED and _flat_near(image, index[len(index) // 2]) <= PADDED
@@ -123,8 +124,8 @@ def of_the_ends(image: Subtraction, attempt: Attempt, points: Array, length_mm: 
          f"a line that ends {missing_mm:.1f} mm before the tip, by the wire's opacity", "one that goes to the tip",
          "look whether the picture shows more of it, or correct opacity in the manifest"),
         (_at_edge(image, points), FrameStatus.TRACE_LEFT_SCAN,
-         f"a curve that ends at the edge of the scan, or of what it shows (padding, saturated voxels), after "
-         f"{length_mm:.1f} mm", "a tip inside it", "leave this frame out, or scan a larger field"),
+         f"a curve of {length_mm:.1f} mm that ends at the edge of the scan, or of what it shows (padding, saturated "
+         "voxels), or leads out of it and back", "a wire inside it", "leave this frame out, or scan a larger field"),
         (hidden_ahead(image, points), FrameStatus.TRACE_AMBIGUOUS,
          "a line that goes on where the reference has one, too", "a reference without a wire, or any piece of one",
          "look at the reference; name another one, or none"),

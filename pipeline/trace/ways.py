@@ -3,6 +3,7 @@
 A wire 1.5 noises bright is 6 standard deviations over 3 mm, and may be 2 over any one of them.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -34,6 +35,8 @@ FEWER = 0.3
 that 300 tips in noise had was 3.9 with one piece, 5.1 with two, 6.4 with six."""
 PLACES = 500
 """Pieces of which the noise is taken: to 5 per cent."""
+Grey = Callable[[Array], Array]
+"""Grey (n,) at points (n, 3)."""
 
 
 @cache
@@ -54,7 +57,9 @@ def cone(heading: Array, widest: float, step: float) -> Array:
     return np.asarray(_rings(widest, step) @ np.stack([heading, side, np.cross(heading, side)]))
 
 
-def _longer(image: Subtraction, ways: Array, sums: Array, headings: Array, kept: int) -> tuple[Array, Array, Array]:
+def _longer(
+    image: Subtraction, along: Grey, ways: Array, sums: Array, headings: Array, kept: int
+) -> tuple[Array, Array, Array]:
     """The ``kept`` brightest of ways (m, n, 3) with one more piece, the sums (m,) of their grey, last directions."""
     first = ways.shape[1] == 1
     widest, step = (float(np.arccos(CONE)), CONE_STEP) if first else (TURN + 0.01, TURN_STEP)
@@ -62,7 +67,7 @@ def _longer(image: Subtraction, ways: Array, sums: Array, headings: Array, kept:
     parent, heading = np.repeat(np.arange(len(ways)), [len(f) for f in fans]), np.concatenate(fans)
     s = (np.arange(1, SAMPLES + 1) * PIECE_VOXELS / SAMPLES + FIRST_VOXELS * first) * image.voxel
     points = ways[parent, -1] + s[:, None, None] * heading
-    total = sums[parent] + image.along(points.reshape(-1, 3)).reshape(SAMPLES, -1).mean(axis=0)
+    total = sums[parent] + along(points.reshape(-1, 3)).reshape(SAMPLES, -1).mean(axis=0)
     order = np.argsort(-total, kind="stable")
     voxels = np.rint(points[-1][order] / image.spacing).astype(np.int64)
     best = order[np.sort(np.unique(voxels, axis=0, return_index=True)[1])[:kept]]
@@ -83,23 +88,28 @@ def _noise(image: Subtraction) -> float:
     return max(spread(image.along(points.reshape(-1, 3)).reshape(SAMPLES, -1).mean(axis=0)), 1e-6)
 
 
-def brightest(image: Subtraction, tip: Array, heading: Array, least: float, kept: int = KEPT) -> float:
+def brightest(
+    image: Subtraction, tip: Array, heading: Array, least: float, kept: int = KEPT, along: Grey | None = None
+) -> float:
     """How many standard deviations the brightest way on from a tip stands out, as if it had PIECES of them; 0 where its
     mean is below ``least``.
 
-    least : grey that a wire has.  kept : how many ways are continued.
+    least : grey that a wire has.  kept : how many ways are continued.  along : other grey of points than the image's,
+    with its noise.
     """
     noise, height = _noise(image), 0.0
     ways, sums, headings = tip[None, None], np.zeros(1), heading[None]
     for n in range(1, PIECES + 1):
-        ways, sums, headings = _longer(image, ways, sums, headings, kept)
+        ways, sums, headings = _longer(image, along or image.along, ways, sums, headings, kept)
         if sums[0] > n * least:
             height = max(height, float(sums[0]) / (noise * np.sqrt(n)) + FEWER * (PIECES - n))
     return height
 
 
-def goes_on_unseen(image: Subtraction, tip: Array, heading: Array, least: float) -> bool:
-    """Whether a way on from a tip stands out as no noise does. least : grey that a wire has."""
-    if brightest(image, tip, heading, least, QUICK) < MAYBE:
+def goes_on_unseen(
+    image: Subtraction, tip: Array, heading: Array, least: float, sure: float = SURE, along: Grey | None = None
+) -> bool:
+    """Whether a way on from a tip stands out by ``sure`` standard deviations; see ``brightest`` for the others."""
+    if brightest(image, tip, heading, least, QUICK, along) < MAYBE:
         return False
-    return brightest(image, tip, heading, least) > SURE
+    return brightest(image, tip, heading, least, along=along) > sure

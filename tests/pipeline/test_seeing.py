@@ -81,6 +81,7 @@ def test_what_can_be_seen_is_traced(case, seed):
             ("two wires 0.8 mm apart", 0, "TRACE_AMBIGUOUS"),
             ("tip folded back on itself", 0, "TRACE_AMBIGUOUS"),
             ("wire out of the scan", 0, "TRACE_LEFT_SCAN"),
+            ("wire out of the scan", 971, "TRACE_LEFT_SCAN"),  # out for 8 mm and back, which was bridged, and ok
             ("wire out of the scan at a shallow angle", 1, "TRACE_LEFT_SCAN"),
             ("wire out of the round field of view", 0, "TRACE_LEFT_SCAN"),  # cut where the padding begins, and ok
             ("wire out of the round field of view", 5, "TRACE_LEFT_SCAN"),
@@ -89,6 +90,12 @@ def test_what_can_be_seen_is_traced(case, seed):
                 2,
                 "TRACE_AMBIGUOUS",
             ),  # cut where that begins, and ok
+            (
+                "an end of plastic, darker than the contrast medium",
+                962,
+                "TRACE_AMBIGUOUS",
+            ),  # cut where it begins, and ok
+            ("an end of plastic, darker than the contrast medium", 968, "TRACE_AMBIGUOUS"),
             ("entry_direction the wrong way round", 0, "TRACE_WRONG_WAY"),
             ("slices of 2 mm", 0, "TRACE_AMBIGUOUS"),
             ("dim distal part, x 0.15 to 0.2", 316, "TRACE_AMBIGUOUS"),  # cut by 1.5 mm in its noise, and ok
