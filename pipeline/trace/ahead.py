@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pipeline.arrays.grids import unflattened
 from pipeline.arrays.jets import Blurred, values_at
@@ -20,8 +19,8 @@ HIDDEN = 0.4
 DARK = 6.0
 """Noises by which the darkest way on stands out, over its length, from what is as far from the end: it had at most 4.6
 where nothing lay ahead (110 tips), and 7.7 and more along 4 to 8 mm of a wire less dense than the contrast medium."""
-DARK_REACH_VOXELS, DEEP_VOXELS = 31, 0.5
-"""How far a dark way may lead, and how far inside the wall the grey counts."""
+DARK_REACH_VOXELS, DEEP_VOXELS = 32, 0.5
+"""How far a dark way may lead (and what lies further away), and how far inside the wall grey counts."""
 
 
 def hidden_ahead(image: Subtraction, points: Array) -> bool:
@@ -45,24 +44,33 @@ def dark_ahead(image: Subtraction, points: Array) -> bool:
     contrast is as dark on all ways.
     """
     tip, last = points[-1], tip_tangent(points, VOXELS * image.voxel)
+
+    def dark(at: Array) -> Array:
+        return np.where(image.depth_at(at) < -DEEP_VOXELS * image.voxel, -image.along(at), -np.inf)
+
+    if not goes_on_unseen(image, tip, last, 0.0, DARK, dark):
+        return False
+    usual = _usual_ahead(image, tip, last)
+    return goes_on_unseen(image, tip, last, 0.0, DARK, lambda at: dark(at) + usual[_voxels_from(image, tip, at)])
+
+
+def _usual_ahead(image: Subtraction, tip: Array, heading: Array) -> Array:
+    """Median grey (DARK_REACH_VOXELS,) of the lumen ahead of a tip, by whole voxels from it."""
     box, within = image.region.box, image.region.within
     deep = within[box.values.reshape(-1)[within] < -DEEP_VOXELS * image.voxel]
     places = unflattened(deep, box.shape) * image.spacing
     away = _voxels_from(image, tip, places)
-    near = (away < DARK_REACH_VOXELS) & ((places - tip) @ last > 0.0)  # the wire brightens what lies behind
-    usual = np.asarray(ndimage.median(image.along(places[near]), away[near], np.arange(DARK_REACH_VOXELS)))
-
-    def darker(at: Array) -> Array:
-        far = _voxels_from(image, tip, at)
-        inside = (image.depth_at(at) < -DEEP_VOXELS * image.voxel) & (far < DARK_REACH_VOXELS)
-        return np.where(inside, usual[np.minimum(far, DARK_REACH_VOXELS - 1)] - image.along(at), -np.inf)
-
-    return goes_on_unseen(image, tip, last, 0.0, DARK, darker)
+    ahead = (places - tip) @ heading > 0.0  # the wire brightens what lies behind
+    grey, usual = image.along(places[ahead]), np.full(DARK_REACH_VOXELS, -np.inf)
+    for far in np.unique(away[ahead]):
+        usual[far] = np.median(grey[away[ahead] == far])
+    return usual
 
 
 def _voxels_from(image: Subtraction, tip: Array, points: Array) -> NDArray[np.int64]:
-    """How many whole voxels points (n, 3) are from a tip."""
-    return np.asarray(np.linalg.norm(points - tip, axis=1) / image.voxel, dtype=np.int64)
+    """How many whole voxels points (n, 3) are from a tip, up to the most of DARK_REACH_VOXELS."""
+    away = (np.linalg.norm(points - tip, axis=1) / image.voxel).astype(np.int64)
+    return np.asarray(np.minimum(away, DARK_REACH_VOXELS - 1))
 
 
 def _rays(image: Subtraction, points: Array, voxels: int) -> Array:
