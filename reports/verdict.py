@@ -247,10 +247,10 @@ def next_command(cases: Iterable[str], typed: Sequence[str] = ()) -> str:
     named = list(dict.fromkeys(cases))
     only = [word for case in named for word in ("--only", case)] if len(named) <= _MANY else []
     head = list(typed) if list(typed[:2]) == ["wireval", "run"] else ["wireval", "run", "MANIFEST", "-o", "OUT"]
-    kept, words = [], iter(head)
+    kept, words, left_out = [], iter(head), (*_NOT_AGAIN, *("--shard",) * bool(only))
     for word in words:
         name, equals, _ = word.partition("=")
-        if name in _NOT_AGAIN:
+        if name in left_out:
             if not equals:
                 next(words, None)
         elif word not in ("--fresh", "--resume"):

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", action="append", default=[], metavar="ID", help="only this case; may be repeated")
     add("--until", default="report", metavar="STAGE", help="load, segment, trace, simulate, compare")
     add("--executor", default="", metavar="ADDRESS", help="tcp://host:port of a dask scheduler")
-    add("--skip-bad", action="store_true", help="leave out and name cases that check finds fault with; exit 1")
+    add("--skip-bad", action="store_true", help="leave out and name cases whose files cannot be used; exit 1")
     add("--resume", action="store_true", help="go on in an OUT made from another manifest or with other settings")
     add("--fresh", action="store_true", help="compute every case again")
     add("--dry-run", action="store_true", help="say what would be done, and do nothing")
@@ -105,17 +105,17 @@ def _sound(plan: "Plan", skip_bad: bool) -> "Plan":
     from reports.inside import misleading_links
 
     config, problems = plan.template.settings.config, misleading_links(plan.out)
-    faults = {case.id: found for case in plan.cases if (found := check([case], config, whole=False))}
-    some_sound = len(faults) < len(plan.cases)
-    if skip_bad and some_sound:
+    bad = [case for case in plan.cases if check([case], config, whole=False)]
+    faults, count = {case.id: check([case], config) for case in bad}, len(plan.cases)
+    if skip_bad:
         plan = without(plan, faults)
     else:
         problems += [text for found in faults.values() for text in found]
     problems += [text for point in plan.points for text in too_coarse(plan.cases, point.cheap.config)]
     if problems:
         error = InputError(list(dict.fromkeys(problems)))
-        if faults and some_sound and not skip_bad:
-            error.then += f"; --skip-bad runs the {counted(len(plan.cases) - len(faults), 'other case')}"
+        if 0 < len(faults) < count and not skip_bad:
+            error.then += f"; --skip-bad runs the {counted(count - len(faults), 'other case')}"
         raise error
     return plan
 

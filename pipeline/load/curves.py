@@ -122,14 +122,15 @@ def read_curve(path: Path) -> Curve:
     return Curve(points, np.full(len(points), np.nan), note=f"given: {path.name}")
 
 
-def read_truth(path: Path, frame_count: int) -> list[Array]:
-    """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip."""
+def read_truth(path: Path, frame_count: int | None) -> list[Array]:
+    """True wires, one (n, 3) LPS mm curve per frame from the entry to the tip. frame_count : None where not known."""
     expected = '{"frames": [{"points_mm": [[x, y, z], ...]}]}'
     found = read_json(path, expected)
     try:
         curves = [np.array(frame["points_mm"], dtype=np.float64) for frame in found["frames"]]
     except (ValueError, KeyError, TypeError, IndexError):
         raise unusable(path, f"cannot be read as truth; expected {expected}") from None
+    frame_count = len(curves) if frame_count is None else frame_count
     if len(curves) != frame_count or any(c.ndim != 2 or c.shape[1] != 3 for c in curves):
         raise unusable(path, f"holds {len(curves)} curves, expected {frame_count} of shape (n, 3), one per frame")
     for number, curve in enumerate(curves):

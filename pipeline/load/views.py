@@ -92,8 +92,11 @@ class View:
     fitted: bool
 
 
-def read_views(path: Path, count: int) -> list[View]:
-    """One view for each frame; raises LoadError where the file is no such thing, or has another number of them."""
+def read_views(path: Path, count: int | None) -> list[View]:
+    """One view for each frame; raises LoadError where the file is no such thing, or has another number of them.
+
+    count : None where it is not known.
+    """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -102,7 +105,7 @@ def read_views(path: Path, count: int) -> list[View]:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise unusable(path, said(*next(sentences(error, data, _File.model_json_schema())))) from None
-    if len(file.frames) != count:
+    if count is not None and len(file.frames) != count:
         raise unusable(path, f"holds {len(file.frames)} frames for {count} depths in insertion_mm; give one for each")
     centre, leaf, fitted = np.array(file.isocentre_mm), np.array(file.leaf_mm), file.translation == "fitted"
     return [View(f.projection, centre, leaf, np.array(f.points_px, float), fitted) for f in file.frames]

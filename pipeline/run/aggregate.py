@@ -113,7 +113,8 @@ def write_tests(path: Path, found: Sequence[Result], gates: Mapping[str, str]) -
 
 
 def _whole(result: Result) -> dict[str, Any]:
-    return {"frame": "case", "status": result.status, "sentence": result.sentence, "message": result.sentence}
+    why = next((failure["message"] for failure in result.failures), "") or result.sentence
+    return {"frame": "case", "status": result.status, "sentence": result.sentence, "message": why}
 
 
 def _outcome(frame: Mapping[str, Any]) -> Outcome:

@@ -146,8 +146,7 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     remove_leftovers(out)
     if plan.template.fresh:
         _remove_others(out, info["manifest_sha256"])
-    for case, why in plan.refused:
-        _write_lost(Outcome(replace(plan.template, case=case), None, why, why, "refused"))
+    _refuse(plan)
     run_cases(plan, [*plan.jobs, *plan.sweep_jobs])
     if removed := write_sweep(out, found_heads(out)):  # points of other shards so far included
         sys.stderr.write(f"{removed}\n")
@@ -156,6 +155,15 @@ def launch(plan: Plan) -> tuple[Totals, Path]:
     Store(plan.template.cache).trim()
     totals = replace(aggregate(out, info, name), sweep_lost=len(lost_points(out, heads)))
     return totals, render_index(out, plan.template.embed, each_on(1 if plan.address else plan.workers))
+
+
+def _refuse(plan: Plan) -> None:
+    """Write for each refused case, in every point of the sweep, too, that it is; an earlier result goes."""
+    reasons = {case.id: why for case, why in plan.refused}
+    bad = replace(plan, cases=tuple(case for case, _ in plan.refused))
+    for job in [*bad.jobs, *bad.sweep_jobs]:
+        (job.folder / "log.txt").unlink(missing_ok=True)  # it tells of stages that this run did not come to
+        _write_lost(Outcome(job, None, reasons[job.case.id], reasons[job.case.id], "refused"))
 
 
 def _never_asked(info: Path, left_out: Sequence[str]) -> list[str]:

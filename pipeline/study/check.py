@@ -31,7 +31,7 @@ from pipeline.study.manifest import Case, not_one_per_frame
 from pipeline.study.parameters import ParametersError, read_parameters
 from pipeline.study.same_scans import repeated
 from pipeline.study.settings import Config
-from pipeline.study.sources import files_of
+from pipeline.study.sources import files_of, is_pattern
 
 T = TypeVar("T")
 NEAR_MM = 20.0
@@ -54,7 +54,7 @@ def check_case(case: Case, config: Config, *, whole: bool = True) -> list[str]:
     count = _look_at_scans(case, config, absent, whole, found)
     if count is not None:
         found += not_one_per_frame(case.lists, count)
-        found += _told_problems(case, count, absent)
+    found += _told_problems(case, count, absent)
     for source in case.traces:
         if source.path not in absent:
             found.tried(read_curve, source.path)
@@ -79,7 +79,7 @@ class _Findings(list[str]):
 
 
 def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: bool, found: _Findings) -> int | None:
-    """How many frames the case has, as far as headers tell; None where the one file that may hold many has none."""
+    """How many frames the case has; None where the header of one is not known, whose file may hold several."""
 
     def header_of(source: Source | None) -> Header | None:
         if source is None or source.path in absent:
@@ -95,7 +95,7 @@ def _look_at_scans(case: Case, config: Config, absent: Container[Path], whole: b
     for header in scans.frames:
         found.tried(require_same_geometry, scans.all[0], header)
     found += entry_problems(case, scans)
-    return None if frames == [None] else len(scans.frames) + frames.count(None) or case.frame_count
+    return None if None in frames else len(scans.frames) or case.frame_count
 
 
 def frames_of(case: Case, config: Config) -> int:
@@ -109,7 +109,7 @@ def _absent(case: Case) -> Iterator[tuple[Path, str]]:
     for path in dict.fromkeys(files_of(case).values()):
         try:
             if status_of(path) is None:
-                yield path, f"{path}: no such file or folder"
+                yield path, f"{path}: {'matches no file' if is_pattern(path.name) else 'no such file or folder'}"
         except LoadError as error:
             yield path, str(error)
 
@@ -140,11 +140,11 @@ def _lumen_problems(case: Case, config: Config, absent: Container[Path]) -> Iter
         )
 
 
-def _told_problems(case: Case, count: int, absent: Container[Path]) -> list[str]:
-    """What is wrong with the roll, the truth, the projections and another simulator's wires."""
+def _told_problems(case: Case, count: int | None, absent: Container[Path]) -> list[str]:
+    """What is wrong with the roll, the truth, the projections and another simulator's wires. count : of the frames."""
     problems = []
     seen = count if case.frames or case.traces else 0
-    if case.roll_deg == "fit" and case.role == "validation" and seen < 2:
+    if case.roll_deg == "fit" and case.role == "validation" and seen is not None and seen < 2:
         said = "the first one is what it is fitted on, and is not scored; give a number, or two frames or more"
         problems.append(f'roll_deg = "fit" with frames: {seen}; {said}')
     for told, read in ((case.truth, read_truth), (case.projections, read_views)):
@@ -153,7 +153,7 @@ def _told_problems(case: Case, count: int, absent: Container[Path]) -> list[str]
                 read(told, count)
         except LoadError as error:
             problems.append(str(error))
-    return problems + _others_problems(case, count)
+    return problems + ([] if count is None else _others_problems(case, count))
 
 
 def _others_problems(case: Case, count: int) -> list[str]:

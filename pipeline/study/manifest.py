@@ -159,9 +159,8 @@ class Case(Strict):
                 f"down is missing: wire {self.wire.name!r} has a weight; [0, 1, 0] for a patient on the back"
             )
         problems += self._axis_along_the_wire()
-        # a single file may hold many volumes; their number is known once its header is read
-        one_file = len(self.frames) == 1 and self.frames[0].path.is_file()
-        problems += () if one_file else not_one_per_frame(self.lists, self.frame_count)
+        # files of scans may hold several volumes each: how many is known once their headers are read
+        problems += () if self.frames else not_one_per_frame(self.lists, self.frame_count)
         if self.catheter is not None:
             problems += catheter_problems(self.catheter, self.wire.radius_mm, self.insertion_mm or ())
         if problems:

@@ -40,14 +40,14 @@ def _require_name(name: str, info: ValidationInfo) -> None:
 
 
 def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
-    """A list of sources, or a pattern whose matches come in natural order."""
+    """A list of sources, or a pattern whose matches come in natural order; one without any stays as it is."""
     if isinstance(value, list):
         if not value:
             raise saying(f"{info.field_name} = []: an empty list; name files, or leave the key out")
         return tuple(_source(item, info) for item in value)
     source = _source(value, info)
     pattern = value.partition("#")[0]
-    if not any(mark in pattern for mark in "*?["):
+    if not is_pattern(pattern):
         return (source,)
     base, relative = _base(pattern, info)
     try:
@@ -55,11 +55,16 @@ def _sources(value: Any, info: ValidationInfo) -> tuple[Source, ...]:
     except (ValueError, NotImplementedError, OSError, RecursionError):
         raise saying(f"{info.field_name} = {value!r} is no pattern; write names with *, ? and [...]") from None
     found = sorted(matches, key=lambda path: natural_key(path.relative_to(base).as_posix()))
-    if not found:
-        raise saying(f"{info.field_name} = {value!r} matches no file below {base}")
+    if not found:  # said beside what else is wrong with the case's files
+        return (source,)
     if len(found) > MOST_MATCHES:
         raise saying(f"{info.field_name} = {value!r} matches more than {MOST_MATCHES} files; make it narrower")
     return tuple(Source(path, source.dataset) for path in found)
+
+
+def is_pattern(name: str) -> bool:
+    """Whether a name holds one of the marks of a pattern."""
+    return any(mark in name for mark in "*?[")
 
 
 def _base(pattern: str, info: ValidationInfo) -> tuple[Path, str]:
@@ -67,7 +72,7 @@ def _base(pattern: str, info: ValidationInfo) -> tuple[Path, str]:
     path = Path(pattern)
     if not path.is_absolute():
         return Path((info.context or {}).get("folder", "")), pattern
-    fixed = list(itertools.takewhile(lambda part: not any(mark in part for mark in "*?["), path.parts))
+    fixed = list(itertools.takewhile(lambda part: not is_pattern(part), path.parts))
     if len(fixed) < 2:
         raise saying(f"{info.field_name} = {pattern!r} looks through the whole machine; name a folder")
     return Path(*fixed), str(Path(*path.parts[len(fixed) :]))

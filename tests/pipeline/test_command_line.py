@@ -455,11 +455,52 @@ def test_bad_cases_are_left_out_and_named_where_that_is_asked_for(
     assert set(pd.read_csv(out / "summary.csv")["status"]) == {"ok"}
 
 
-def test_where_every_case_is_bad_none_is_left_out(study: Path, tmp_path: Path) -> None:
-    folder, out = shutil.copytree(study, tmp_path / "study"), tmp_path / "out"
+def test_a_refused_case_is_refused_in_the_sweep_and_to_the_build_server_too(study: Path, tmp_path: Path) -> None:
+    """Its earlier result in a point of the sweep was pooled with what the others have now."""
+    folder, out, junit = _twice(study, tmp_path / "study"), tmp_path / "out", tmp_path / "junit.xml"
+    command = ["run", str(folder), "-o", str(out), "--until", "compare", "--sweep", "simulate.wall_scale=2"]
+    assert main(command) == 0
+    shutil.rmtree(folder / "other" / "frames")
+    assert main([*command, "--skip-bad", "--junit", str(junit)]) == 1
+    swept = pd.read_csv(out / "sweep.csv").set_index(["parameter", "case"])["frames_ok"]
+    assert swept["simulate.wall_scale", "straight"] == swept["(plain)", "straight"] > 0
+    assert not swept["simulate.wall_scale", "other"] > 0
+    assert "matches no file" in junit.read_text("utf-8")
+    assert not (out / "cases" / "other" / "errors.csv").exists()
+
+
+def test_where_every_case_is_bad_each_is_named(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As a shard of one case is: nothing would tell it from one that was never started."""
+    folder, out = _twice(study, tmp_path / "study"), tmp_path / "out"
+    (folder / "other" / "reference.mha").unlink()
+    command = ["run", str(folder), "-o", str(out), "--until", "load"]
+    assert main([*command, "--shard", "1/2", "--skip-bad"]) == 1
+    assert list(pd.read_csv(out / "summary.csv")["status"]) == ["refused"]
+    said = capsys.readouterr().err
+    assert "--only other --resume" in said
+    assert "--shard" not in said.splitlines()[-1], "with it, another part of the cases is meant"
+    assert main(command) == 2
+
+
+def test_how_many_frames_there_are_is_said_once_all_headers_are_read(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two files of three volumes each were two frames, and a list of another length hid what was wrong with files."""
+    folder = shutil.copytree(study, tmp_path / "study")
+    frames = [sitk.ReadImage(str(path)) for path in sorted((folder / "frames").glob("*.mha"))[:2]]
+    for name in ("a", "b"):
+        sitk.WriteImage(sitk.JoinSeries(frames), str(folder / f"{name}.nrrd"))
+    text = (folder / "manifest.toml").read_text("utf-8")
+    text = re.sub(r"(?m)^(truth|insertion_mm) = .*\n", "", text).replace('"frames/*.mha"', '["a.nrrd", "b.nrrd"]')
+    (folder / "manifest.toml").write_text(text.replace("[[case]]", "[[case]]\ninsertion_mm = [1, 2, 3, 4]"), "utf-8")
+    main(["check", str(folder)])
+    assert "entries for" not in capsys.readouterr().err
+    (folder / "manifest.toml").write_text(text.replace("[[case]]", "[[case]]\ninsertion_mm = [1, 2, 3]"), "utf-8")
     (folder / "reference.mha").unlink()
-    assert main(["run", str(folder), "-o", str(out), "--skip-bad"]) == 2
-    assert not out.exists()
+    assert main(["check", str(folder)]) == 2
+    said = capsys.readouterr().err
+    assert "insertion_mm has 3 entries for 4 frames" in said
+    assert "no such file" in said
 
 
 def test_check_names_missing_scans_beside_a_wrong_key(
