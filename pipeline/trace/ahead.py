@@ -14,13 +14,14 @@ FIRST_VOXELS, VOXELS = 2.0, 4
 """Where, and over what length, the grey ahead is averaged: beyond the wire's own blur."""
 WIDEST_RAD = 0.5
 """How far off the curve's last direction: the wire bends."""
-HIDDEN = 0.4
-"""Share of the wire's brightness, and of the contrast medium's, that the reference has there at the least."""
+HIDDEN = 0.25
+"""Share of the wire's brightness, and of the contrast medium's, that the reference has there at the least: it had at
+most 0.08 ahead of tips that are right (100 traces), and 0.30 and more where a piece of wire in it bends away."""
 DARK = 6.0
 """Noises by which the darkest way on stands out, over its length, from what is as far from the end: it had at most 4.6
 where nothing lay ahead (110 tips), and 7.7 and more along 4 to 8 mm of a wire less dense than the contrast medium."""
-DARK_REACH_VOXELS, DEEP_VOXELS = 32, 0.5
-"""How far a dark way may lead (and what lies further away), and how far inside the wall grey counts."""
+DARK_REACH_VOXELS, DEEP_VOXELS, EDGE_VOXELS = 32, 0.5, 3.0
+"""How far a dark way may lead (and what lies further away), and how far inside the wall and the scan grey counts."""
 
 
 def hidden_ahead(image: Subtraction, points: Array) -> bool:
@@ -46,7 +47,10 @@ def dark_ahead(image: Subtraction, points: Array) -> bool:
     tip, last = points[-1], tip_tangent(points, VOXELS * image.voxel)
 
     def dark(at: Array) -> Array:
-        return np.where(image.depth_at(at) < -DEEP_VOXELS * image.voxel, -image.along(at), -np.inf)
+        index = at / image.spacing + image.region.corner
+        shown = np.minimum(index, np.array(image.scan.shape) - 1 - index).min(axis=1) > EDGE_VOXELS
+        inside = shown & (image.depth_at(at) < -DEEP_VOXELS * image.voxel)
+        return np.where(inside, -image.along(at), -np.inf)
 
     if not goes_on_unseen(image, tip, last, 0.0, DARK, dark):
         return False

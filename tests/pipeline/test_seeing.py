@@ -90,6 +90,7 @@ def test_what_can_be_seen_is_traced(case, seed):
                 2,
                 "TRACE_AMBIGUOUS",
             ),  # cut where that begins, and ok
+            ("a piece of wire in the reference, where the wire ends", 986, "TRACE_AMBIGUOUS"),  # the same, round a bend
             (
                 "an end of plastic, darker than the contrast medium",
                 962,
