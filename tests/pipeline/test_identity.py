@@ -139,8 +139,9 @@ def test_everything_that_is_wrong_with_the_files_of_a_case_is_said_at_once(tmp_p
     for verb in (["check", str(tmp_path / "m.toml")], ["run", str(tmp_path / "m.toml"), "-o", str(tmp_path / "out")]):
         assert main(verb) == 2
         said = capsys.readouterr().err.splitlines()  # type: ignore[attr-defined]
-        assert len(said) == 4, said
-        for part, line in zip(("f_0.mha", "f_2.mha", "l.stl", "3 problems"), said, strict=True):
+        assert len(said) == 6, said
+        parts = ("f_0.mha", "f_2.mha", "outside the scan", "t.json", "l.stl", "5 problems")
+        for part, line in zip(parts, said, strict=True):
             assert part in line
         assert not (tmp_path / "out").exists()
 
