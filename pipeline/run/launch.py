@@ -89,8 +89,11 @@ class Plan:
 
 def without(plan: Plan, faults: Mapping[str, Sequence[str]]) -> Plan:
     """The plan with the cases of these ids refused. faults : what is wrong with each, lines that name the case."""
-    why = {name: "; ".join(line.removeprefix(f"case {name!r}: ") for line in lines) for name, lines in faults.items()}
-    refused = tuple((case, why[case.id]) for case in plan.cases if case.id in faults)
+
+    def why(case: Case) -> str:
+        return "; ".join(line.removeprefix(f"case {case.id!r}: ") for line in faults[case.id])
+
+    refused = tuple((case, why(case)) for case in plan.cases if case.id in faults)
     return replace(plan, cases=tuple(case for case in plan.cases if case.id not in faults), refused=refused)
 
 

@@ -47,9 +47,7 @@ def dark_ahead(image: Subtraction, points: Array) -> bool:
     tip, last = points[-1], tip_tangent(points, VOXELS * image.voxel)
 
     def dark(at: Array) -> Array:
-        index = at / image.spacing + image.region.corner
-        shown = np.minimum(index, np.array(image.scan.shape) - 1 - index).min(axis=1) > EDGE_VOXELS
-        inside = shown & (image.depth_at(at) < -DEEP_VOXELS * image.voxel)
+        inside = (image.from_side(at) > EDGE_VOXELS) & (image.depth_at(at) < -DEEP_VOXELS * image.voxel)
         return np.where(inside, -image.along(at), -np.inf)
 
     if not goes_on_unseen(image, tip, last, 0.0, DARK, dark):
@@ -60,9 +58,7 @@ def dark_ahead(image: Subtraction, points: Array) -> bool:
 
 def _usual_ahead(image: Subtraction, tip: Array, heading: Array) -> Array:
     """Median grey (DARK_REACH_VOXELS,) of the lumen ahead of a tip, by whole voxels from it."""
-    box, within = image.region.box, image.region.within
-    deep = within[box.values.reshape(-1)[within] < -DEEP_VOXELS * image.voxel]
-    places = unflattened(deep, box.shape) * image.spacing
+    places = unflattened(image.deep(DEEP_VOXELS), image.region.box.shape) * image.spacing
     away = _voxels_from(image, tip, places)
     ahead = (places - tip) @ heading > 0.0  # the wire brightens what lies behind
     grey, usual = image.along(places[ahead]), np.full(DARK_REACH_VOXELS, -np.inf)

@@ -71,8 +71,7 @@ def _named(image: Subtraction, point: Array) -> str:
 
 def _at_edge(image: Subtraction, points: Array) -> bool:
     """Whether a curve (n, 3) leads out of the scan, or ends within EDGE_VOXELS of its end or of what it shows."""
-    index = points / image.spacing + image.region.corner
-    inside = np.minimum(index, np.array(image.scan.shape) - 1 - index).min(axis=1)
+    index, inside = image.in_scan(points), image.from_side(points)
     if inside[-1] < EDGE_VOXELS or inside.min() < OUTSIDE_VOXELS:
         return True
     # a scan without any noise is flat beside the rest of the wire, too

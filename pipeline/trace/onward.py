@@ -142,7 +142,7 @@ def seen_outside(image: Subtraction, line: Array) -> bool:
     out = np.mean(depth > OUTSIDE_VOXELS * h, axis=0) > 0.5
     if not out.any():
         return False
-    index = points / image.spacing + image.region.corner
+    index = image.in_scan(points)
     field = Blurred(
         image.scan.values, np.asarray(image.scan.spacing_mm), CREST_VOXELS * float(image.scan.spacing_mm.min())
     )

@@ -129,6 +129,15 @@ class Subtraction:
         """Kernel coordinates -> LPS mm."""
         return self.region.box.to_mm(np.asarray(points, float) / self.spacing)
 
+    def in_scan(self, points: Array) -> Array:
+        """Kernel coordinates (n, 3) -> voxels of the scan, between them too."""
+        return np.asarray(points / self.spacing + self.region.corner)
+
+    def from_side(self, points: Array) -> Array:
+        """How many voxels points (n, 3) are inside the scan's nearest side; below 0 outside it."""
+        index = self.in_scan(points)
+        return np.asarray(np.minimum(index, np.array(self.scan.shape) - 1 - index).min(axis=1))
+
     def turned(self, direction: ArrayLike) -> Array:
         """A direction in LPS -> kernel coordinates."""
         along = np.asarray(direction, float) @ self.region.box.direction
@@ -149,6 +158,11 @@ class Subtraction:
             yield
         finally:
             flat[voxels] = kept
+
+    def deep(self, voxels: float) -> NDArray[np.int64]:
+        """The lumen's voxels (flat) that are more than so many voxels inside its wall."""
+        within = self.region.within
+        return np.asarray(within[self.region.box.values.reshape(-1)[within] < -voxels * self.voxel])
 
     def depth_at(self, points: Array) -> NDArray[Any]:
         """Signed distance to the wall (n,) at the voxels nearest to points (n, 3); beyond the box, that at its edge."""

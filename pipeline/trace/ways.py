@@ -78,11 +78,10 @@ def _longer(
 
 def _noise(image: Subtraction) -> float:
     """Standard deviation of a piece's mean grey: of pieces at places well inside the lumen, in all directions."""
-    box, within = image.region.box, image.region.within
-    deep = within[box.values.reshape(-1)[within] < -image.voxel]
-    places = deep if len(deep) > PLACES else within
+    deep = image.deep(1.0)
+    places = deep if len(deep) > PLACES else image.region.within
     rng = np.random.default_rng(0)
-    index = unflattened(rng.choice(places, PLACES), box.shape)
+    index = unflattened(rng.choice(places, PLACES), image.region.box.shape)
     heading = rng.normal(size=(PLACES, 3))
     heading /= np.linalg.norm(heading, axis=1)[:, None]
     s = (np.arange(SAMPLES) - 0.5 * (SAMPLES - 1)) * PIECE_VOXELS / SAMPLES * image.voxel

@@ -263,7 +263,7 @@ def test_a_lumen_ends_too_early_before_a_vessel_or_a_wire_but_not_before_bone(be
     grey[np.hypot(*np.meshgrid(x, y, indexing="ij")) < 0.25] += thread
     scan = Volume(grey.astype(np.float32), [h] * 3, [0.0] * 3)
     image = SimpleNamespace(
-        voxel=h, spacing=np.full(3, h), region=SimpleNamespace(corner=np.zeros(3)), scan=scan,
+        voxel=h, spacing=np.full(3, h), in_scan=lambda points: points / h, scan=scan,
         wall_greys=(1000.0, 100.0), depth_at=lambda points: points[:, 2] - wall,
     )  # fmt: skip
     line = np.stack([np.full(20, 7.0), np.full(20, 7.0), np.linspace(0.0, 5.5, 20)], axis=1)
@@ -283,6 +283,7 @@ def line_in_noise(seed, height, last_mm, size=(40, 40, 90), h=0.3, blur=0.95):
         voxel=h, spacing=np.full(3, h), grey=grey, noise=1.0, correlation=1.0, noise_in=lambda blur: sd,
         along=lambda points: ndimage.map_coordinates(smooth, np.asarray(points).T / h, order=1),
         region=SimpleNamespace(within=within, box=box, numbers=Spare(size, np.int32)),
+        deep=lambda _: within,
     )  # fmt: skip
 
 
