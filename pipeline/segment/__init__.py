@@ -91,7 +91,8 @@ def segment(
     if len(region.thin):
         thin = balls(grid, region.thin, site.corner, region.levels, blur)
         add_balls(wall.values, np.asarray(grid.spacing_mm), thin, config.outer_mm)
-    said = warning(open_ones) + brighter(wall.levels) + bright + uneven.warning(found.least)
+    other = brighter(wall.levels) + bright + uneven.warning(found.least)
+    said = warning(open_ones) + (other or bone.two_greys(grid, found.distance, site.corner, wall.levels, wall.blur_mm))
     box = wall.values, site.corner
     said += add_necks(region.necks, box, grid, region.levels, blur)
     said += add_necks(closed_necks(*box, grid, config.least_voxels), box, grid, region.levels, blur)

@@ -1,14 +1,15 @@
 """Finds what is brighter than the vessel and touches its wall: calcification, bone or metal.
 
 Between two classes of tissue the wall is the half-level surface; beside a third, brighter one that surface lies too far
-out, or there is none.
+out, or there is none. What is hardly brighter has no such limit; it is told by the two greys that the depth then has.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from skimage.filters import threshold_otsu
 
-from pipeline.arrays.grids import indices_of
+from pipeline.arrays.grids import indices_of, spread
 from pipeline.segment.contact import Contact, counted, named
 from pipeline.segment.levels import BRIGHTER, GreyLevels, Index, grey_around
 from solver.grid import Grid
@@ -21,6 +22,14 @@ SIGMAS = 3.0
 """Standard deviations of the mean of 3^3 voxels by which that mean must be above BRIGHTER of the contrast."""
 THICK = 2
 """Layers that are eroded: something is left of bone and plaque, nothing of a wire, which is three voxels across."""
+DEEP = 2.0
+"""Blurs below the wall from which the grey there is the plateau's: 2 % are missing."""
+LOOKED_AT, LEAST = 20_000, 100
+"""Deep voxels that are looked at, and the least that tell anything."""
+APART, GAP = 4.5, 0.08
+"""Ashman's D of two groups of greys, and the share of the contrast between them, above which they are two plateaus. A
+vessel has D up to 3.7 in 230 tempting scenes without bone, whatever the noise, also around a wire and where the medium
+settles or decays; with bone 1.12 times as bright, at a contrast of 8 noises, it has 5."""
 
 
 def touching(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels) -> tuple[str, ...]:
@@ -63,3 +72,32 @@ def _places(bright: NDArray[np.bool_], at_wall: NDArray[np.bool_]) -> list[tuple
     of = numbers[tuple(touched.T)]
     groups = [touched[of == n] for n in thick if n]
     return [(len(g), g.mean(axis=0)) for g in groups if len(g)]
+
+
+def two_greys(scan: Grid, distance: Grid, corner: Index, levels: GreyLevels, blur_mm: float) -> tuple[str, ...]:
+    """One sentence for the report where the vessel has two greys, well apart, or none.
+
+    The deep voxels are split by Otsu's threshold and judged by the distance of the two groups over their spread (Ashman
+    et al. 1994, Astron. J. 108, 2348). blur_mm : the wall's.
+    """
+    deep = indices_of(distance.values < -DEEP * blur_mm)
+    deep = deep[:: max(1, len(deep) // LOOKED_AT)]
+    if len(deep) < LEAST:
+        return ()
+    grey = (grey_around(scan, deep + corner) - levels.outside) / levels.contrast
+    kept = grey < BRIGHTER * np.median(grey)  # what is brighter is looked for by ``touching``, and may be a wire
+    deep, grey = deep[kept], grey[kept]
+    bright = grey > threshold_otsu(grey)
+    if not bright.any():  # all alike, as without noise
+        return ()
+    low, high = (float(np.median(group)) for group in (grey[~bright], grey[bright]))
+    wide = float(np.hypot(spread(grey[~bright]), spread(grey[bright]))) / np.sqrt(2.0)
+    if high - low < max(GAP, APART * wide):
+        return ()
+    at = [round(float(x), 1) for x in distance.to_mm(np.median(deep[bright], axis=0))]
+    share, more = 100 * np.mean(bright), 100 * (high / low - 1)
+    return (
+        f"segment: the vessel has two greys: {share:.0f} % of its depth are {more:.0f} % brighter than the rest, at "
+        f"{at} mm; bone or another vessel may hang together with it: look at the picture, subtract the bone, scan with "
+        "smaller voxels, or give the lumen as a file (manifest key lumen)",
+    )

@@ -15,7 +15,7 @@ from tests.studies.seeing.scenes import Draft
 H = 0.3
 
 
-def flags(vessels, wires=(), seed=0):
+def flags(vessels, wires=(), seed=0, noise=60.0, said="touches its wall"):
     """Warnings of bone for a vessel along z with more beside it: (axis, radius, level)."""
     rng = np.random.default_rng(seed)
     z = np.arange(0.0, 30.0, 0.05)
@@ -26,8 +26,8 @@ def flags(vessels, wires=(), seed=0):
     )
     for curve in wires:
         grey = grey + render.METAL * render.wire(lattice, curve, 0.2)
-    lumen = segment(Volume(render.noisy(grey, 60.0, rng), lattice.spacing, lattice.origin), [[0.0, 0.0, 5.0]])
-    return [text for text in lumen.warnings if "touches its wall" in text]
+    lumen = segment(Volume(render.noisy(grey, noise, rng), lattice.spacing, lattice.origin), [[0.0, 0.0, 5.0]])
+    return [text for text in lumen.warnings if said in text]
 
 
 def lump(x, size, level):
@@ -51,3 +51,23 @@ def test_bone_at_a_distance_a_wire_and_a_plain_vessel_are_not():
     assert flags([], [wire]) == []
     scene = Draft(np.random.default_rng(3)).scan(16, reference=False)
     assert not any("touches its wall" in text for text in segment(scene.frame, scene.entry[None]).warnings)
+
+
+@pytest.mark.parametrize("noise", [0.0, 60.0, 110.0])
+def test_bone_hardly_brighter_than_the_vessel_is_told_by_the_two_greys_of_its_depth(noise):
+    wide = np.linspace(9.0, 21.0, 241)
+    bone = np.stack([np.full(241, 4.3), np.zeros(241), wide], axis=1), 2.6, 1.15
+    said = flags([bone], noise=noise, said="two greys")
+    assert len(said) == 1
+    assert "15 % brighter" in said[0] or "14 % brighter" in said[0]
+    x, _, z = json.loads(said[0].split("rest, at ")[1].split(" mm")[0])
+    assert 2.5 < x < 6.0
+    assert 9.0 < z < 21.0
+
+
+@pytest.mark.parametrize("noise", [0.0, 60.0, 220.0])
+def test_a_vessel_of_one_grey_has_one_around_a_wire_too(noise):
+    z = np.arange(2.0, 25.0, 0.05)
+    wire = np.stack([1.2 * np.sin(0.2 * z), 1.2 * np.cos(0.2 * z), z], axis=1)
+    assert flags([], noise=noise, said="two greys") == []
+    assert flags([], [wire], noise=noise, said="two greys") == []
