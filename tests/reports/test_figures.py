@@ -495,6 +495,7 @@ def test_every_parameter_of_a_calibration_has_a_panel() -> None:
     assert panels["depth_offset_mm"].get_linestyle() == "--"
     values, rises = panels["depth_offset_mm"].get_xydata().T
     np.testing.assert_allclose(rises, ((values - 1.0) / 0.1) ** 2, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(values[[0, -1]], [0.7, 1.3], rtol=0.0, atol=1e-12, err_msg="three deviations each way")
     (entry,) = [entry for entry in declared("calibration") if entry["figure"] == "profiles"]
     assert "dashed curve" in caption(entry["read"], drawing.table)
     assert "dashed curve" not in caption(entry["read"], drawing.table.query("parameter == 'taper'"))

@@ -53,6 +53,9 @@ def assert_same(together: list[list[Solution]], alone: list[list[Solution]]) -> 
             np.testing.assert_allclose(a.contact_force_N, b.contact_force_N, rtol=0, atol=1e2 * same * forces)
             np.testing.assert_allclose(a.reaction_force_N, b.reaction_force_N, rtol=0, atol=1e3 * same * forces)
             assert a.push_force_N == pytest.approx(b.push_force_N, abs=1e3 * same * forces), where
+            # a torque is a force times a lever that is no longer than the wire
+            torque = pytest.approx(b.reaction_torque_N_mm, abs=1e3 * same * forces * max(b.depth_mm, 1.0))
+            assert a.reaction_torque_N_mm == torque, where
             assert a.energy_N_mm == pytest.approx(b.energy_N_mm, rel=1e-9, abs=1e-15), where
             assert a.least_pivot == pytest.approx(b.least_pivot, abs=1e2 * same), where
             assert a.dissipated_N_mm == pytest.approx(b.dissipated_N_mm, abs=1e3 * same * forces), where
