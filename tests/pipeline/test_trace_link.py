@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.model import arc_length
 from pipeline.trace.crests import Tracklet
-from pipeline.trace.link import extended, link, with_doubles
+from pipeline.trace.link import extended, join, link, with_doubles
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -43,6 +43,21 @@ def test_a_path_goes_on_over_a_gap_whichever_way_its_pieces_run(turned):
     assert inside.max() < 9.5 + 1e-9
     assert np.ptp(inside) > 1.0
     np.testing.assert_allclose(path.points[:, :2], 0.0, rtol=0.0, atol=1e-12)
+
+
+def beyond(gap, angle, tangent_angle):
+    """A straight crest that begins ``gap`` mm from the origin, ``angle`` off z, and runs ``tangent_angle`` off it."""
+    way, run = (np.array([np.sin(a), 0.0, np.cos(a)]) for a in (angle, tangent_angle))
+    along = np.arange(0.0, 8.0, 0.25)
+    return Tracklet(gap * way + np.outer(along, run), np.tile(run, (len(along), 1)), np.full(len(along), 100.0))
+
+
+@pytest.mark.parametrize(("further", "taken"), [(0.9, "s"), (1.1, "s"), (1.5, "s"), (1.8, "c")])
+def test_a_bridge_may_bend_there_and_back_sooner_than_twice_one_way(further, taken):
+    """Both turn by half a radian at either end: an S costs 1 + 2 a mm, a C 1 + 2 + 2."""
+    s, c = beyond(1.0 * further, 0.5, 0.0), beyond(1.0, -0.5, -1.0)
+    joined = join([piece(-8.0, 0.0), s, c], 3.0)
+    assert joined[1] == {"s": 2, "c": 4}[taken]
 
 
 def test_no_path_begins_far_from_the_entry_or_across_it():

@@ -100,7 +100,13 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
 
 @pytest.mark.parametrize(
     ("low", "high", "text"),
-    [(-0.5, -0.01, "worse"), (-0.5, 0.1, "no better"), (-0.5, None, "no better"), (None, -0.01, "worse")],
+    [
+        (-0.5, -0.01, "worse"),
+        (-0.5, 0.0, "no better"),
+        (-0.5, 0.1, "no better"),
+        (-0.5, None, "no better"),
+        (None, -0.01, "worse"),
+    ],
 )
 def test_worse_is_said_where_the_whole_interval_is(low: float | None, high: float | None, text: str) -> None:
     """A skill of -38.6 was called "no better"."""
