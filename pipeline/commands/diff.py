@@ -120,13 +120,14 @@ def _compared(first: Path, second: Path, tolerance: Mapping[str, float]) -> Any:
 
 
 def _pooled(before: "Sequence[Found]", after: "Sequence[Found]") -> list[dict[str, Any]]:
-    """The columns of overall.csv that have a better side and are not the same."""
+    """What differs of overall.csv: columns that have a better side, and the predictor behind skill_strongest."""
     import pandas as pd
 
     from pipeline.run.overall import overall
     from reports.schema import SUMMARY
 
     old, new = overall(before), overall(after)
-    names = [column.name for column in SUMMARY if column.better and column.name in old and column.name in new]
+    told = [column.name for column in SUMMARY if column.better or column.name == "strongest_null"]
+    names = [name for name in told if name in old and name in new]
     rows = [{"column": name, "before": old[name], "after": new[name]} for name in names]
     return [row for row in rows if row["before"] != row["after"] and pd.notna(row["before"])]

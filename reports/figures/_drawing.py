@@ -161,13 +161,18 @@ def positive_axis(axes: Axes, values: Iterable[Any]) -> None:
 
 def from_zero(axes: Axes) -> None:
     """Let y begin at zero and end beyond the largest marker: matplotlib's margin is a share of the values' span."""
-    most = axes.dataLim.y1
+    most = max(panel.dataLim.y1 for panel in _with_this_y(axes))
     axes.set_ylim(bottom=0.0, top=most * (1.0 + ROOM_ABOVE) if 0.0 < most < np.inf else None)
+
+
+def _with_this_y(axes: Axes) -> list[Axes]:
+    """The panels that share its y axis, itself among them."""
+    return axes.get_shared_y_axes().get_siblings(axes)
 
 
 def _end_at_least(axes: Axes) -> None:
     """Draw all lines that fall below LEAST_MM there, with a tick that says what lies on it."""
-    for line in axes.lines:
+    for line in (line for panel in _with_this_y(axes) for line in panel.lines):
         line.set_ydata(np.maximum(np.asarray(line.get_ydata(), dtype=float), LEAST_MM))
     tick = FuncFormatter(lambda v, _: f"\u2264 {v:g}" if v < 1.01 * LEAST_MM else f"{v:g}")
     axes.yaxis.set_major_formatter(tick)

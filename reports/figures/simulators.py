@@ -1,5 +1,6 @@
 """Several simulators side by side: error along the wire and over depth, and who is nearest where."""
 
+import math
 from dataclasses import dataclass
 from itertools import cycle
 
@@ -43,10 +44,10 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     shown = colours(where["simulator"])
     for (axes, strip), (along, rows) in zip(panels.T, where.groupby("along", sort=False), strict=False):
         for number, (name, mine) in enumerate(rows.groupby("simulator", sort=False)):
-            middle = 0.5 * (mine["low_mm"] + mine["high_mm"])
+            middle, rms = unbroken(mine)
             # gaps at other places in each show the line below where two lie on each other
             style = ("o-", "o--", "o-.", "o:")[number % 4]
-            axes.plot(middle, mine["rms_mm"], style, color=shown[str(name)], label=str(name), markersize=4)
+            axes.plot(middle, rms, style, color=shown[str(name)], label=str(name), markersize=4)
         plain(axes)
         _nearest(strip, rows, shown)
         strip.set_xlabel(f"{along}, mm")
@@ -57,6 +58,21 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
     # at the left and two abreast: what a phone shows of the figure before it is panned
     legend(figure, *panels[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return Drawing(figure, where)
+
+
+def unbroken(rows: pd.DataFrame) -> tuple[list[float], list[float]]:
+    """Middles of bins and their errors, with a NaN between two that do not touch: no line crosses an empty one."""
+    middles: list[float] = []
+    errors: list[float] = []
+    end = math.nan
+    for low, high, error in rows[["low_mm", "high_mm", "rms_mm"]].itertuples(index=False):
+        if low > end:
+            middles.append(0.5 * (end + low))
+            errors.append(math.nan)
+        middles.append(0.5 * (low + high))
+        errors.append(error)
+        end = high
+    return middles, errors
 
 
 def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:

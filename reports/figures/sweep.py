@@ -39,7 +39,8 @@ def sensitivity(run: RunFiles) -> Drawing | None:
 
 def with_unchanged(sweep: pd.DataFrame) -> pd.DataFrame:
     """The points of every parameter, the unchanged result among them where its value is known."""
-    varied = sweep[sweep["parameter"] != UNCHANGED].assign(in_use=False)
+    varied = sweep[sweep["parameter"] != UNCHANGED]
+    varied = varied.assign(in_use=varied["value"] == varied["unchanged"])
     plain_rows = sweep[sweep["parameter"] == UNCHANGED]
     parts = [varied]
     for parameter, rows in varied.groupby("parameter", sort=False):

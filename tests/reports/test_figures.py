@@ -21,6 +21,7 @@ from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
 from reports.figures._drawing import LEAST_MM, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
+from reports.figures.simulators import unbroken
 from reports.frames_file import FrameArrays, ScanCrop, frame_numbers, read_frame, read_scan, write_frames
 from reports.page import draw_sections
 from reports.schema import BUDGET, ENTRIES, ERRORS, POINTS, SUMMARY, SWEEP, TIMINGS
@@ -105,6 +106,22 @@ def test_the_unchanged_value_is_a_point_of_the_curve(tmp_path: Path) -> None:
     lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
     assert lines["to the traced wire"].get_xydata().tolist() == [[-15.0, 0.25], [0.0, 0.1], [15.0, 0.25]]
     assert lines["unchanged"].get_xydata().tolist() == [[0.0, 0.1]]
+
+
+def test_the_unchanged_value_has_its_ring_where_it_was_asked_for_too(tmp_path: Path) -> None:
+    """``--sweep simulate.taper_scale=0.5,1,2`` had none."""
+    rows = [{"parameter": "(plain)", "value": "", "case": "a", "rms_mm": 0.1}]
+    rows += [
+        {"parameter": "simulate.taper_scale", "value": value, "unchanged": "1", "case": "a", "rms_mm": rms}
+        for value, rms in (("0.5", 0.2), ("1", 0.1), ("2", 0.3))
+    ]
+    tables.write(tmp_path / "sweep.csv", SWEEP, rows)
+    sweep = tables.read(tmp_path / "sweep.csv", SWEEP)
+    drawing = RUN_FIGURES["sensitivity"](RunFiles({}, tables.read_if_there(None, SUMMARY), sweep))
+    assert drawing is not None
+    lines = {str(line.get_label()): line for line in drawing.figure.axes[0].get_lines()}
+    assert lines["to the traced wire"].get_xydata().tolist() == [[0.5, 0.2], [1.0, 0.1], [2.0, 0.3]]
+    assert lines["unchanged"].get_xydata().tolist() == [[1.0, 0.1]]
 
 
 def test_no_case_of_a_sweep_is_cut_off_and_an_interval_that_goes_on_says_so(tmp_path: Path) -> None:
@@ -417,6 +434,22 @@ def test_equal_curves_do_not_stretch_an_axis_down_to_rounding() -> None:
     axes = figure.subplots()
     positive_axis(axes, [[1e-16, 3e-16]])
     assert axes.get_ylim() == (0.0, LEAST_MM)
+
+
+def test_panels_that_share_an_axis_have_room_for_all_of_them() -> None:
+    """It ended above the first one's values: a bin of the second left its panel."""
+    first, second = Figure().subplots(1, 2, sharey=True)
+    first.plot([0, 1], [0.1, 0.15])
+    second.plot([0, 1], [0.1, 0.2])
+    positive_axis(first, [[0.1, 0.15, 0.2]])
+    assert second.get_ylim()[1] > 0.2
+
+
+def test_no_line_crosses_a_bin_in_which_nothing_was_measured() -> None:
+    bins = pd.DataFrame({"low_mm": [5.0, 10.0, 20.0], "high_mm": [10.0, 15.0, 25.0], "rms_mm": [0.1, 0.2, 0.3]})
+    middles, errors = unbroken(bins)
+    assert middles == [7.5, 12.5, 17.5, 22.5]
+    np.testing.assert_array_equal(errors, [0.1, 0.2, np.nan, 0.3])
 
 
 def test_the_largest_of_nearly_equal_values_has_room_for_its_marker() -> None:
