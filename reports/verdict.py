@@ -74,7 +74,7 @@ def tips_off(statistics: Mapping[str, Any]) -> str:
         return ""
     where = f"ends {number(abs(along))} mm {'short' if along < 0 else 'beyond'}" if abs(along) > 0.5 * tip else ""
     where = where or f"has its tip {number(tip)} mm off"
-    return f"It {where} (median): rms_mm does not see that, judge by tip_median_mm and back_rms_mm."
+    return f"It {where} (median): rms_mm does not see that, judge by tip_median_mm, and by back_rms_mm of errors.csv."
 
 
 def standing(statistics: Mapping[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,14 +67,19 @@ def main(args: argparse.Namespace) -> int:
         say(f"{name}: {last_line(*done[name])}")
         for text in remarks(done[name][0].pooled, name):
             say(f"{name}: warning: {text}")
-    # what the manifest or the scans are doubted for is the same of every simulator
-    warnings = dict.fromkeys(line for plan in plans.values() for line in warned(plan.out))
+    warnings = said_once({name: warned(plan.out) for name, plan in plans.items()})
     for line in warnings if not args.quiet else ():
         say(line)
     sys.stderr.writelines(f"{line}\n" for line in warnings if args.quiet)
     for line in side_by_side(args.out, {name: plan.out for name, plan in plans.items()}, args.embed):
         say(line)
     return 0 if all(totals.all_ok for totals, _ in done.values()) else 1
+
+
+def said_once(said: Mapping[str, Sequence[str]]) -> list[str]:
+    """Each warning once: as it is where all simulators have it, as of manifest or scans, else behind their names."""
+    owners = {line: [n for n, lines in said.items() if line in lines] for lines in said.values() for line in lines}
+    return [line if len(names) == len(said) else f"{', '.join(names)}: {line}" for line, names in owners.items()]
 
 
 def _plans(args: argparse.Namespace) -> "dict[str, Plan]":

@@ -35,7 +35,7 @@ def _traces_of_wire(image: Subtraction) -> bool:
 def no_wire(image: Subtraction) -> Curve:
     """The empty curve, with status and note, of a frame in which no line passes the entry."""
     status, allowed = FrameStatus.NO_WIRE, f"a bright line in the lumen within {ENTRY_REACH_MM} mm of entry_mm"
-    do = "check entry_mm and that the frame shows a wire"
+    do = "check entry_mm, entry_direction and that the frame shows a wire"
     if _traces_of_wire(image):
         status, allowed = FrameStatus.TRACE_LOW_CONTRAST, "a contrast of 2.5 noises"
         do = f"{do}; list a frame of a smaller depth before it, or scan with more dose"

@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.cli import main
+from pipeline.commands.score import said_once
 from pipeline.load.geometry import LoadError, Source
 from pipeline.load.vtk import read_vtk_points
 from pipeline.load.wires import numbered_frames, read_wires
@@ -79,6 +80,12 @@ def test_a_folder_of_a_sweep_may_be_scored() -> None:
 
 SOLVERS = ("push_force_N", "iterations", "num_mm", "snaps", "uncertain", "least_pivot")
 """Columns that only the solver itself can fill."""
+
+
+def test_a_warning_of_one_simulator_bears_its_name() -> None:
+    """A mirrored wire's stood behind the solver's own line, as if it were of that one."""
+    said = {"theirs": ["scan", "mirrored"], "third": ["scan", "jagged", "mirrored"], "wireval": ["scan"]}
+    assert said_once(said) == ["scan", "theirs, third: mirrored", "third: jagged"]
 
 
 def test_own_wires_give_the_identical_table(tmp_path: Path) -> None:

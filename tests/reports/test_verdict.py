@@ -92,7 +92,7 @@ def test_a_wire_that_ends_elsewhere_is_not_called_better(along: float | None, sa
     row |= {"skill_strongest": 0.9, "skill_strongest_low": 0.8, "strongest_null": "previous"}
     assert badge("ok", True, row) == {"text": "the tips lie off", "look": "poor"}
     assert f"It {said} (median)" in verdict(row)
-    assert "judge by tip_median_mm and back_rms_mm" in verdict(row)
+    assert "judge by tip_median_mm, and by back_rms_mm of errors.csv" in verdict(row)
     assert "That is better" not in verdict(row)
     assert badge("ok", True, row | {"tip_median_mm": 0.29})["look"] == "good"
     assert badge("ok", True, row | {"rms_mm": 0.7})["look"] == "good", "a tip is the worst of most wires"
