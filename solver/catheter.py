@@ -12,8 +12,8 @@ from solver.grid import read_only
 from solver.wire import GuideWire
 
 PIECES = 32
-"""Pieces of a stretch in which the stiffness changes and the rest shape is curved: there the pair's rest curvature is
-not linear. From an EI of 1 to one of 1000 the sum over the pieces is right to 1e-3."""
+"""Pieces of a stretch with a curved rest shape in which stiffness or curvature change: the pair's rest curvature is not
+linear there, nor is the energy stored. From an EI of 1 to one of 1000 the sum over the pieces is right to 1e-3."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ def _both(own: Profile) -> tuple[Array, Array, Array]:
         # inside a stretch, short of its ends, both are straight lines
         inner = np.array([0.25, 0.75]) * (b - a) + a
         lines = [np.interp(inner, x, y) for x, y in ((own.stiffness_at, own.stiffness), (own.rest_at, own.rest))]
-        count = 1 if not np.any(lines[1]) or np.ptp(lines[0]) <= 1e-3 * lines[0][0] else PIECES
+        alike = np.ptp(lines[0]) <= 1e-3 * lines[0][0] and np.ptp(lines[1]) == 0.0
+        count = 1 if alike or not np.any(lines[1]) else PIECES
         t = np.linspace(0.0, 1.0, count + 1)
         s = [line[0] + (2.0 * t - 0.5) * (line[1] - line[0]) for line in lines]
         rows.append(np.stack([a + t * (b - a), *s]))

@@ -1,7 +1,7 @@
 """simulate, where another simulator did it: each frame takes that simulator's wire, or has failed."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from pipeline.arrays.polyline import resample
 from pipeline.load.wires import OtherFile, read_wires
 from pipeline.model import Array, OtherWire, arc_length
 from pipeline.run.stages.known import Context, Frame, Known
+from pipeline.run.stages.own_curves import rough
 from pipeline.simulate import wall_of
 from pipeline.simulate.others import MIRROR, begun, not_to_depth, oddity
 from pipeline.status import FrameStatus
@@ -30,7 +31,11 @@ def frames_of_others(run: Context, known: Known) -> tuple[Frame, ...]:
     log.assumptions.append(
         f"the simulated wires are another simulator's: {_listed(files)}; their depth counts from the clamp's plane"
     )
-    log.warnings += _outside(known, frames, case.wire.radius_mm)
+    assert known.lumen is not None
+    wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
+    voxel_mm = float(min(known.lumen.distance.spacing_mm))
+    log.warnings += _outside(known, wires, case.wire.radius_mm)
+    log.warnings += rough(wires, voxel_mm, "the simulated wires", "give a point every millimetre")
     return tuple(frames)
 
 
@@ -62,9 +67,8 @@ def _clearance(known: Known, points: Array) -> Array:
     return wall_of(known.lumen.distance, "offset").look_up(resample(points, STEP_MM))[0]
 
 
-def _outside(known: Known, frames: Sequence[Frame], radius_mm: float) -> list[str]:
-    """Warnings where wires lie outside the lumen, and whether they would not with x and y turned."""
-    wires = {f.index: f.simulated.joints_mm for f in frames if f.simulated is not None}
+def _outside(known: Known, wires: Mapping[int, Array], radius_mm: float) -> list[str]:
+    """Warnings where wires (n, 3), by frame, lie outside the lumen, and whether they would not with x and y turned."""
     outside = {n: np.mean(_clearance(known, wire) > radius_mm) for n, wire in wires.items()}
     outside = {n: share for n, share in outside.items() if share > MOST_OUTSIDE}
     if not outside:

@@ -4,7 +4,7 @@ No scan has to be there for that. A curve in straight lines from voxel to voxel 
 simulated beside it; one of few points cuts its own corners; one in another vessel is no wire of this lumen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,7 @@ CORNER_VOXELS = 0.25
 LEAST_BEND_MM = 0.01
 """By how much a curve that is not straight is longer than its chord: as 5 mm of a wire with a radius of 20 mm."""
 MOST_NAMED = 6
+RESAMPLE = "give more; 3D Slicer saves a curve's control points alone: resample it before it is saved"
 
 
 def given_curves(run: Context) -> list[Curve]:
@@ -92,16 +93,15 @@ def _in_lumen(curve: Curve, distance: Grid) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_LEFT_LUMEN, note=note)
 
 
-def rough(frames: Sequence[Frame], voxel_mm: float) -> list[str]:
-    """A warning of own curves that cut the wire's corners."""
-    apart = {f.index: corner_mm(curve.points_mm) for f in frames if (curve := f.trusted_curve) is not None}
+def rough(curves: Mapping[int, Array], voxel_mm: float, whose: str, mend: str) -> list[str]:
+    """A warning of curves (n, 3), by frame, that cut the wire's corners. whose, mend : words for it."""
+    apart = {frame: corner_mm(points) for frame, points in curves.items()}
     coarse = [f"frame {n}: {mm:.2f} mm" for n, mm in apart.items() if mm > CORNER_VOXELS * voxel_mm]
     if not coarse:
         return []
     return [
-        f"the manifest's own curves have few points: straight lines between them pass beside a smooth wire "
-        f"({listed(coarse, MOST_NAMED)}; {CORNER_VOXELS * voxel_mm:.2f} mm would do): give more; 3D Slicer saves "
-        "a curve's control points alone: resample it before it is saved"
+        f"{whose} have few points: straight lines between them pass beside a smooth wire "
+        f"({listed(coarse, MOST_NAMED)}; {CORNER_VOXELS * voxel_mm:.2f} mm would do): {mend}"
     ]
 
 

@@ -20,7 +20,7 @@ from pipeline.run.stages.depths import in_step, shrinking, turned_round
 from pipeline.run.stages.dim_ends import own_dim_ends
 from pipeline.run.stages.gaps import own_gaps
 from pipeline.run.stages.known import Context, Frame, Known
-from pipeline.run.stages.own_curves import as_given, given_curves, rough
+from pipeline.run.stages.own_curves import RESAMPLE, as_given, given_curves, rough
 from pipeline.run.stages.repeated import known_by, once
 from pipeline.run.stages.thickness import too_thin
 from pipeline.run.stages.wire_free import wire_in_reference
@@ -72,7 +72,8 @@ def _in_step(run: Context, frames: list[Frame], voxel_mm: float) -> list[Frame]:
     frames = in_step(frames, voxel_mm)
     run.log.warnings += shrinking(frames, voxel_mm)
     if run.case.traces:
-        run.log.warnings += rough(frames, voxel_mm)
+        own = {f.index: curve.points_mm for f in frames if (curve := f.trusted_curve) is not None}
+        run.log.warnings += rough(own, voxel_mm, "the manifest's own curves", RESAMPLE)
     return frames
 
 
