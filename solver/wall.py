@@ -1,5 +1,6 @@
 """The vessel wall: the signed distance to the lumen, interpolated so that energies can be checked."""
 
+import warnings
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,6 +21,10 @@ MAKE_A_DISTANCE = (
     "a mask of the lumen is made one by scipy.ndimage: "
     "distance_transform_edt(~mask, spacing_mm) - distance_transform_edt(mask, spacing_mm)"
 )
+SLICES = 16
+FLAT, STEEP = 0.5, 1.75
+"""Gradients at the wall that no distance in mm has: in voxels of 0.5 mm it is 2, in metres 0.001. A lumen of a voxel's
+radius has 1.0, one with noise of half a voxel 1.6."""
 
 
 def _is_mask(values: Array, least: float, largest: float) -> bool:
@@ -58,6 +63,31 @@ def _checked(grid: Grid) -> Array:
     return values
 
 
+def steepness(values: Array, spacing_mm: Array) -> float:
+    """Median gradient of distances (nx, ny, nz) over spacing (3,) where their sign changes; NaN where it never does.
+
+    Looks at SLICES slices: the whole grid would take as long as the spline.
+    """
+    at = np.arange(0, len(values) - 1, max(1, len(values) // SLICES))
+    here = values[at, :-1, :-1]
+    beside = values[at + 1, :-1, :-1], values[at, 1:, :-1], values[at, :-1, 1:]
+    crossed = np.any([np.signbit(here) != np.signbit(other) for other in beside], axis=0)
+    if not crossed.any():
+        return float("nan")
+    steps = [(other[crossed] - here[crossed]) / h for other, h in zip(beside, spacing_mm, strict=True)]
+    return float(np.median(np.linalg.norm(steps, axis=0)))
+
+
+def _warn_of(steep: float) -> None:
+    """A warning where the gradient at the wall is not that of a distance in mm."""
+    if steep < FLAT or steep > STEEP:
+        warnings.warn(
+            f"wall: distance: it changes by {steep:.2g} per mm across the wall, a signed distance in mm by 1; is it in "
+            "voxels or in metres, is the spacing right, are the axes x, y, z?",
+            stacklevel=4,
+        )
+
+
 def _padded(coefficients: Array) -> NDArray[np.float32]:
     """Coefficients with their ghost layers: c[-1] = 2 c[0] - c[1], which goes on linearly beyond the grid.
 
@@ -78,7 +108,8 @@ class VesselWall:
 
     stiffness_N_mm2 : k, in N/mm per mm of wire.     friction : Coulomb's coefficient, 0 costs nothing.
     hull : "offset" (the smooth limit d = max(0, φ + radius)) or "samples:N" (N points around each joint).
-    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid.
+    Beyond the grid the distance continues linearly. Raises ValueError for NaN or inf in the grid; warns where it
+    is no distance in mm by its slope at the wall.
     """
 
     distance: Grid
@@ -92,6 +123,7 @@ class VesselWall:
         self._check_law()
         _ = self.samples
         values = _checked(instance("wall", "distance", self.distance, Grid))
+        _warn_of(steepness(values, self.distance.spacing_mm))
         marks = creases(values, self.distance.spacing_mm)
         prefilter(values)
         to_index = np.ascontiguousarray((self.distance.direction / self.distance.spacing_mm).T)

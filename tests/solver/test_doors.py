@@ -373,3 +373,25 @@ def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
 ) -> None:
     monkeypatch.setattr(sys.modules["solver.relax"], "base_frame", lambda *_: np.full((3, 3), np.nan))
     assert relaxed(method=method).status is solver.Status.NON_FINITE
+
+
+@pytest.mark.parametrize(
+    ("change", "steep"),
+    [(lambda d: d / 0.25, "4"), (lambda d: 1e-3 * d, "0.001"), (lambda d: (d + 2.0) ** 2 - 4.0, "4")],
+    ids=["in voxels", "in metres", "squared"],
+)
+def test_a_distance_in_another_unit_is_warned_of(change: Any, steep: str) -> None:
+    """Wires went into such a lumen and came to rest, on a wall many times too hard or too soft."""
+    grid = tube_grid()
+    with pytest.warns(UserWarning, match=f"changes by {steep}(?:\\.\\d)? per mm across the wall"):
+        VesselWall(grid.with_values(solver.grid.read_only(change(grid.values.astype(np.float64)))), 1.0)
+
+
+@pytest.mark.parametrize("lumen", [0.25, 0.5, 2.0])
+@pytest.mark.parametrize("noise", [0.0, 0.1])
+def test_a_distance_in_mm_is_not_however_thin_the_lumen_or_rough_its_wall(lumen: float, noise: float) -> None:
+    grid = tube_grid(lumen=lumen)
+    rough = noise * np.random.default_rng(1).normal(size=grid.shape)
+    VesselWall(grid.with_values(solver.grid.read_only(np.clip(grid.values + rough, -1.0, 1.0))), 1.0)
+    flat = Grid(np.full((4, 4, 4), -1.0))
+    VesselWall(flat, 1.0)
