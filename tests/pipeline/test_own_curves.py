@@ -174,10 +174,12 @@ def test_score_says_what_the_curves_are_doubted_for(tmp_path: Path, capsys: pyte
     """Its warnings stood on the pages of the cases alone."""
     manifest = write_study(tmp_path)
     write_csv(tmp_path / "traces", [resample(wire, 8.0) for wire in WIRES])
-    write_csv(tmp_path / "theirs", WIRES)
+    write_csv(tmp_path / "theirs", [resample(wire, 5.0) for wire in WIRES])
     words = ["score", str(manifest), "--curves", f"theirs={tmp_path / 'theirs'}", *QUICK]
     assert main([*words, "-o", str(tmp_path / "out")]) == 0
-    assert capsys.readouterr().out.count("own curves have few points") == 1
+    said = capsys.readouterr().out
+    assert said.count("own curves have few points") == 1
+    assert said.count("theirs: warning: the simulated wires have few points") == 1
     assert main([*words, "-o", str(tmp_path / "out"), "-q"]) == 0
     told = capsys.readouterr()
     assert "few points" in told.err

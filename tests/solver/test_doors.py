@@ -377,13 +377,13 @@ def test_an_undefined_frame_behind_the_doors_is_not_called_converged_either(
 
 @pytest.mark.parametrize(
     ("change", "steep"),
-    [(lambda d: d / 0.25, "4"), (lambda d: 1e-3 * d, "0.001"), (lambda d: (d + 2.0) ** 2 - 4.0, "4")],
+    [(lambda d: d / 0.25, "4"), (lambda d: 1e-3 * d, "0.001"), (lambda d: (d + 2.0) ** 2 - 4.0, "3.9")],
     ids=["in voxels", "in metres", "squared"],
 )
 def test_a_distance_in_another_unit_is_warned_of(change: Any, steep: str) -> None:
     """Wires went into such a lumen and came to rest, on a wall many times too hard or too soft."""
     grid = tube_grid()
-    with pytest.warns(UserWarning, match=f"changes by {steep}(?:\\.\\d)? per mm across the wall"):
+    with pytest.warns(UserWarning, match=f"changes by {steep} per mm across the wall"):
         VesselWall(grid.with_values(solver.grid.read_only(change(grid.values.astype(np.float64)))), 1.0)
 
 
