@@ -386,6 +386,9 @@ def test_a_length_that_disagrees_with_the_insertion_is_a_named_status():
     given = Curve(wire, np.full(len(wire), np.nan))
     assert of_length(given, 11.0, TraceConfig()) is of_length(given, None, TraceConfig()) is given
     assert of_length(given, 16.0, TraceConfig()).status is FrameStatus.LENGTH_MISMATCH
+    for expected, said in ((1.2, "would do in cm"), (0.012, "would do in m:"), (16.0, ""), (1.7, "")):
+        assert ("would do" in of_length(given, expected, TraceConfig()).note) == bool(said)
+        assert said in of_length(given, expected, TraceConfig()).note
 
 
 def test_a_trace_that_ends_with_the_catheter_may_be_the_catheter_s():
