@@ -120,3 +120,16 @@ def test_the_ceiling_lies_between_the_frames_around(quarter_torus: tuple[Lumen, 
 def test_what_is_told_of_the_frame_is_no_rival() -> None:
     assert not {"pinned", "neighbours"} & set(nulls.rivals())
     assert {"centreline", "previous", "roll_unknown", "no_tip_curve", "another"} <= set(nulls.rivals())
+
+
+def test_a_way_through_voxels_ends_in_the_lumen_where_its_ends_lie_outside() -> None:
+    """Two rooms with a wall between: from one to the other there is no way; what lies in the wall begins beside it."""
+    cost = np.full((5, 5, 9), np.inf)
+    cost[2, 2, :4] = cost[2, 2, 5:] = 1.0
+    grid = Grid(cost, [0.5, 0.5, 0.5])
+    outside, near, far = np.array([1.0, 1.9, 0.0]), np.array([1.0, 1.0, 1.5]), np.array([1.0, 1.0, 4.0])
+    path = nulls.voxel_path(grid, cost, outside, near)
+    assert path is not None
+    np.testing.assert_allclose(path, [outside, [1, 1, 0.5], [1, 1, 1.0], [1, 1, 1.5]], rtol=0.0, atol=1e-12)
+    assert nulls.voxel_path(grid, cost, near, far) is None
+    assert nulls.voxel_path(grid, np.full(cost.shape, np.inf), near, far) is None
