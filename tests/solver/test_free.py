@@ -90,3 +90,15 @@ def test_profile_forms_agree() -> None:
     forms = ([[0, 1.0], [50, 6.0]], lambda s: 1.0 + 0.1 * s)
     tips = [relax(GuideWire(1.0, 0.1, f), depth_mm=40.0, load_N=[0.003, 0, 0]).joints_mm[-1] for f in forms]
     np.testing.assert_allclose(tips[0], tips[1], rtol=0.0, atol=1e-6)
+
+
+def test_push_and_reaction_differ_by_the_force_on_a_rod_that_leaves_its_sleeve_bent() -> None:
+    """M²/2EI (Bosi et al. 2015): the introducer bears the load's axial part, the hand that less what the wire holds."""
+    load, errors = np.array([0.02, 0.0, 0.01]), []
+    for segment in (1.0, 0.5, 0.25):
+        solution = relax(GuideWire(segment, 0.18, STIFFNESS), depth_mm=30.0, load_N=load)
+        assert solution.reaction_force_N[2] == pytest.approx(-0.01, rel=1e-9)
+        moment = np.linalg.norm(np.cross(solution.joints_mm[-1], load))
+        errors.append(solution.push_force_N - (-0.01 - 0.5 * moment**2 / STIFFNESS))
+    assert abs(errors[0]) < 2e-3 * 0.01
+    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 4.0, rtol=0.0, atol=0.3)  # second order
