@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver import GuideWire, Insertion, Insertions, Solution, VesselWall, skips
+from solver import Grid, GuideWire, Insertion, Insertions, Solution, Status, VesselWall, skips
 from solver._kernels.lanes.relax import POOL
 from solver._kernels.lanes.vectors import WIDTH, room
 from solver.crew import Job, first_points
@@ -87,6 +87,25 @@ def test_each_comes_to_lie_as_by_itself(threads: int) -> None:
     found = both(wires_in_the_bend, depths, rolls, threads)
     assert all(s.converged for solutions in found for s in solutions)
     assert max(s.max_penetration_mm for solutions in found for s in solutions) > 0.01, "they must touch"
+
+
+def tips_at_a_septum() -> list[Insertion]:
+    """Eight curved tips turned towards the next lumen, behind a wall of 0.6 mm that most are stiff enough to pass."""
+    axes = (np.arange(-3, 7, 0.3), np.arange(-3, 3.1, 0.3), np.arange(-3, 30, 0.3))
+    x, y, _ = np.meshgrid(*axes, indexing="ij")
+    distance = np.minimum(np.hypot(x, y) - 1.2, np.hypot(x - 3, y) - 1.2)
+    wall, made = VesselWall(Grid(distance, [0.3] * 3, [-3, -3, -3]), 1.0), []
+    for n in range(8):
+        wire = GuideWire(0.5, 0.18, [[0, 1.0], [15, 4.0]], [[0, 0.2 + 0.05 * n], [6, 0.2 + 0.05 * n], [6, 0]])
+        own = wall.like(stiffness_N_mm2=(0.3, 1.0, 3.0, 10.0)[n % 4])
+        made.append(Insertion(wire, own, [0, 0, 0], [0, 0, 1], material_axis=[1, 0, 0]))
+    return made
+
+
+def test_tips_that_a_septum_stops_or_does_not() -> None:
+    found = both(tips_at_a_septum, [np.arange(1.0, 26.0)] * 8, [0.0] * 8)
+    statuses = {solution.status for solutions in found for solution in solutions}
+    assert statuses >= {Status.CONVERGED, Status.THROUGH_WALL}
 
 
 def test_back_again_rolled_and_to_no_depth_at_all() -> None:
