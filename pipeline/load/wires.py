@@ -23,6 +23,8 @@ OF_KIND = {**READERS, ".vtk": read_vtk_points}
 IN_HDF5 = (".h5", ".hdf5")
 KINDS = (*OF_KIND, *IN_HDF5)
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
+USUAL = {"space": "LPS", "unit": "mm"}
+"""What is stated of coordinates, in the order of ``stated_in``, and what most have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,20 +123,27 @@ def _read(path: Path, space: str, unit: str) -> OtherFile:
 
 def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
     """Space and unit of a file, as it or the caller states them; LoadError where neither does, or they differ."""
-    agreed = []
-    for what, own, given, key in zip(
-        ("space", "unit"), stated_in(path, kind), (space, unit), ("LPS", "mm"), strict=True
-    ):
-        if own and given and own != given:
-            raise unusable(path, f"{what}: the file says {own}, stated was {given}; correct one of them")
-        if not own and not given:
-            how = f"say --{what} {key}, or {what} = {key!r} in the manifest's simulated"
-            also = f"; or write '# {what}: {key}' above the table; columns x_mm, y_mm, z_mm say LPS mm"
-            raise unusable(path, f"{what} is not stated and will not be guessed; {how}{also * (kind == '.csv')}")
-        agreed.append(own or given)
+    own = dict(zip(USUAL, stated_in(path, kind), strict=True))
+    given = dict(zip(USUAL, (space, unit), strict=True))
+    for what in USUAL:
+        if own[what] and given[what] and own[what] != given[what]:
+            raise unusable(path, f"{what}: the file says {own[what]}, stated was {given[what]}; correct one of them")
+    if missing := [what for what in USUAL if not (own[what] or given[what])]:
+        raise unusable(path, _unstated(missing, kind))
+    agreed = own["space"] or given["space"], own["unit"] or given["unit"]
     if agreed[1] not in UNITS_MM:
         raise unusable(path, f"unit {agreed[1]!r}; allowed: {', '.join(UNITS_MM)}")
-    return agreed[0], agreed[1]
+    return agreed
+
+
+def _unstated(missing: Sequence[str], kind: str) -> str:
+    """What to do where space, unit or both are not stated."""
+    are = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not stated and will not be guessed"
+    say = " ".join(f"--{what} {USUAL[what]}" for what in missing)
+    keys = ", ".join(f"{what} = {USUAL[what]!r}" for what in missing)
+    lines = " and ".join(f"'# {what}: {USUAL[what]}'" for what in missing)
+    also = f"; or write {lines} above the table; columns x_mm, y_mm, z_mm say LPS mm" * (kind == ".csv")
+    return f"{are}; say {say}, or {keys} in the manifest's simulated{also}"
 
 
 def _checked(name: str, points: Array) -> OtherFile:

@@ -230,7 +230,7 @@ def test_bad_frames_fail_and_the_others_count(known: Known, tmp_path: Path) -> N
     assert list(table["status"]) == ["ok", *["curve_unusable"] * 3]
     said = [failure["message"] for failure in json.loads(json.dumps(result["failures"]))]
     assert "wire_001.csv: has columns a, b; expected x_mm, y_mm, z_mm (or x, y, z), separated by commas" in said[0]
-    assert "wire_002.csv: space is not stated" in said[1]
+    assert "wire_002.csv: space and unit are not stated" in said[1]
     assert r"wire_003.csv: has columns '\x00\x01\x02'; expected" in said[2], "nothing that a terminal would obey"
 
 
@@ -253,7 +253,8 @@ def test_a_refusal_says_which_simulator_and_which_file(
 def test_what_is_wrong_with_all_is_refused(known: Known, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     wires = known[1]
     for name, folder, said in (
-        ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space is not stated"),
+        ("bare", write_csv(tmp_path / "bare", wires, "x,y,z"), "space and unit are not stated"),
+        ("cm", write_csv(tmp_path / "cm", wires, "# unit: cm\nx,y,z"), "space is not stated and will not be guessed"),
         ("unit", write_csv(tmp_path / "unit", wires, "# space: LPS\nx,y,z"), "unit is not stated"),
         ("feet", write_csv(tmp_path / "feet", wires, "# space: LPS\n# unit: ft\nx,y,z"), "unit 'ft'"),
         ("five", write_csv(tmp_path / "five", [*wires, wires[-1]]), "5 files, wire_000.csv to wire_004.csv, for 4"),
