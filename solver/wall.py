@@ -51,7 +51,9 @@ def _checked(grid: Grid) -> Array:
     if min(values.shape) < 2:
         refuse("wall", "grid shape", values.shape, "at least 2 voxels along each axis", "pad the distance map")
     # whatever is undefined is so in the sum, which takes no memory
-    if not np.isfinite(values.sum()) and (bad := ~np.isfinite(values)).any():
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = values.sum()
+    if not np.isfinite(total) and (bad := ~np.isfinite(values)).any():
         where = [int(i) for i in np.argwhere(bad)[0]]
         got = f"{values[tuple(where)]} at voxel {where} ({int(bad.sum())} such voxels)"
         refuse("wall", "grid values", got, "finite signed distances in mm", "fill or crop these voxels")

@@ -18,6 +18,7 @@ from tests.solver.scenes import tube_grid
 
 WIRE = GuideWire(1.0, 0.18, 10.0)
 TUBE = np.full((3, 4, 5), -1.0)
+ENDLESS = np.where(np.arange(60).reshape(3, 4, 5) % 2, np.inf, -np.inf)
 WALL = VesselWall(Grid(TUBE), 1.0)
 MASK = np.hypot(*np.mgrid[-3:3.5, -3:3.5, 0:5][:2]) < 2.0
 MASKS = [1.0 - 2.0 * MASK, 0.5 - MASK, np.where(MASK, -1e3, 1e3), np.sign(np.mgrid[-3.0:4, 0:7, 0:7][0])]
@@ -100,7 +101,16 @@ DOORS: dict[str, tuple[Callable[..., Any], dict[str, list[Any]]]] = {
     "wall": (
         wall,
         {
-            "distance": ["x", None, TUBE, TUBE < 0, Grid(TUBE < 0), Grid((TUBE < 0).astype(np.uint8)), Grid(-TUBE)]
+            "distance": [
+                "x",
+                None,
+                TUBE,
+                TUBE < 0,
+                Grid(TUBE < 0),
+                Grid((TUBE < 0).astype(np.uint8)),
+                Grid(-TUBE),
+                Grid(ENDLESS),
+            ]
             + [Grid(np.where(np.arange(60).reshape(3, 4, 5) == 7, bad, -1.0)) for bad in (np.nan, np.inf, -1e30)]
             + [Grid(mask.astype(kind)) for mask in MASKS for kind in (np.float32, np.float64)],
             "stiffness_N_mm2": NOT_NUMBERS + HUGE + BELOW,
