@@ -46,7 +46,7 @@ def oddity(points_mm: Array, entry_mm: Array, direction: Array) -> str:
     """Why a wire cannot have been pushed in at this entry, and what would make it fit; empty where it can."""
     back = _turned_back(points_mm)
     if back:
-        return f"it turns straight back at point {back}: are its points in order?"
+        return f"it turns straight back at point {back}: are its points in order, or do they scatter?"
     wrong = _misplaced(points_mm, entry_mm, direction)
     if not wrong:
         return ""
