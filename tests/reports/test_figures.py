@@ -18,7 +18,7 @@ from reports._content import caption
 from reports.case_files import CaseFiles, read_case
 from reports.colours import ERROR_SCALE_MM, TRACED
 from reports.figures import RunFiles, _drawing, _planes, declared, figures_of
-from reports.figures._drawing import LEAST_MM, positive_axis
+from reports.figures._drawing import LEAST_MM, Drawing, FrameAxis, positive_axis
 from reports.figures._style import STAGE_COLOURS, lines, predictors
 from reports.figures.along_wire import _CLIP_PERCENTILE
 from reports.figures.simulators import unbroken
@@ -610,3 +610,15 @@ def test_the_first_figure_draws_the_predictor_that_the_verdict_names(tmp_path: P
     assert said == {"predictor: previous frame (strongest)"}
     assert not shown
     assert "strongest" not in read
+
+
+def test_marks_of_frames_lie_where_their_values_are_drawn() -> None:
+    """Percent of the figure from its left and upper edge, along x or down y."""
+    figure = Figure(figsize=(6.0, 4.0), dpi=50)
+    wide, tall = figure.add_axes((0.1, 0.2, 0.5, 0.6)), figure.add_axes((0.7, 0.2, 0.2, 0.6))
+    wide.set_xlim(10.0, 60.0)
+    tall.set_ylim(4.5, -0.5)
+    frames = [FrameAxis(wide, {0: 10.0, 3: 35.0}), FrameAxis(tall, {0: 0.0, 4: 4.0}, across=False)]
+    first, second = Drawing(figure, pd.DataFrame(), frames=frames).marks
+    assert first == {"box": [10.0, 20.0, 50.0, 60.0], "across": True, "at": {"0": 10.0, "3": 35.0}}
+    assert second == {"box": [70.0, 20.0, 20.0, 60.0], "across": False, "at": {"0": 26.0, "4": 74.0}}
