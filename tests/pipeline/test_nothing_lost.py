@@ -266,6 +266,8 @@ def test_the_cache_has_a_limit_and_a_check(
     one = mine.entries()[0][1]
     assert main(["cache", "--limit", "5"]) == 2, "meant as 5 GB, it removed all"
     assert len(mine.entries()) == 4
+    assert mine.trim(4 * one) == (0, 0)
+    assert mine.trim(4 * one - 1) == (1, one), "a byte too much"
     assert main(["cache", "--limit", f"{2 * one / 1024}K"]) == 0
     assert [path.stem[0] for path, _, _ in mine.entries()] == ["a", "d"]
     assert mine.limit == 2 * one
