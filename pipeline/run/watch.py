@@ -61,6 +61,7 @@ class Watch:
     stream: TextIO = field(default_factory=lambda: sys.stderr)
     _start: float = field(default_factory=time.time)
     _finished: set[Path] = field(default_factory=set)
+    _told: bool = False
 
     @property
     def bar(self) -> bool:
@@ -75,10 +76,19 @@ class Watch:
         if self.silent or self.bar or total < 2:
             return
         passed = time.time() - self._start
-        rest = f", about {_clock(passed / done * (total - done))} left" if done < total else ""
+        rest = f", about {_clock(passed / done * (total - done))} left" if done < total and self._tells() else ""
         what = job.label if job.pictures else f"{job.label} with {job.out.name}"
         self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or became(job.folder)}\n")
         self.stream.flush()
+
+    def _tells(self) -> bool:
+        """Whether what is finished says how long the rest takes: a case of a sweep takes ten times as long as a point,
+        and comes first, so one with all its points must be finished.
+        """
+        if not self._told:
+            labels = {job.label for job in self.jobs}
+            self._told = bool(labels - {job.label for job in self.jobs if job.folder not in self._finished})
+        return self._told
 
     @contextmanager
     def shown(self) -> Iterator[None]:

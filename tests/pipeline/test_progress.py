@@ -114,6 +114,17 @@ def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:
     assert not Watch(batch, lines=True, stream=Terminal()).bar
 
 
+def test_a_sweep_tells_no_rest_before_one_case_has_all_its_points(tmp_path: Path) -> None:
+    """After the first of 48, a whole case, it said an hour; the rest were points of seconds, and took seven minutes."""
+    cases = jobs(tmp_path, 2)
+    batch = [job for case in cases for job in (case, replace(case, out=tmp_path / "sweep" / "a", pictures=False))]
+    stream = io.StringIO()
+    watch = Watch(batch, stream=stream)
+    for job in batch:
+        watch.finished(job)
+    assert ["left" in line for line in stream.getvalue().splitlines()] == [False, True, True, False]
+
+
 def test_a_line_says_what_became_of_a_case(tmp_path: Path) -> None:
     """A case without a lumen was "finished", as any other."""
     stream, batch = io.StringIO(), jobs(tmp_path, 5)
