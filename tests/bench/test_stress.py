@@ -220,6 +220,21 @@ def test_the_judge_sees_a_wire_that_is_not_at_rest() -> None:
     assert judge(plan, wire, wall, moved, float("nan"), False).fault == "not_at_rest"
 
 
+def test_the_judge_sees_a_free_wire_that_is_not_at_rest() -> None:
+    """Without a wall rounding causes no moment that could excuse it."""
+    plan = ScenePlan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
+    plan.stiffness, plan.load_N = [[0.0, 10.0]], (0.001, 0.0, 0.0)
+    wire, _ = build(plan)
+    solution = relax(wire, None, depth_mm=20.0, load_N=plan.load_N)
+    chain = assemble(wire, None, 20.0, plan.load_N)
+    assert not judge(plan, wire, None, solution, float("nan"), False).fault
+    angles = chain.angles(solution.frames)
+    angles[5, 0] += 0.01
+    nodes, frames = chain.roll_out(angles, solution.joints_mm[0], solution.frames[0])
+    moved = replace(solution, joints_mm=nodes, frames=frames, energy_N_mm=chain.energy(nodes, frames))
+    assert judge(plan, wire, None, moved, float("nan"), False).fault == "not_at_rest"
+
+
 def test_the_judge_sees_a_saddle() -> None:
     """A straight column under four times its buckling load is at rest, and no minimum."""
     plan = ScenePlan(0, 0, way="relax", wall=False, joints=20, depths=[20.0], rolls=[0.0])
