@@ -1,4 +1,4 @@
-"""Polylines: resampling, truncation and extension by arc length, tangents."""
+"""Polylines: resampling, truncation and extension by arc length, tangents, units of their lengths."""
 
 import warnings
 
@@ -10,6 +10,16 @@ from pipeline.model import Array, arc_length
 
 SAME_MM = 1e-6
 """Arc lengths closer than this are one."""
+UNITS_MM = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
+"""Units in which a length may have been given by mistake."""
+
+
+def unit_of(ratio: float, room: float) -> str:
+    """The unit in which a length is right that is ``ratio`` times too small in mm; empty for none.
+
+    room : how near log(ratio) must be to the logarithm of the unit's factor.
+    """
+    return next((name for name, factor in UNITS_MM.items() if abs(np.log(ratio / factor)) < room), "")
 
 
 def at_arc(curve_mm: ArrayLike, arc_mm: ArrayLike) -> Array:

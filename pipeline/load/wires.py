@@ -128,12 +128,12 @@ def _agreed(path: Path, kind: str, space: str, unit: str) -> tuple[str, str]:
     for what in USUAL:
         if own[what] and given[what] and own[what] != given[what]:
             raise unusable(path, f"{what}: the file says {own[what]}, stated was {given[what]}; correct one of them")
-    if missing := [what for what in USUAL if not (own[what] or given[what])]:
+    agreed = {what: own[what] or given[what] for what in USUAL}
+    if missing := [what for what in USUAL if not agreed[what]]:
         raise unusable(path, _unstated(missing, kind))
-    agreed = own["space"] or given["space"], own["unit"] or given["unit"]
-    if agreed[1] not in UNITS_MM:
-        raise unusable(path, f"unit {agreed[1]!r}; allowed: {', '.join(UNITS_MM)}")
-    return agreed
+    if agreed["unit"] not in UNITS_MM:
+        raise unusable(path, f"unit {agreed['unit']!r}; allowed: {', '.join(UNITS_MM)}")
+    return agreed["space"], agreed["unit"]
 
 
 def _unstated(missing: Sequence[str], kind: str) -> str:

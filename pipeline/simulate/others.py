@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from pipeline.arrays.polyline import angle_deg, at_arc
+from pipeline.arrays.polyline import UNITS_MM, angle_deg, at_arc, unit_of
 from pipeline.model import Array, arc_length
 
 AT_ENTRY_MM = 5.0
@@ -20,7 +20,6 @@ OVER_MM = 2.0
 STEP_BACK_MM, BACK = 0.05, -0.5
 """A step longer than this (mm) whose cosine to the one before is below this: no wire turns by 120 degrees there."""
 ROUNDING_MM = 1e-3
-UNITS = {"cm": 10.0, "inch": 25.4, "m": 1000.0, "µm": 1e-3}
 SAME = 0.15
 """How near log(depth / length) must be to the logarithm of a unit's factor for that unit to be suggested."""
 MIRROR = np.array([-1.0, -1.0, 1.0])
@@ -81,7 +80,7 @@ def _readings(points_mm: Array) -> Iterator[tuple[str, Array]]:
     """Other readings of the numbers (point order, RAS, units), each with the resulting points; fewest changes first."""
     orders = {"": points_mm, "read from its other end (tip first)": points_mm[::-1]}
     spaces = {"": np.ones(3), "RAS": MIRROR}
-    units = {"": 1.0} | {f"in {name}": factor for name, factor in UNITS.items()}
+    units = {"": 1.0} | {f"in {name}": factor for name, factor in UNITS_MM.items()}
     all_of_them = [tuple(zip(*named, strict=True)) for named in product(orders.items(), spaces.items(), units.items())]
     for names, (points, signs, factor) in sorted(all_of_them, key=lambda one: sum(map(bool, one[0]))):
         if any(names):
@@ -92,6 +91,6 @@ def not_to_depth(length_mm: float, depth_mm: float, tolerance_mm: float) -> str:
     """Why a wire does not have this depth, with a guess at its unit; empty where it does."""
     if abs(length_mm - depth_mm) <= tolerance_mm:
         return ""
-    unit = next((n for n, f in UNITS.items() if abs(np.log(depth_mm / max(length_mm, 1e-9) / f)) < SAME), "")
+    unit = unit_of(depth_mm / max(length_mm, 1e-9), SAME)
     hint = f"; is it in {unit}?" if unit else ""
     return f"it is {length_mm:.3g} mm long from the entry on, the frame {depth_mm:.2f} mm deep{hint}"

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from pipeline.arrays.polyline import unit_of
 from pipeline.model import Curve, Lumen, Volume
 from pipeline.ranges import Profile
 from pipeline.status import FrameStatus
@@ -24,8 +25,8 @@ __all__ = ["BEYOND_GAP", "DIM_FROM_TIP", "GAP", "cleared", "of_catheter", "of_le
 THICK_VOXELS = 1.6
 """Blur of a wire, from which its crest wanders: the ends of such wires, 0.9 mm in voxels of 0.15 mm, were 2 voxels off
 in a tenth of the scans that showed nothing else."""
-UNIT_ROOM = 0.1
-"""Share of its length to which a curve must fit a stated depth in another unit before that unit is named."""
+UNIT_ROOM = 0.095
+"""How near log(length / depth) must be to the logarithm of a unit's factor for that unit to be named: a tenth."""
 
 BACK_END = explained
 """How the curve is found: (subtraction, entry, previous, config) -> Curve."""
@@ -121,14 +122,6 @@ def of_catheter(curve: Curve, catheter_mm: float) -> Curve:
     return replace(curve, status=FrameStatus.TRACE_AMBIGUOUS, note=note, levels=levels)
 
 
-def _in_another_unit(length_mm: float, expected_mm: float | None) -> str:
-    """What the note adds where the expected depth would do, to UNIT_ROOM, in another unit."""
-    for unit, mm in (("cm", 10.0), ("m", 1000.0)):
-        if expected_mm is not None and abs(length_mm - mm * expected_mm) < UNIT_ROOM * length_mm:
-            return f"; it would do in {unit}: give mm"
-    return ""
-
-
 def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> Curve:
     """The curve, traced or given; an OK one whose length is too far from the expected one gets LENGTH_MISMATCH."""
     if curve.status is not FrameStatus.OK or missed_mm(curve.length_mm, expected_mm, config) == 0:
@@ -138,5 +131,6 @@ def of_length(curve: Curve, expected_mm: float | None, config: TraceConfig) -> C
     note += "trace.length_tolerance_mm"
     if hardly_begun(curve.length_mm, expected_mm):
         note += "; or entry_direction points back along the wire: turn it round"
-    note += _in_another_unit(curve.length_mm, expected_mm)
+    if expected_mm and (unit := unit_of(curve.length_mm / expected_mm, UNIT_ROOM)):
+        note += f"; it would do in {unit}: give mm"
     return replace(curve, status=FrameStatus.LENGTH_MISMATCH, note=note)

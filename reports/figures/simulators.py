@@ -1,9 +1,9 @@
 """Several simulators side by side: error along the wire and over depth, and who is nearest where."""
 
-import math
 from dataclasses import dataclass
 from itertools import cycle
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
@@ -62,17 +62,10 @@ def who_is_nearest(files: SimulatorFiles) -> Drawing | None:
 
 def unbroken(rows: pd.DataFrame) -> tuple[list[float], list[float]]:
     """Middles of bins and their errors, with a NaN between two that do not touch: no line crosses an empty one."""
-    middles: list[float] = []
-    errors: list[float] = []
-    end = math.nan
-    for low, high, error in rows[["low_mm", "high_mm", "rms_mm"]].itertuples(index=False):
-        if low > end:
-            middles.append(0.5 * (end + low))
-            errors.append(math.nan)
-        middles.append(0.5 * (low + high))
-        errors.append(error)
-        end = high
-    return middles, errors
+    low, high, error = (rows[name].to_numpy(float) for name in ("low_mm", "high_mm", "rms_mm"))
+    after = np.flatnonzero(low[1:] > high[:-1]) + 1
+    middles = np.insert(0.5 * (low + high), after, 0.5 * (high[after - 1] + low[after]))
+    return middles.tolist(), np.insert(error, after, np.nan).tolist()
 
 
 def _nearest(axes: Axes, rows: pd.DataFrame, shown: dict[str, str]) -> None:

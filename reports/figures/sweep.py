@@ -45,7 +45,7 @@ def with_unchanged(sweep: pd.DataFrame) -> pd.DataFrame:
     parts = [varied]
     for parameter, rows in varied.groupby("parameter", sort=False):
         value = rows["unchanged"].iloc[0]
-        if pd.notna(value) and value not in set(rows["value"]):
+        if pd.notna(value) and not rows["in_use"].any():
             parts.append(plain_rows.assign(parameter=parameter, value=value, unchanged=value, in_use=True))
     return pd.concat(parts, ignore_index=True)
 
