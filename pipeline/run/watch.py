@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TextIO
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn
 from rich.table import Column
 
 from pipeline.run.case import Job
@@ -76,18 +76,25 @@ class Watch:
         if self.silent or self.bar or total < 2:
             return
         passed = time.time() - self._start
-        rest = f", about {_clock(passed / done * (total - done))} left" if done < total and self._tells() else ""
+        rest = f", about {rest}" if (rest := self._rest(done)) else ""
         what = job.label if job.pictures else f"{job.label} with {job.out.name}"
         self.stream.write(f"{done}/{total} in {_clock(passed)}{rest}: {what} {error or became(job.folder)}\n")
         self.stream.flush()
 
+    def _rest(self, done: float) -> str:
+        """The time left, in words; none before it can be told."""
+        if not 0 < done < len(self.jobs) or not self._tells():
+            return ""
+        return f"{_clock((time.time() - self._start) / done * (len(self.jobs) - done))} left"
+
     def _tells(self) -> bool:
-        """Whether what is finished says how long the rest takes: a case of a sweep takes ten times as long as a point,
+        """Whether what is done says how long the rest takes: a case of a sweep takes ten times as long as a point,
         and comes first, so one with all its points must be finished.
         """
         if not self._told:
             labels = {job.label for job in self.jobs}
-            self._told = bool(labels - {job.label for job in self.jobs if job.folder not in self._finished})
+            left = {job.label for job in self.jobs if job.folder not in self._finished}
+            self._told = len(labels) == len(self.jobs) or bool(labels - left)
         return self._told
 
     @contextmanager
@@ -98,9 +105,9 @@ class Watch:
             return
         # the words come last and take what is left: on a narrow terminal they are cut, not the share and the rest
         words = TextColumn("{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True))
-        columns = TaskProgressColumn(), TimeRemainingColumn(), BarColumn(16), words
+        columns = TaskProgressColumn(), TextColumn("{task.fields[rest]}"), BarColumn(16), words
         with Progress(*columns, console=Console(file=self.stream), transient=True, expand=True) as progress:
-            task, stop = progress.add_task("starting", total=len(self.jobs)), threading.Event()
+            task, stop = progress.add_task("starting", total=len(self.jobs), rest=""), threading.Event()
             thread = threading.Thread(target=self._follow, args=(progress, task, stop), daemon=True)
             thread.start()
             try:
@@ -112,7 +119,8 @@ class Watch:
     def _follow(self, progress: Progress, task: TaskID, stop: threading.Event) -> None:
         while not stop.wait(EVERY_S):
             done, heard = self.now()
-            progress.update(task, completed=done, description=f"{len(self._finished)}/{len(self.jobs)} {heard}")
+            words = f"{len(self._finished)}/{len(self.jobs)} {heard}"
+            progress.update(task, completed=done, description=words, rest=self._rest(done))
 
     def now(self) -> tuple[float, str]:
         """Number of jobs done, with fractions for those that are running, and the latest log text of one of these."""

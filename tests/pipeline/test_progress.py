@@ -88,7 +88,7 @@ def test_one_bar_over_all_cases_on_a_terminal(tmp_path: Path, monkeypatch: pytes
         assert watch.now()[0] == 1.0
         time.sleep(3 * EVERY_S)
     assert "0/2 [c0]" in stream.getvalue(), "the name of a case is no markup"
-    assert re.search(r"\d\d%.* \S+:\d\d.* 1/2", stream.getvalue()), "share, time left and count"
+    assert re.search(r"\d\d%.* \d s left.* 1/2", stream.getvalue()), "share, time left and count"
     assert "1/2" in stream.getvalue()
 
 
@@ -114,15 +114,33 @@ def test_lines_with_the_rest_elsewhere(tmp_path: Path) -> None:
     assert not Watch(batch, lines=True, stream=Terminal()).bar
 
 
+def swept(folder: Path) -> list[Job]:
+    """Two cases, each with a point of a sweep."""
+    points = [(job, replace(job, out=folder / "sweep" / "a", pictures=False)) for job in jobs(folder, 2)]
+    return [job for both in points for job in both]
+
+
 def test_a_sweep_tells_no_rest_before_one_case_has_all_its_points(tmp_path: Path) -> None:
     """After the first of 48, a whole case, it said an hour; the rest were points of seconds, and took seven minutes."""
-    cases = jobs(tmp_path, 2)
-    batch = [job for case in cases for job in (case, replace(case, out=tmp_path / "sweep" / "a", pictures=False))]
+    batch = swept(tmp_path)
     stream = io.StringIO()
     watch = Watch(batch, stream=stream)
     for job in batch:
         watch.finished(job)
     assert ["left" in line for line in stream.getvalue().splitlines()] == [False, True, True, False]
+
+
+def test_nor_does_the_bar_of_a_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream, batch = Terminal(), swept(tmp_path)
+    watch = Watch(batch, stream=stream)
+    said = []
+    with watch.shown():
+        for job in batch[:2]:
+            watch.finished(job)
+            time.sleep(3 * EVERY_S)
+            said.append(" left" in stream.getvalue())
+    assert said == [False, True]
 
 
 def test_a_line_says_what_became_of_a_case(tmp_path: Path) -> None:
